@@ -78,10 +78,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
     """The run of a scene, in this process; `members` as given by the caller, none where there is no contact."""
-    from flexclear.pipeline.core.artifacts.effect_size import recorded, with_members
+    from flexclear.pipeline.core.artifacts.effect_size import recorded
     from flexclear.pipeline.dynamics.record.point import Runner
 
-    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members)).run(with_members(scene))
+    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members)).run(scene)
 
 
 def point(stored: xr.Dataset, scene: Scene, chosen: Sequence[Quantity]) -> Point:

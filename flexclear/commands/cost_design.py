@@ -83,7 +83,8 @@ class Design:
 
 
 def neighbours(scene: Scene, own: Setting) -> list[Design]:
-    """The scene as it is and its neighbourhood, what answers most first."""
+    """The scene as it is and its neighbourhood, what answers most first: by its own method, since another one must be
+    compiled. Only fixed steps call for it early, which are no reference."""
     asis, denser = _sampling(scene, own)
     if own.step is not None:
         mine = [_stepped(scene, own.integrator, own.step * factor) for factor in STEPS]
@@ -93,7 +94,8 @@ def neighbours(scene: Scene, own: Setting) -> list[Design]:
         mine = [_tolerant(scene, own.integrator, rtol) for rtol in tolerances]
         confirming = tuple(dict.fromkeys(max(own.rtol * factor, TIGHTEST) for factor in CONFIRMING))
     others = [_tolerant(scene, other, rtol) for rtol in confirming for other in _others(scene, own)]
-    return [asis, *mine[:2], *others[:1], *mine[2:4], denser, *others[1:], *mine[4:]]
+    early = 2 if own.step is not None else 4
+    return [asis, *mine[:early], *others[:1], *mine[early:4], denser, *others[1:], *mine[4:]]
 
 
 def _others(scene: Scene, own: Setting) -> list[str]:

@@ -215,7 +215,7 @@ def test_a_file_that_is_open_elsewhere_is_waited_for(tmp_path: Path, held: list[
 def test_a_file_that_stays_open_elsewhere_is_named(
     tmp_path: Path, held: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(platforms, "PATIENCE", 0.0)
+    monkeypatch.setattr(platforms, "WAIT_FOR_FILE", 0.0)
     new, old = tmp_path / "new", tmp_path / "run.nc"
     new.write_bytes(b"new")
     old.write_bytes(b"old")

@@ -1,5 +1,7 @@
 """Verdicts on plans: what is met, missed and not decided, before and beyond the horizon, and with how many members."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -62,9 +64,26 @@ def test_beyond_the_horizon_as_much_is_allowed_as_two_runs_of_the_scene_differ()
     assert many.allowed == pytest.approx(np.sqrt(2.0) * spread)
     # the spread is pooled over a twentieth of the series, so it is seen so much earlier
     assert many.horizon == pytest.approx(0.5, abs=0.5 * POOLED + 1.0 / n)
-    # from the same starts, too, the whole difference counts before the horizon
-    assert same_starts(early, full, q, 3, requested) == pytest.approx(3.0)
-    assert same_starts(late, full, q, 3, requested) == 0.0
+
+
+def test_from_the_same_starts_what_all_have_in_common_is_error_and_what_scatters_is_chance():
+    """Two ways to integrate from three starts: their differences are 3, or as large as their scatter about 0.5."""
+    n, requested, q = 400, 1.0, Quantity("b", "position")
+
+    def point(*offsets: float) -> Point:
+        rows = [{"b.position.series": np.full((n, 3), [offset, 0.0, 0.0])} for offset in offsets]
+        mean = _scattered(np.full(n, np.mean(offsets)), np.std(offsets, ddof=1))
+        return replace(mean, members=rows)
+
+    full = point(0.0, 0.1, -0.1)
+    common = same_starts(point(3.0, 3.1, 2.9), full, q, requested)
+    assert (common.difference, common.uncertainty) == (pytest.approx(3.0), pytest.approx(0.0))
+    scattered = same_starts(point(1.5, 0.1, -0.1), full, q, requested)
+    assert (scattered.difference, scattered.uncertainty) == (0.0, pytest.approx(0.5))
+    # beyond the horizon what exceeds chance counts, as a fraction of what two runs of the scene differ
+    beyond = same_starts(point(1150.0, 1450.0, 850.0), point(0.0, 300.0, -300.0), q, requested)
+    chance = 2.776 * 300.0 * np.sqrt(2.0 / 3.0)
+    assert beyond.difference == pytest.approx(np.sqrt(1150.0**2 - chance**2) / (300.0 * np.sqrt(2.0)), rel=1e-3)
 
 
 def test_members_are_added_until_all_is_decided_as_far_as_they_are_affordable():

@@ -51,13 +51,16 @@ def study(swing: Scene, place: Workplace) -> cost.Study:
     return found
 
 
-def test_a_first_answer_has_tighter_and_looser_runs_and_another_family_of_methods(csj: Scene):
+def test_a_first_answer_has_tighter_and_looser_runs_and_compiles_another_method_for_fixed_steps_only(csj: Scene):
     designs = cost_design.neighbours(csj, OWN)
     first = designs[: cost_design.FIRST]
     assert first[0].key == "as it is"
     tolerances = [d.scene.solver.rtol for d in first if d.scene.solver.integrator == "dop853"]
     assert min(tolerances) < OWN.rtol < max(tolerances)
-    assert {d.scene.solver.integrator for d in first} - {"dop853"}
+    assert {d.scene.solver.integrator for d in first} == {"dop853"}
+    assert designs[cost_design.FIRST + 1].scene.solver.integrator != "dop853"
+    fixed = cost_design.neighbours(csj, Setting("rk4", 1e-10, 1e-5))[: cost_design.FIRST]
+    assert any(d.group == "tolerance" for d in fixed)
     assert len({d.key for d in designs}) == len(designs)
 
 

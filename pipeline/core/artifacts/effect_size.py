@@ -23,7 +23,6 @@ from scipy.special import stdtrit
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.numerics.rotations import rotation_between
 from flexclear.pipeline.core.scene.quantity import Quantity, Recorded
-from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3
@@ -31,8 +30,6 @@ RARE = 1e-3
 LIKELY = 0.05
 #: fraction of a series over which the spread of members is pooled
 POOLED = 0.05
-#: by how much the starts of members differ: a fraction of the clearance, and the least [m]
-MEMBER_OFFSET, LEAST_OFFSET = 1e-3, 1e-8
 #: what is recorded of a quantity to compare it by: the series, and of what impacts make large its extreme, which is
 #: read where it is and not at an output
 OF_KIND = {
@@ -106,19 +103,6 @@ def chance(members: int, rare: float = RARE) -> float:
     return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * rare))
 
 
-def with_members(scene: Scene) -> Scene:
-    """The scene with members whose starts differ by a hair: a thousandth of its least clearance, at least 1e-8 m.
-
-    No start is known better; and members that are nearer to each other than the errors of a loose tolerance would make
-    these look like influences.
-    """
-    clearances = [joint.clearance for joint in scene.contacts().values()]
-    perturbation = max(LEAST_OFFSET, MEMBER_OFFSET * min(clearances, default=0.0))
-    changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=perturbation)})
-    changed._name, changed._path = scene.name, scene.path
-    return changed
-
-
 def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
     """Recorded values of a run to compare it by; quantities that its scene does not have are left out.
 
@@ -175,23 +159,29 @@ def _beyond(distance: np.ndarray, doubt: np.ndarray) -> np.ndarray:
     return np.sqrt(squares)
 
 
-def same_starts(a: Point, b: Point, quantity: Quantity, members: int, requested: float) -> float:
-    """How far two ways to integrate one scene differ from the same starts, in the quantity's SI unit.
+def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Influence:
+    """How far two ways to integrate one scene differ from the same starts, two at least, in the quantity's SI unit.
 
-    While runs of b agree within what is requested, all of the difference counts; beyond, what exceeds LIKELY chance,
-    as a fraction of what may be off there (`Agreement.allowed`).
+    While runs of b agree within what is requested, what the starts have in common is the error: the mean of their
+    differences, less LIKELY chance by Student's paired t. The rest of that mean is uncertain. Beyond, what exceeds
+    LIKELY chance of a difference of means counts, as a fraction of what may be off there (`Agreement.allowed`).
     """
     if quantity.kind == "impact_times":
-        return _impact_times(a, b, quantity.name).difference
-    turning, most = quantity.kind == "orientation", 0.0
+        return _impact_times(a, b, quantity.name)
+    turning, n, error, most = quantity.kind == "orientation", len(b.members), 0.0, 0.0
     for name in (f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)):
-        distance, error = _along(a, b, name, members, turning=turning)
+        distance, of_means = _along(a, b, name, n, turning=turning)
         if np.isinf(distance).any():
-            return np.inf
+            return Influence(np.inf)
+        pairs = zip(a.members, b.members, strict=True)
+        spread = np.std([_rows(one[name]) - _rows(two[name]) for one, two in pairs], axis=0, ddof=1)
+        of_pairs = _pooled(np.linalg.norm(spread, axis=1) * (2.0 if turning else 1.0)) / np.sqrt(n)
         allowed = _allowed(b, name, requested, turning=turning)
-        doubt = np.where(allowed > requested, chance(members, LIKELY) * error, 0.0)
-        most = max(most, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
-    return most
+        alike = allowed <= requested
+        doubt = np.where(alike, stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * of_pairs, chance(n, LIKELY) * of_means)
+        error = max(error, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
+        most = max(most, error, float(distance[alike].max(initial=0.0)))
+    return Influence(error, most - error)
 
 
 def _allowed(full: Point, name: str, requested: float, *, turning: bool) -> np.ndarray:

@@ -31,7 +31,7 @@ class Point:
     a tighter
     tolerance.  deviation: standard deviation over the members.  Both are empty where nobody asked.
     evaluations: of the right-hand side, all runs of the point together.
-    refused: why there are no values; else empty.
+    refused: why there are no values; else empty.  members: values of each start; artifacts lack them.
     """
 
     values: Values
@@ -39,6 +39,7 @@ class Point:
     deviation: Values
     evaluations: int
     refused: str = ""
+    members: Sequence[Values] = ()
 
 
 def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Dataset:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.contact.law import Resolved
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.contact.law import Resolved
 
 #: above this fraction of the inner radius a contact is no longer small and Hertz's theory ends
 SMALL_CONTACT = 0.3

@@ -28,6 +28,7 @@ class Chosen:
     """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown.
 
     ledger_tolerance: energy error beyond which the run is refused, where it is not the usual one.
+    evaluations, reference: that a run of all the time takes, and one by what it was compared with, where that is known.
     """
 
     integrator: str
@@ -35,6 +36,8 @@ class Chosen:
     error: Mapping[str, float]
     level: int | None = None
     ledger_tolerance: float | None = None
+    evaluations: float = np.nan
+    reference: float = np.nan
 
 
 @dataclass

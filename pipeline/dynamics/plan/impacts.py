@@ -17,6 +17,7 @@ from flexclear.pipeline.core.scene.integrators import DEFAULT
 from flexclear.pipeline.core.scene.variants import Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.screening_runs import LEAST_PART, MEMBERS, OF_TIGHT, TAKES_LONG, shorter
+from flexclear.pipeline.dynamics.plan.tolerance import TIGHTEST
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
 #: rigid bodies and fewer modes are only trusted that were seen over this part of the time
@@ -24,8 +25,8 @@ LEAST_SEEN = 0.5
 #: what is tried: next to impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
 #: looser than that of the pilots where these are tight
 QUICK, QUICK_RTOL = "dopri5", 1e-4
-#: what they are compared with: the pilots' method at so much tighter a tolerance, at most the default one
-TIGHTER, TIGHTEST = 1e-2, 1e-10
+#: what they are compared with: the pilots' method at so much tighter a tolerance, at most `TIGHTEST`
+TIGHTER = 1e-2
 #: of the largest energy error of a run, what one over a part of the time may have, as a fraction of that part
 OF_LEDGER = 0.25
 #: energy error that the planned run may have then: what it does to the requested quantities has been tested
@@ -69,6 +70,8 @@ def quickest(search: Search) -> Chosen:
     loose, fraction = pilots.loose(pilots.variant(gone)), pilots.part(gone)
     tight, most = max(TIGHTER * loose, TIGHTEST), OF_TIGHT * pilots.extent.most
     unknown = Chosen(DEFAULT, tight, dict.fromkeys(search.requested, np.nan))
+    if pilots.must_run(gone, fraction).refused:
+        return unknown
     levels = _levels(search)
     if levels and fraction < LEAST_SEEN:
         if pilots.point(gone, fraction=LEAST_SEEN, rtol=tight, evaluations=most).refused:
@@ -79,28 +82,33 @@ def quickest(search: Search) -> Chosen:
     if TAKES_LONG in there.refused and fraction > LEAST_PART:
         fraction = shorter(fraction)
         there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
-    whole = pilots.must_run(gone, fraction)
-    if whole.refused or there.refused:
+    if there.refused:
         return unknown
-    for level in [*levels, None]:
-        for rtol in sorted({QUICK_RTOL, loose}, reverse=True):
+    for rtol in (QUICK_RTOL, loose):
+        for level in [*levels, None]:
             if pilots.work > MOST_WORK:
                 return unknown
-            tried = _tried(search, level, fraction, rtol, whole)
-            errors = _errors(search, tried, there, fraction)
-            if search.fits(errors):
+            rival = there if rtol > loose else pilots.must_run(gone, fraction)
+            tried = _tried(search, level, fraction, rtol, rival)
+            errors, fits = _errors(search, tried, there, fraction)
+            if fits:
                 search.spend(errors)
-                return Chosen(QUICK, rtol, errors, level, LEDGER)
+                taken = [point.evaluations / (MEMBERS * fraction) for point in (tried, there)]
+                return Chosen(QUICK, rtol, errors, level, LEDGER, *taken)
             if level is not None and _by_modes(search, errors, pilots.between(tried, there)):
-                break
-    errors = _errors(search, whole, there, fraction)
-    return Chosen(DEFAULT, loose, errors) if search.fits(errors) else unknown
+                levels = [k for k in levels if k != level]
+    errors, fits = _errors(search, pilots.must_run(gone, fraction), there, fraction)
+    return Chosen(DEFAULT, loose, errors) if fits else unknown
 
 
-def _errors(search: Search, tried: Point, there: Point, fraction: float) -> dict[str, float]:
-    """What a way to integrate errs by over the whole time, by quantity."""
+def _errors(search: Search, tried: Point, there: Point, fraction: float) -> tuple[dict[str, float], bool]:
+    """What a way to integrate errs by over the whole time, by quantity, and whether it may.
+
+    That must fit into the budget, and what was seen, chance included, into what is requested.
+    """
     differences = search.pilots.same_starts(tried, there, search.requested)
-    return {name: (1.0 + _more(fraction)) * difference for name, difference in differences.items()}
+    errors = {name: (1.0 + _more(fraction)) * i.difference for name, i in differences.items()}
+    return errors, search.fits(errors) and all(differences[q].most <= r for q, r in search.requested.items())
 
 
 def _by_modes(search: Search, most: Mapping[str, float], effect_sizes: Mapping[str, Influence]) -> bool:
@@ -123,12 +131,13 @@ def _levels(search: Search) -> list[int]:
     return [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
 
 
-def _tried(search: Search, level: int | None, fraction: float, rtol: float, whole: Point) -> Point:
-    """A run of a level of modes at a tolerance, given up where it takes longer or loses energy too fast."""
+def _tried(search: Search, level: int | None, fraction: float, rtol: float, rival: Point) -> Point:
+    """A run of a level of modes at a tolerance, given up where it takes longer than another run of all modes, or
+    loses energy too fast."""
     pilots = search.pilots
     saved = 1.0 if level is None else pilots.saved(level)
     limits: dict[str, Any] = {
-        "evaluations": int(saved * whole.evaluations / MEMBERS) + 1,
+        "evaluations": int(saved * rival.evaluations / MEMBERS) + 1,
         "ledger_tolerance": OF_LEDGER * CHOSEN * fraction,
     }
     return pilots.point(search.gone, level=level, fraction=fraction, integrator=QUICK, rtol=rtol, **limits)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.effect_size import Influence, influence, recorded, same_starts, with_members
+from flexclear.pipeline.core.artifacts.effect_size import Influence, influence, recorded, same_starts
 from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import edited
@@ -20,6 +20,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.run import placed
 
 #: starts of pilots with contacts: enough to see whether the motion parts
@@ -83,16 +84,23 @@ class Pilots:
     work: float = 0.0
     refused_loose: bool = False
     _extent: Extent | None = None
+    _variants: dict[tuple[frozenset[str], bool], Scene] = field(default_factory=dict)
+    _engines: dict[tuple[frozenset[str], int | None, str], Engine | None] = field(default_factory=dict)
 
-    def variant(self, gone: Collection[Effect], **solver: object) -> Scene:
-        """The scene without some effects, integrated as `solver` says, else as pilots are."""
-        bare = without(self.scene, gone)
+    def variant(self, gone: Collection[Effect]) -> Scene:
+        """The scene without some effects, integrated as pilots are."""
+        names = frozenset(effect.name for effect in gone)
+        if (names, self.refused_loose) not in self._variants:
+            self._variants[names, self.refused_loose] = self._made(without(self.scene, gone))
+        return self._variants[names, self.refused_loose]
+
+    def _made(self, bare: Scene) -> Scene:
         contacts = bool(bare.contacts() or bare.stop)
         smooth = bool(bare.flexible()) and not contacts
         usual: dict[str, object] = {"integrator": SMOOTH, "rtol": SMOOTH_RTOL} if smooth else {"rtol": RTOL}
         if contacts:
             usual = {"rtol": self.loose(bare), "evaluations": self.extent.most}
-        return self.filled(edited(bare, {"solver": usual | solver}))
+        return self.filled(edited(bare, {"solver": usual}))
 
     def loose(self, variant: Scene) -> float:
         """The tolerance of a variant with contacts."""
@@ -137,20 +145,21 @@ class Pilots:
         level: with so few modes of those bodies that have a choice; None: with all.  members: starts, where there are
             contacts.
         """
-        scene = self.variant(gone, **solver)
-        mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
-        if level is not None:
-            mine |= {name: bundle for name, bundle in self.fewer[level].items() if name in mine}
-            scene = with_modes(scene, self.modes(level, mine))
-        if fraction < 1.0:
-            scene = edited(scene, {"time.end": scene.time.start + fraction * (scene.time.end - scene.time.start)})
-        names = frozenset(effect.name for effect in gone)
-        key = (names, json.dumps([scene.solver.model_dump(mode="json"), level, fraction, members]))
+        scene, names = self.variant(gone), frozenset(effect.name for effect in gone)
+        key = (names, json.dumps([scene.solver.model_dump(mode="json") | solver, level, fraction, members]))
         if key not in self.points:
+            mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
+            if level is not None:
+                mine |= {name: bundle for name, bundle in self.fewer[level].items() if name in mine}
+                scene = with_modes(scene, self.modes(level, mine))
+            end = scene.time.start + fraction * (scene.time.end - scene.time.start)
+            scene = edited(scene, {f"solver.{k}": v for k, v in solver.items()} | {"time.end": end})
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
-            measured = Runner(mine, recorded(scene.owners(), self.chosen), starts).run(with_members(scene))
-            self.points[key] = measured
+            place = names, level, scene.solver.integrator
+            runner = Runner(mine, recorded(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
+            measured = self.points[key] = runner.run(scene)
+            self._engines[place] = runner.engine
             self.evaluations += measured.evaluations
             self.work += measured.evaluations * self._variables(mine)
         return self.points[key]
@@ -187,8 +196,8 @@ class Pilots:
             return {q.name: Influence(np.inf) for q in self.chosen}
         return {q.name: influence(a, b, q, MEMBERS) for q in self.chosen}
 
-    def same_starts(self, a: Point, b: Point, requested: Mapping[str, float]) -> dict[str, float]:
+    def same_starts(self, a: Point, b: Point, requested: Mapping[str, float]) -> dict[str, Influence]:
         """Difference of two ways to integrate one variant, in each quantity; infinite where one was refused."""
         if a.refused or b.refused:
-            return dict.fromkeys(requested, np.inf)
-        return {q.name: same_starts(a, b, q, MEMBERS, requested[q.name]) for q in self.chosen}
+            return dict.fromkeys(requested, Influence(np.inf))
+        return {q.name: same_starts(a, b, q, requested[q.name]) for q in self.chosen}

@@ -30,6 +30,9 @@ STIFF_TRIED = (1e-3, 1e-4)
 TIGHT = 1e-8
 #: by so much a planned run must be cheaper than the scene as it is
 CHEAPER = 1.2
+#: tightest tolerance of references, and how many times the evaluations the scene's own one may call for at most: a
+#: thousandth of the tolerance 2.4 times, by the method's order 8
+TIGHTEST, AT_MOST = 1e-10, 4.0
 
 
 def smooth(pilots: Pilots, gone: Sequence[Effect], requested: Mapping[str, float], level: int | None) -> Chosen:
@@ -91,10 +94,16 @@ def as_it_is(search: Search, chosen: Chosen) -> bool:
     bare = pilots.variant(gone)
     if scene.solver.step is not None or not (bare.contacts() or bare.stop):
         return False
+    fewer = 1.0 if chosen.level is None else pilots.saved(chosen.level)
+    integrator, rtol = own_method(scene) or (DEFAULT, scene.solver.rtol)
+    # the reference is the scene by its own method, at no tighter tolerance
+    known = not gone and integrator == DEFAULT and rtol <= TIGHTEST
+    dear = scene.by_need() and not chosen.reference < AFFORDABLE / AT_MOST
+    if known and not dear and CHEAPER * chosen.evaluations / fewer <= chosen.reference:
+        return False
     fraction, most = pilots.part(gone), OF_TIGHT * pilots.extent.most
     ways = {"integrator": chosen.integrator, "rtol": chosen.rtol, "evaluations": most}
     planned = pilots.point(gone, level=chosen.level, fraction=fraction, members=0, **ways)
-    integrator, rtol = own_method(scene) or (DEFAULT, scene.solver.rtol)
     full = pilots.point((), fraction=fraction, members=0, integrator=integrator, rtol=rtol, evaluations=most)
     taken = most if TAKES_LONG in full.refused else full.evaluations
     if scene.by_need() and taken > fraction * AFFORDABLE:
@@ -102,7 +111,6 @@ def as_it_is(search: Search, chosen: Chosen) -> bool:
         taken = most if TAKES_LONG in full.refused else full.evaluations
     if planned.refused or not taken:
         return bool(planned.refused)
-    fewer = 1.0 if chosen.level is None else pilots.saved(chosen.level)
     return CHEAPER * planned.evaluations / fewer > taken
 
 

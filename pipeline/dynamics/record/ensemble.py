@@ -22,6 +22,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.cores import side_by_side, width
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
@@ -40,6 +41,9 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
+#: by how much members start apart where the scene does not say: a fraction of a contact's clearance or depth, which
+#: count as at least a fraction of the mechanism's size times that
+FRACTION_OF_CLEARANCE, LEAST_OF_SIZE = 1e-3, 2.5e-8
 #: variables of one member by name, with the dimensions of the schema but `member`, and why its method was `switched`
 Member = dict[str, np.ndarray]
 
@@ -106,6 +110,24 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     facts = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}
     facts |= attributes(scene) | {"title": f"{requested.members} motions of {subject(scene)}"}
     return conform(made, ENSEMBLE, **facts, seed=requested.seed, perturbation=requested.perturbation)
+
+
+def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
+    """What the scene says of its members; where it says nothing, by how much they start apart [m].
+
+    That is FRACTION_OF_CLEARANCE of the least clearance: no start is known better. It is at least LEAST_OF_SIZE of the
+    mechanism's size, since the errors of a loose tolerance would make members that are nearer look like influences.
+    Contacts that the start presses together hold it in equilibrium, so that members differ by the same fraction of
+    their depth at most: more would change the force itself and shake the mechanism.
+    """
+    model = engine.model
+    if model.scene.ensemble is not None:
+        return model.scene.ensemble
+    engine.attempt(start, engine.start)
+    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"]
+    clearance = min((joint.clearance for joint in model.scene.contacts().values()), default=0.0)
+    pressed = max(least, depths[depths > 0.0].min(initial=np.inf))
+    return Ensemble(perturbation=min(max(least, FRACTION_OF_CLEARANCE * clearance), FRACTION_OF_CLEARANCE * pressed))
 
 
 def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np.ndarray]:

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.quantity import MAGNITUDES, Recorded
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
+from flexclear.pipeline.core.scene.schema import Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record.dataset import chosen
-from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
+from flexclear.pipeline.dynamics.record.ensemble import ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
@@ -74,14 +74,16 @@ class Runner:
         scene = thinned(scene, self.recorded)
         try:
             try:
-                values, deviation, count = self._values(scene, place, alive)
+                rows, count = self._rows(scene, place, alive)
             except DearError:
                 scene = unverified(scene)
-                values, deviation, count = self._values(scene, place, alive)
+                rows, count = self._rows(scene, place, alive)
+            values, deviation = _statistics(rows)
             if not self.error:
-                return Point(values, {}, deviation, count)
+                return Point(values, {}, deviation, count, members=rows)
             tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
-            better, _, more = self._values(tight, place, alive)
+            others, more = self._rows(tight, place, alive)
+            better, _ = _statistics(others)
         except (SolverError, InputError) as error:
             return Point({}, {}, {}, 0, str(error))
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
@@ -99,7 +101,8 @@ class Runner:
             return False  # as each point reports by itself
         return self.engine is not None and self.engine.method.staged and not INTERPRETED
 
-    def _values(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[Values, Values, int]:
+    def _rows(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[list[Values], int]:
+        """Recorded values of each start, and the evaluations of all."""
         if scene.event:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
@@ -108,20 +111,16 @@ class Runner:
         engine.straight.place = place
         if in_sections(self.recorded):
             values, count = _sections(scene, engine, self.recorded, alive)
-            return values, {}, count
+            return [values], count
         rows, count, judges = list[Values](), 0, affordable(scene)
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other, judges and judges.run)
             with self._looking:
                 rows.append(_kept(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
-        if not self.members:
-            return rows[0], {}, count
-        stacked = {name: np.stack([values[name] for values in rows]) for name in rows[0]}
-        means = {name: values.mean(axis=0) for name, values in stacked.items()}
-        return means, {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}, count
+        return rows, count
 
-    def _over_events(self, scene: Scene, alive: Progress) -> tuple[Values, Values, int]:
+    def _over_events(self, scene: Scene, alive: Progress) -> tuple[list[Values], int]:
         """Recorded values of a scene with events, read from its whole run."""
         if in_sections(self.recorded) or self.members:
             raise InputError("[event]", "a run with events has neither sections nor members", "record other reductions")
@@ -137,7 +136,7 @@ class Runner:
                 values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
             else:
                 values[one.name] = np.asarray(quantities.events(run, one.quantity)[0])
-        return values, {}, int(run.attrs["evaluations"])
+        return [values], int(run.attrs["evaluations"])
 
     def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
         """What runs a point, and the maker of what continues with another integrator; made one at a time."""
@@ -156,8 +155,17 @@ class Runner:
         if not self.members:
             return [start]
         jacobian = offset_jacobian(engine, start)
-        offsets = ball_offsets(model, model.scene.ensemble or Ensemble(), self.members)
+        offsets = ball_offsets(model, difference_of_starts(engine, start), self.members)
         return [perturbed(engine, start, jacobian, moved) for moved in offsets]
+
+
+def _statistics(rows: Sequence[Values]) -> tuple[Values, Values]:
+    """Means over starts and their standard deviations; of one start its values alone."""
+    if len(rows) == 1:
+        return rows[0], {}
+    stacked = {name: np.stack([values[name] for values in rows]) for name in rows[0]}
+    deviation = {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}
+    return {name: values.mean(axis=0) for name, values in stacked.items()}, deviation
 
 
 def in_sections(recorded: Sequence[Recorded]) -> bool:

@@ -356,7 +356,7 @@ def _why_not(study: xr.Dataset) -> str:
     if best is NOTHING:
         return "every run is refused, or has another number of impacts than the reference"
     if best.error <= ROUNDED * float(unsure.sel(quantity=best.worst)):
-        agree = f"two independent methods at the tightest tolerances that were run differ as much ({best.worst})"
+        agree = f"the reference and its confirmation, the tightest runs that were made, differ as much ({best.worst})"
         if not study.attrs.get("complete", 1):
             return f"{agree}; a larger budget allows tighter ones"
         return f"{agree}; rounding errors, which the motion itself magnifies, decide there, and no method helps"
