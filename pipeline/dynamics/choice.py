@@ -1,8 +1,9 @@
-"""Choice between the kinds present, as compiled branches; one kind needs no branch."""
+"""Choice between the kinds present, as branches; one kind needs no branch. And what is repeated."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -10,6 +11,12 @@ from flexclear.pipeline.dynamics.kernels import kernel
 @kernel
 def nothing(d):
     """Do what the parts do of which a mechanism has none."""
+
+
+def repeat(step: Callable[..., bool], *arguments: Any) -> None:
+    """Call a kernel again as long as it returns true; on a tape that is a loop (`specialise.trace`)."""
+    while step(*arguments):
+        pass
 
 
 def choose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:

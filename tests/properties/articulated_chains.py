@@ -8,6 +8,7 @@ import pytest
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
+from flexclear.pipeline.dynamics.effects import Scheme
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model import model as modelling
 from flexclear.pipeline.dynamics.model.arrays import WorkSpace
@@ -85,11 +86,12 @@ def tabulated(monkeypatch: pytest.MonkeyPatch, scene: Scene, articulated: bool) 
         return tabulate(build(scene, {}))
 
 
-def right_hand_side(model: Model) -> Any:
-    """The kernel of the right-hand side that is compiled for a model."""
+def kernels(model: Model) -> tuple[Any, Any]:
+    """The kernels of the laws of time and of the right-hand side of a model."""
     scope: dict[str, Any] = {}
-    exec(sources.kernels(model.parts)["evaluate"].partition("@calls")[0], scope)
-    return scope["right_hand_side"]
+    for text in (sources.sources(model.parts, Scheme("dop853"))["prescribe"], sources.straight(model.parts, ())):
+        exec(text.partition("@calls")[0].partition("WIRING")[0], scope)
+    return scope["laws"], scope["rates"]
 
 
 def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any = float) -> Evaluated:
@@ -108,10 +110,11 @@ def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any
     w[y : y + model.ny], n[n[m.MODE] :] = start, 1
     w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
     n[n[m.ACTIVE] : n[m.ACTIVE] + model.arrays.size(m.N_LAWS)] = model.arrays.table(m.LAWS)["piece0"]
-    plain = (Trace(0) if number is float else Long(0)).plain(right_hand_side(model))
+    laws, rates_then = map((Trace(0) if number is float else Long(0)).plain, kernels(model))
 
     def rates(h: Any, f: Any, w: Any, n: Any, y: int, dy: int) -> None:
-        plain(h, f, w, n, number(0.1), y, dy)
+        laws(h, f, w, n, number(0.1))
+        rates_then(h, f, w, n, y, dy)
 
     keep_independent(model, h, y, dy, w.copy(), n.copy(), rates)
     rates(h.tolist(), f.astype(number), w, n, y, dy)
