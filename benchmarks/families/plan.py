@@ -208,7 +208,7 @@ def show(records: list[Record]) -> dict[str, str]:
         "kept": lambda r: ", ".join(r["kept"]) or "nothing",
         "verdict": lambda r: r["judged"],
         "members": lambda r: str(r["members"]),
-        "error / allowed": lambda r: f"{short(r['share'])} ± {short(r['chance'])}",
+        "error / allowed": lambda r: "refused" if r["share"] is None else f"{short(r['share'])} ± {short(r['chance'])}",
     }
     misses = [r for r in done if r["judged"] in (MISSED, UNDECIDED)]
     other = [f"{r['case']}: {r['reason']}" for r in records if "judged" not in r]
@@ -223,6 +223,8 @@ def show(records: list[Record]) -> dict[str, str]:
 def _worst(done: list[Record]) -> str:
     """The worst miss, in words."""
     missed = [r["share"] for r in done if r["judged"] == MISSED]
+    if None in missed:  # logs have no infinity
+        return "a planned run whose energy balance, for one of its members, is refused"
     return f"{max(missed):.2g} times what is allowed" if missed else "none"
 
 
