@@ -51,7 +51,7 @@ def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
     family: Family = pickle.loads(packed)
     scene = rebuild(family.simulate, family.inputs)
     recorded = [parse_recorded(name, scene.owners()) for name in family.keep]
-    return scene, Runner(bundles(family.inputs), recorded, family.members, family.error)
+    return scene, Runner(bundles(family.inputs), recorded, family.members, family.error, scaled=False)
 
 
 def work(

@@ -114,7 +114,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
-    """What the scene says of its members; where it says nothing, by how much they start apart [m].
+    """By how much members start apart [m] where the scene does not say.
 
     That is FRACTION_OF_CLEARANCE of the least clearance: no start is known better. It is at least LEAST_OF_SIZE of the
     mechanism's size, since the errors of a loose tolerance would make members that are nearer look like influences.
@@ -122,8 +122,6 @@ def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
     their depth at most: more would change the force itself and shake the mechanism.
     """
     model = engine.model
-    if model.scene.ensemble is not None:
-        return model.scene.ensemble
     engine.attempt(start, engine.start)
     least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model)
     clearance = min((joint.clearance for joint in model.scene.contacts().values()), default=0.0)

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.quantity import MAGNITUDES, Recorded
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.core.scene.schema import Scene, Sections
+from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
@@ -53,13 +53,15 @@ class Runner:
     """Runs points of one family, all edits of one scene with the same bundles; keeps the engine that it made first.
 
     recorded: the quantities.  members: starts of each point that differ by a hair; 0: the one of the scene.
-    error: whether each point is run at a tighter tolerance as well.
+    error: whether each point is run at a tighter tolerance as well.  scaled: whether starts differ by what clearances,
+    depths and the size allow, where the scene has no ensemble; else by the default of ensembles.
     """
 
     bundles: Mapping[str, Labelled]
     recorded: Sequence[Recorded]
     members: int = 0
     error: bool = False
+    scaled: bool = True
     engine: Engine | None = None
     _making: Lock = field(default_factory=Lock)
     #: what is seen of all rows is large, and seen in turn it is there once
@@ -155,8 +157,9 @@ class Runner:
         if not self.members:
             return [start]
         jacobian = offset_jacobian(engine, start)
-        offsets = ball_offsets(model, difference_of_starts(engine, start), self.members)
-        per_length = np.ones(len(model.contacts)) if model.scene.ensemble else 1.0 / arms(model)
+        given = model.scene.ensemble or (None if self.scaled else Ensemble())
+        offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.members)
+        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model)
         return [perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3)) for moved in offsets]
 
 
