@@ -384,7 +384,7 @@ def read_peers(path: Path) -> dict[str, list[Track]]:
     try:
         if path.stat().st_size > LARGEST_PEERS:
             raise ValueError(f"it is larger than {LARGEST_PEERS >> 20} MB")
-        scenes = json.loads(path.read_text("utf-8"))
+        scenes = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(scenes, dict) or not all(isinstance(tracks, list) for tracks in scenes.values()):
             raise ValueError("it must be a table of scenes, each with a list of tracks")
     except (OSError, ValueError, RecursionError) as error:
