@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised, straight_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
@@ -39,6 +39,14 @@ class Mechanism:
     def engine(self) -> Engine:
         """Its compiled engine."""
         return engine_of(self.scene, self.bundles, silent)
+
+    def general_engine(self) -> Engine:
+        """Its engine that evaluates with the kernels for all wirings, as what is too long for straight code does."""
+        proper, straight_code.suited = straight_code.suited, lambda model: False
+        try:
+            return self.engine()
+        finally:
+            straight_code.suited = proper
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
         """The same bundles under an edited scene."""

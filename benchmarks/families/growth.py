@@ -61,7 +61,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 def _absent(effect: str) -> Record:
     full, without = mechanism("far_csj_cb"), mechanism(ABSENT[effect])
-    engines = {"stripped": stripped(full, effect).engine(), "without": without.engine()}
+    engines = {"stripped": stripped(full, effect).general_engine(), "without": without.general_engine()}
     times = interleaved({label: _evaluation(engine, EVALUATIONS) for label, engine in engines.items()}, ROUNDS)
     return {
         "scene": without.name,
@@ -87,24 +87,28 @@ def stripped(full: Mechanism, effect: str) -> Mechanism:
 
 
 def _grown(what: str, grown: Mapping[Case, Mechanism]) -> Measured:
-    """Evaluations in free flight; of outputs whole runs."""
+    """Evaluations in free flight by the kernels and, where there is such, by straight code; of outputs whole runs."""
     tasks, more = dict[str, Callable[[], float]](), dict[str, Record]()
     for case, here in grown.items():
         if what == "outputs":
             tasks[case.name] = partial(once, partial(dynamics.simulate, here.scene, here.bundles, silent))
             continue
-        engine = here.engine()
-        tasks[case.name] = _evaluation(engine, max(EVALUATIONS // (case.of if what == "loops" else 4), 10))
-        if what == "modes":
+        tasks[case.name] = _evaluation(
+            here.general_engine(), max(EVALUATIONS // (case.of if what == "loops" else 4), 10)
+        )
+        engine = here.engine() if what != "loops" else None
+        if engine is not None and engine.has_straight_code:
+            tasks[f"{case.name}, straight"] = _evaluation(engine, EVALUATIONS // 4)
+        if engine is not None and what == "modes":
             arrays = engine.model.arrays
             held, products = int(arrays.table(m.FLEXES)["n_held"][0]), len(arrays.table(m.MOMENTS))
             more[case.name] = {"held": held, "products": products}
-    times = interleaved(tasks, RUNS if what == "outputs" else ROUNDS)
+    unit, rounds = ("s", RUNS) if what == "outputs" else ("us", ROUNDS)
+    times = interleaved(tasks, rounds)
     for case in grown:
-        found = times[case.name]
-        # by this name older records have no other time
-        time = found.record("s") if what == "outputs" else {"straight": found.record("us")}
-        yield case, [{what: case.of, **more.get(case.name, {}), **time}]
+        straight = times.get(f"{case.name}, straight")
+        record = {what: case.of, **more.get(case.name, {}), **times[case.name].record(unit)}
+        yield case, [record | ({"straight": straight.record(unit)} if straight else {})]
 
 
 def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
@@ -249,11 +253,10 @@ def show(records: list[Record]) -> str:
     }
     parts = [table([r for r in records if "same_code" in r], absent)]
     for what in KINDS:
-        # older records of loops are of code that is gone
-        if found := [r for r in records if what in r and ("straight" in r or what == "outputs")]:
+        if found := [r for r in records if what in r]:
             parts.append(table(found, _columns(found, what)))
         if what == "loops" and len(found) > 1:
-            exponent = slope([r[what] for r in found], [r["straight"]["us"] for r in found])
+            exponent = slope([r[what] for r in found], [r["us"] for r in found])
             parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
     return "\n\n".join(parts)
 
@@ -264,7 +267,7 @@ def _columns(records: list[Record], what: str) -> Columns:
     def exponent(of: Callable[[Record], Any]) -> Callable[[Record], str]:
         def to_here(r: Record) -> str:
             before = records[max(records.index(r) - 1, 0)]
-            if before is r:
+            if before is r or not (of(before) and of(r)):
                 return ""
             return f"{slope([before[what], r[what]], [of(before), of(r)]):.2f}"
 
@@ -273,8 +276,8 @@ def _columns(records: list[Record], what: str) -> Columns:
     columns: dict[str, Callable[[Record], str]] = {what: lambda r: str(r[what])}
     if what == "loops":
         return columns | {
-            "us per evaluation": lambda r: spread(r["straight"], "us", 1),
-            "us per loop": lambda r: short(r["straight"]["us"] / r[what]),
+            "us per evaluation": lambda r: spread(r, "us", 1),
+            "us per loop": lambda r: short(r["us"] / r[what]),
         }
     if what == "outputs":
         return columns | {"simulate stage [s]": lambda r: spread(r, "s", 3), "exponent": exponent(lambda r: r["s"])}
@@ -284,8 +287,10 @@ def _columns(records: list[Record], what: str) -> Columns:
             "integrals of two modes": lambda r: str(r["products"]),
         }
     return columns | {
-        "us per evaluation": lambda r: spread(r["straight"], "us", 2),
-        "exponent": exponent(lambda r: r["straight"]["us"]),
+        "kernels [us]": lambda r: spread(r, "us", 2),
+        "exponent": exponent(lambda r: r["us"]),
+        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "its exponent": exponent(lambda r: r.get("straight", {}).get("us")),
     }
 
 

@@ -22,7 +22,6 @@ from benchmarks.timing import interleaved, once, slope
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
@@ -39,8 +38,9 @@ def cases() -> list[Case]:
 
 
 def _of_chain(name: str, links: int) -> Record:
-    """Evaluations of an open chain, and those of its run."""
-    peer, engine = CHAINS[name](links), Mechanism(name, hinged(links), {}).engine()
+    """Evaluations of an open chain, by the kernels and, where there is such, by straight code; and those of its run."""
+    peer, mine = CHAINS[name](links), Mechanism(name, hinged(links), {})
+    engine, straight = mine.general_engine(), mine.engine()
     start, order = consistent_start(engine), [hinge.start for hinge in engine.model.numbering.coordinates[1:]]
     integrate(engine, start, silent)
     evaluations, y, nq = int(engine.n[m.EVALUATIONS]), start.copy(), engine.model.nq
@@ -50,46 +50,49 @@ def _of_chain(name: str, links: int) -> Record:
     state = State(engine.start, np.zeros(0), np.zeros(0), y)
     ours, theirs = closure_rows.evaluate(engine, y, state.t)[engine.model.speeds][order], peer.hinges()
     repeat = max(EVALUATIONS // links, 10)
+    tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
+    if straight.has_straight_code:
+        tasks["straight"] = partial(evaluation_time, straight, state, repeat)
+    times = interleaved(tasks, ROUNDS)
     return {
         "by": name,
         "links": links,
         "apart": float(np.abs(theirs - ours).max() / np.abs(theirs).max()),
         "evaluations": evaluations,
         "way": "articulated inertias" if engine.model.parts.articulated else "mass matrix",
-        **_times(peer, engine, state, repeat),
-    }
-
-
-def _times(peer: Peer, engine: Engine, state: State, repeat: int) -> Record:
-    """Both times and their ratio; of ours under names by which older records have no other time."""
-    tasks = {"theirs": partial(peer.time, repeat), "straight": partial(evaluation_time, engine, state, repeat)}
-    times = interleaved(tasks, ROUNDS)
-    return {
         **{label: found.record("us") for label, found in times.items()},
-        "straight_ratio": times["theirs"].over(times["straight"]),
+        "ratio": times["theirs"].over(times["ours"]),
+        "straight_ratio": times["theirs"].over(times["straight"]) if "straight" in times else None,
     }
 
 
 def _record(name: str, loops: int) -> Record:
-    peer, engine = PEERS[name](loops), Mechanism(name, four_bars(loops, LEAN), {}).engine()
+    peer, mine = PEERS[name](loops), Mechanism(name, four_bars(loops, LEAN), {})
+    engine = mine.general_engine()
     state = State(engine.start, np.zeros(0), np.zeros(0), consistent_start(engine))
     links, numbering = engine.model.links, engine.model.numbering
     uprights = [numbering.coordinates[i][0] for i, link in enumerate(links) if i and link.kind == "revolute"]
     ours = np.sort(closure_rows.evaluate(engine, state.y, state.t)[engine.model.speeds][uprights])
     repeat = max(EVALUATIONS // loops, 10)
+    tasks: dict[str, Callable[[], float]] = {"theirs": partial(peer.time, repeat)}
+    for label, one in (("ours", engine), ("straight", mine.engine())):
+        tasks[label] = partial(evaluation_time, one, state, repeat)
+    times = interleaved(tasks, ROUNDS)
     apart = np.abs(np.sort(peer.hinges()) - ours).max() / np.abs(ours).max()
     return {
         "by": name,
         "loops": loops,
         "apart": float(apart),
         "versions": {package: version(package) for package in ("pin", "mujoco")},
-        **_times(peer, engine, state, repeat),
+        **{label: found.record("us") for label, found in times.items()},
+        "ratio": times["theirs"].over(times["ours"]),
+        "straight_ratio": times["theirs"].over(times["straight"]),
     }
 
 
 def show(records: list[Record]) -> str:
     """Both tables."""
-    chains = [r for r in records if "links" in r and "straight" in r]
+    chains = [r for r in records if "links" in r]
     parts = [_of_loops([r for r in records if "loops" in r]), _of_chains(chains) if chains else ""]
     return "\n\n".join(part for part in parts if part)
 
@@ -100,8 +103,10 @@ def _of_chains(records: list[Record]) -> str:
         "program": lambda r: r["by"],
         "links": lambda r: str(r["links"]),
         "theirs [us]": lambda r: spread(r["theirs"], "us", 1),
-        "ours [us]": lambda r: spread(r["straight"], "us", 2),
-        "ratio": lambda r: f"{r['straight_ratio']:.1f}",
+        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "ratio": lambda r: f"{r['straight_ratio']:.1f}" if "straight" in r else "",
+        "kernels [us]": lambda r: spread(r["ours"], "us", 2),
+        "ratio ": lambda r: f"{r['ratio']:.1f}",
         "by": lambda r: r["way"],
         "accelerations differ by": lambda r: short(r["apart"]),
         "evaluations of 0.2 s": lambda r: str(r["evaluations"]),
@@ -109,7 +114,7 @@ def _of_chains(records: list[Record]) -> str:
     shown = table(records, columns)
     if len(records) == 1:
         return shown
-    exponent = slope([r["links"] for r in records], [r["straight"]["us"] for r in records])
+    exponent = slope([r["links"] for r in records], [r["ours"]["us"] for r in records])
     return f"{shown}\n\nTime grows as the number of links to the power {exponent:.2f}."
 
 
@@ -121,8 +126,10 @@ def _of_loops(records: list[Record]) -> str:
         "program": lambda r: r["by"],
         "loops": lambda r: str(r["loops"]),
         "theirs [us]": lambda r: spread(r["theirs"], "us", 1),
-        "ours [us]": lambda r: spread(r["straight"], "us", 2),
+        "straight [us]": lambda r: spread(r["straight"], "us", 2),
         "ratio": lambda r: f"{r['straight_ratio']:.1f}",
+        "kernels [us]": lambda r: spread(r["ours"], "us", 2),
+        "ratio ": lambda r: f"{r['ratio']:.1f}",
         "accelerations differ by": lambda r: short(r["apart"]),
     }
     versions = records[-1]["versions"]

@@ -158,11 +158,13 @@ JOINT_ROWS = {"spherical": 3, "revolute": 5, "prismatic": 5, "fixed": 0, "cleara
 def _evaluations(case: Case) -> list[Record]:
     """Both in turns in one process, the ratio the median of the ratios of neighbours."""
     here = mechanism(case.name)
-    engine = here.engine()
+    engines = {"": here.general_engine(), ", straight": here.engine()}
     unknowns, derivation = maximal_unknowns(here.scene, here.bundles)
     tasks: dict[str, Callable[[], float]] = {"dgesv": partial(dgesv_time, unknowns)}
-    for label, state in states(engine, trajectory(engine)).items():
-        tasks[f"{label}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS)
+    straight = engines[", straight"]
+    for label, state in states(straight, trajectory(straight)).items():
+        for way, engine in engines.items():
+            tasks[f"{label}{way}"] = partial(evaluation_time, engine, state, EVALUATIONS)
     times = interleaved(tasks, TURNS)
     dense = times.pop("dgesv")
     ours = {label: found.record("us") | {"ratio": dense.over(found)} for label, found in times.items()}
@@ -211,12 +213,12 @@ def shown_evaluations(records: list[Record]) -> str:
     rows = []
     for r in records:
         cells = [r["case"], str(r["unknowns"]), spread(r["dgesv"], "us", 1)]
-        for label in ("free", "in contact"):
-            ours = r["ours"].get(f"{label}, straight")
+        for label in ("free, straight", "in contact, straight", "free", "in contact"):
+            ours = r["ours"].get(label)
             cells += [spread(ours, "us", 2), f"1/{ours['ratio']:.1f}"] if ours else ["", ""]
         rows.append(cells)
     head = ["scene", "n", "dgesv(n) [us]"]
-    for label in ("free", "in contact"):
+    for label in ("free", "in contact", "kernels, free", "kernels, in contact"):
         head += [f"{label} [us]", "of dgesv"]
     derivations = "\n".join(f"- {r['case']}: n = {r['derivation']}" for r in records)
     return f"{pipe_table(head, rows)}\n\n{derivations}"

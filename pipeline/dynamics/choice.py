@@ -1,9 +1,8 @@
-"""Choice between the kinds present, as branches; one kind needs no branch. And what is repeated."""
+"""Choice between the kinds present, as compiled branches; one kind needs no branch."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -11,12 +10,6 @@ from flexclear.pipeline.dynamics.kernels import kernel
 @kernel
 def nothing(d):
     """Do what the parts do of which a mechanism has none."""
-
-
-def repeat(step: Callable[..., bool], *arguments: Any) -> None:
-    """Call a kernel again as long as it returns true; on a tape that is a loop (`specialise.trace`)."""
-    while step(*arguments):
-        pass
 
 
 def choose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:

@@ -18,10 +18,10 @@ from flexclear.pipeline.dynamics import loads
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.compile.sources import (
     DESCRIBED,
-    WHOLE,
     abreast,
     along,
     imported,
+    kernels,
     sources,
     straight,
 )
@@ -213,8 +213,8 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
 
 
 def generated(parts: Parts, scheme: Scheme = SCHEME) -> dict[str, str]:
-    """Files of a mechanism of some wiring."""
-    return sources(parts, scheme) | {name: straight(parts, (), name) for name in (WHOLE, DESCRIBED)}
+    """Files of a mechanism whose wiring has no code of its own."""
+    return sources(parts, scheme) | kernels(parts)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -250,7 +250,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
 def test_lines_of_generated_files_tell_all_that_they_import(case: str) -> None:
     """As Python's own parser finds it."""
     parts, _ = CASES[case]
-    alone = straight(parts, ((1, 2),)), abreast(parts, (), 2), along(parts, ())
+    alone = straight(parts, ((1, 2),)), straight(parts, (), DESCRIBED), abreast(parts, (), 2), along(parts, ())
     for text in (*generated(parts).values(), *alone):
         assert imported(text) == fingerprint.imported(text.encode(), "entry", package=False)[0]
 

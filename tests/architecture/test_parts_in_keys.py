@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.dynamics import effects
 from flexclear.pipeline.dynamics.compile import functions
-from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, WHOLE, modules, sources, straight
+from flexclear.pipeline.dynamics.compile.sources import kernels, modules, sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 
 BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
@@ -35,11 +35,6 @@ def test_what_a_family_lists_is_there(package: str, name: str) -> None:
     assert lookup(package, name, where="here") is not None
 
 
-def generated(parts: Parts, scheme: Scheme) -> list[str]:
-    """Files of a mechanism."""
-    return [*sources(parts, scheme).values(), *(straight(parts, (), name) for name in (WHOLE, DESCRIBED))]
-
-
 #: where a part of a family stands among the parts of the code
 CODE = {
     effects.JOINTS: lambda name: Parts((name,), closures=True),
@@ -59,7 +54,8 @@ COMPILED = [f for f in families() if f[0] in CODE and f != (effects.LOADS, "grav
 @pytest.mark.parametrize("package, name", COMPILED)
 def test_what_a_part_compiles_reaches_its_module(package: str, name: str) -> None:
     """The digest of a compiled function changes with the sources of its parts."""
-    texts = generated(CODE[package](name), Scheme("dop853"))
+    parts = CODE[package](name)
+    texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
     reached = {found for text in texts for found in functions.reached(text)}
     assert module_of(package, name) in reached
 
@@ -90,7 +86,7 @@ def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, 
     possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
     for scheme in effects.schemes(scene):
         parts = Parts(tuple(sorted(possible)), closures=True)
-        texts = generated(parts, scheme)
+        texts = (sources(parts, scheme) | kernels(parts)).values()
         assert {found for text in texts for found in functions.reached(text)} <= set(known)
 
 
@@ -128,7 +124,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     tables, parts, module = BESIDE[family]
     if family == "stop":
         tables["stop"]["end"]["coordinate"] = "rotation"
-    texts = generated(parts, Scheme("dop853"))
+    texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
     reached = {found for text in texts for found in functions.reached(text)}
     scene = scene_with({"type": "cylindrical"}, **tables)
     known = Sources(root).closure(["flexclear.stages.simulation", *modules(scene)]).keys()

@@ -8,7 +8,6 @@ import pytest
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.effects import Scheme
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model import model as modelling
 from flexclear.pipeline.dynamics.model.arrays import WorkSpace
@@ -86,12 +85,11 @@ def tabulated(monkeypatch: pytest.MonkeyPatch, scene: Scene, articulated: bool) 
         return tabulate(build(scene, {}))
 
 
-def kernels(model: Model) -> tuple[Any, Any]:
-    """The kernels of the laws of time and of the right-hand side of a model."""
+def right_hand_side(model: Model) -> Any:
+    """The kernel of the right-hand side that is compiled for a model."""
     scope: dict[str, Any] = {}
-    for text in (sources.sources(model.parts, Scheme("dop853"))["prescribe"], sources.straight(model.parts, ())):
-        exec(text.partition("@calls")[0].partition("WIRING")[0], scope)
-    return scope["laws"], scope["rates"]
+    exec(sources.kernels(model.parts)["evaluate"].partition("@calls")[0], scope)
+    return scope["right_hand_side"]
 
 
 def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any = float) -> Evaluated:
@@ -110,11 +108,10 @@ def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any
     w[y : y + model.ny], n[n[m.MODE] :] = start, 1
     w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
     n[n[m.ACTIVE] : n[m.ACTIVE] + model.arrays.size(m.N_LAWS)] = model.arrays.table(m.LAWS)["piece0"]
-    laws, rates_then = map((Trace(0) if number is float else Long(0)).plain, kernels(model))
+    plain = (Trace(0) if number is float else Long(0)).plain(right_hand_side(model))
 
     def rates(h: Any, f: Any, w: Any, n: Any, y: int, dy: int) -> None:
-        laws(h, f, w, n, number(0.1))
-        rates_then(h, f, w, n, y, dy)
+        plain(h, f, w, n, number(0.1), y, dy)
 
     keep_independent(model, h, y, dy, w.copy(), n.copy(), rates)
     rates(h.tolist(), f.astype(number), w, n, y, dy)

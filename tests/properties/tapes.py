@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics.specialise.code import Program
-from flexclear.pipeline.dynamics.specialise.tape import Branch, Loop, Symbol
+from flexclear.pipeline.dynamics.specialise.tape import Branch, Symbol
 from flexclear.pipeline.dynamics.specialise.wiring import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
@@ -91,21 +91,12 @@ def run(
                 which = 0 if values[item.condition] else 1
                 go(item.blocks[which])
                 values.update({joined: known(ways[which]) for joined, *ways in item.joins})
-            elif isinstance(item, Loop):
-                turn(item)
             elif item.operation == "load":
                 array, place = item.arguments
                 place = values[place] if isinstance(place, Symbol) else where(place)
                 values[item] = arrays[array][place]
             else:
                 values[item] = operations[item.operation](*(known(a) for a in item.arguments))
-
-    def turn(loop: Loop) -> None:
-        given, again = [first for _, first, _ in loop.carried], True
-        while again:
-            values.update(zip((symbol for symbol, *_ in loop.carried), map(known, given), strict=True))
-            go(loop.blocks[0])
-            given, again = [known(left) for *_, left in loop.carried], known(loop.condition)
 
     go(program.block)
     for array, place, value in program.stores:

@@ -210,6 +210,6 @@ def test_the_depth_of_the_tree_decides() -> None:
     for count, articulated in ((10, False), (20, True)):
         parts = tabulate(build(Scene.model_validate(rods(count)), {})).parts
         assert parts.articulated == articulated
-        for source in (*sources.sources(parts, Scheme("dop853")).values(), sources.straight(parts, ())):
+        for source in (sources.sources(parts, Scheme("dop853")) | sources.kernels(parts)).values():
             assert ("articulated" in source) <= articulated
             assert ("composite" in source) <= (not articulated)

@@ -10,11 +10,10 @@ import pytest
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.specialise import abreast, dual, straight
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.specialise import dual, straight
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.derivative import tangent
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Tape, UnsuitedError
@@ -35,13 +34,6 @@ ROUNDING = 1e-10
 STEP = 1e-40
 
 
-def smooth(model: Model) -> Any:
-    """The kernel of the right-hand side without friction of ideal joints."""
-    scope: dict[str, Any] = {}
-    exec(sources.rates(model.parts), scope)
-    return scope["rates"]
-
-
 def changes(
     scene: Scene, reduced: dict[str, Any], closed: int, seed: int = 2, *, duals: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -53,7 +45,7 @@ def changes(
     space, random = model.arrays.work_space(lambda _: m.Room(4, 0, 0)), np.random.default_rng(seed)
     h, y = space.h, int(space.h[m.Y])
     dy, vy, vdy = (int(h[m.SLOPES]) + k * model.ny for k in range(3))
-    f, w, n, kernel, begin = model.arrays.f, space.w, space.n, smooth(model), initial.start_state(model)
+    f, w, n, kernel, begin = model.arrays.f, space.w, space.n, rates_kernel(model), initial.start_state(model)
     begin += 1e-3 * random.normal(size=model.ny)  # the distance of two points that coincide has no derivative
     begin[model.speeds] += 0.1 * random.normal(size=model.nv)
     w[y : y + model.ny] = begin
@@ -64,11 +56,11 @@ def changes(
     df, dw = f * random.normal(size=len(f)), np.zeros(len(w))
     dw[laws], dw[impacts] = random.normal(size=laws.stop - laws.start), random.normal(size=len(model.contacts))
     direction = random.normal(size=model.ny) * np.maximum(np.abs(begin), 1e-3)
-    made = straight.program(kernel, wiring(model.arrays, h), longest=abreast.LONGEST_DIFFERENTIATED)
+    made = straight.program(kernel, wiring(model.arrays, h), longest=straight.LONGEST_DIFFERENTIATED)
 
     exact = {"f": f, "w": w.copy(), "n": n.copy(), "df": df, "dw": dw}
     exact["w"][vy : vy + model.ny] = direction
-    tapes.run(tangent(made, abreast.LONGEST_DIFFERENTIATED), h, exact, y, dy, (vy, vdy))
+    tapes.run(tangent(made, straight.LONGEST_DIFFERENTIATED), h, exact, y, dy, (vy, vdy))
     moved = {"f": f + 1j * STEP * df, "w": w + 1j * STEP * dw, "n": n.copy()}
     moved["w"][y : y + model.ny] += 1j * STEP * direction
     tapes.run(made, h, moved, y, dy, operations=tapes.COMPLEX)
@@ -97,13 +89,6 @@ def test_every_scene_is_differentiated(path: Path, duals: bool) -> None:
     for closed in (0, 1):
         exact, stepped = changes(load_scene(path), {}, closed, duals=duals)
         assert np.abs(exact - stepped).max() < ROUNDING
-
-
-def test_friction_of_ideal_joints_is_not_differentiated() -> None:
-    model = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {}))
-    made = straight.program(rates_kernel(model), wiring(model.arrays, model.arrays.h))
-    with pytest.raises(UnsuitedError, match="by iteration"):
-        tangent(made, abreast.LONGEST_DIFFERENTIATED)
 
 
 @pytest.mark.parametrize("duals", [False, True], ids=["tangent", "duals"])

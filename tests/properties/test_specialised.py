@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, sources
@@ -24,11 +24,13 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_co
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.specialise import code, straight
+from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
+from flexclear.pipeline.dynamics.specialise import straight as tracing
 from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
+from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.trace import Trace
 from flexclear.pipeline.dynamics.specialise.wiring import wiring
 from tests.analytic.mechanism_runs import TREE
@@ -68,6 +70,13 @@ def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
     return worst
 
 
+def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = tabulate(build(load_scene(TREE / "scenes/checks/pendulum.toml"), {}))
+    monkeypatch.setattr(tracing, "LONGEST", 10)
+    with pytest.raises(UnsuitedError, match="too long"):
+        program(rates_kernel(model), wiring(model.arrays, model.arrays.work_space(lambda _: m.Room(2, 0, 0)).h))
+
+
 def description_kernel(model: Model) -> Any:
     """The kernel of what is recorded of an evaluation."""
     scope: dict[str, Any] = {}
@@ -86,11 +95,12 @@ def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> flo
 
 @pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_every_scene_is_evaluated_alike(path: Path) -> None:
+def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Both without a compiler: kernels on numbers, and what they wrote on the tape; contacts open and closed.
 
-    What steps read, all of the work space, and with what is recorded.
+    What steps read, all of the work space, and with what is recorded; also of what would be too long.
     """
+    monkeypatch.setattr(tracing, "LONGEST", 200_000)
     model = tabulate(build(load_scene(path), {}))
     space, f = model.arrays.work_space(lambda _: m.Room(2, 0, 0)), model.arrays.f
     h, y, dy = space.h, int(space.h[m.Y]), int(space.h[m.SLOPES])
@@ -135,32 +145,51 @@ def engine(integrator: str = "dop853") -> Engine:
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
-def test_code_of_many_blocks_runs_as_that_of_few_does(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stroke with impacts, as exactly as its own tolerance tells, with equal events."""
-    whole = engine(integrator)
-    runs = [integrate(whole, consistent_start(whole), silent)]
+def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stroke with impacts, as exactly as its own tolerance tells, with equal events; so for what is too long."""
+    alone = engine(integrator)
+    with monkeypatch.context() as patch:
+        patch.setattr(straight_code, "suited", lambda model: False)
+        general = engine(integrator)
+    assert (alone.has_straight_code, general.has_straight_code) == (True, False)
+    straight, kernels = (integrate(one, consistent_start(one), silent) for one in (alone, general))
+    assert alone.h[m.RATES] != alone.h[m.EVALUATE]
+    assert straight.events["kind"].tolist() == kernels.events["kind"].tolist()
+    # before the first impact, whose instants differ by rounding; each of those that follow magnifies it
+    first = float(kernels.events["time"][0]) - 1e-9
+    before = [run.state[run.time <= first][:, : alone.model.nq] for run in (kernels, straight)]
+    assert np.abs(before[0] - before[1]).max() < 1e-9
+    for k in (0, len(kernels.rows) // 2):
+        rates = []
+        for one, address in ((general, m.EVALUATE), (alone, m.EVALUATE), (alone, m.RATES)):
+            one.select_pieces_after(kernels.time[k])
+            one.h[m.EVALUATE], before_it = one.h[address], one.h[m.EVALUATE]
+            rates.append(closure_rows.evaluate(one, kernels.state[k], kernels.time[k]))
+            one.h[m.EVALUATE] = before_it
+        assert all(apart(alone.model, rates[0], other) < ROUNDING for other in rates[1:])
+    seen = [observed(one, kernels) for one in (general, alone)]
+    for name in ("link_wrenches", "closure_wrenches", "drive_force", "energy"):
+        a, b = (getattr(one, name) for one in seen)
+        fields = a.dtype.names or [...]
+        assert all(np.abs(a[k] - b[k]).max() <= 1e-6 * np.abs(a[k]).max() for k in fields), name
+
+
+def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tracing, "LONGEST", 10)
+    monkeypatch.setattr(straight_code, "_known", {})
+    scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
         patch.setenv("FLEXCLEAR_KERNELS", folder)
-        patch.setattr(code, "BLOCK", 50)
-        patch.setattr(compiler_process, "requested", lambda: False)  # it would not divide
-        patch.setattr(straight_code, "_known", {})
+        patch.setattr(compiler_process, "requested", lambda: False)  # it would compile what this process refuses
         patch.setattr(files, "loaded", {})
         patch.setattr(functions, "loaded", files.loaded)
-        divided = engine(integrator)
-        runs.append(integrate(divided, consistent_start(divided), silent))
-        assert whole.h[m.RATES] != divided.h[m.RATES] != divided.h[m.EVALUATE]
-        k, rates = len(runs[0].rows) // 2, []
-        for one, address in ((whole, m.EVALUATE), (whole, m.RATES), (divided, m.RATES)):
-            one.select_pieces_after(runs[0].time[k])
-            one.h[m.EVALUATE], before_it = one.h[address], one.h[m.EVALUATE]
-            rates.append(closure_rows.evaluate(one, runs[0].state[k], runs[0].time[k]))
-            one.h[m.EVALUATE] = before_it
-    assert all(apart(whole.model, rates[0], other) < ROUNDING for other in rates[1:])
-    assert runs[0].events["kind"].tolist() == runs[1].events["kind"].tolist()
-    # before the first impact, whose instants differ by rounding; each of those that follow magnifies it
-    first = float(runs[0].events["time"][0]) - 1e-9
-    before = [run.state[run.time <= first][:, : whole.model.nq] for run in runs]
-    assert np.abs(before[0] - before[1]).max() < 1e-9
+        one = engine_of(scene, {}, silent)
+        assert not one.has_straight_code
+        assert integrate(one, consistent_start(one), silent).time[-1] == 0.01
+        made = sensitivities(scene, {}, silent, ["hinge.velocity.final"], ["load.gravity.acceleration.1"])
+        # as long as it hangs still, its rate grows with gravity
+        rate = made["hinge.velocity.final"].item() * -9.81
+        assert rate == pytest.approx(float(dynamics.simulate(scene, {}, silent).joint_velocity[-1, 0]), rel=1e-3)
 
 
 def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
@@ -189,13 +218,6 @@ def test_no_number_is_in_the_code(place: str, value: Any) -> None:
     scene = load_scene(TREE / "scenes/sps4/csj.toml")
     known = place.split(".")[1] in getattr(scene, place.split(".")[0])
     assert not known or source(edited(scene, {place: value})) == source(scene)
-
-
-def test_a_mechanism_whose_code_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = tabulate(build(load_scene(TREE / "scenes/checks/four_bars_2.toml"), {}))
-    monkeypatch.setattr(straight, "LONGEST", 100)
-    with pytest.raises(InputError, match=r"\[body\], \[joint\]: .* more than 100 operations(.|\n)*hint: use fewer"):
-        straight.straight(rates_kernel(model), wiring(model.arrays, model.arrays.h))
 
 
 def test_laws_of_time_and_integrators_are_not_in_the_code() -> None:

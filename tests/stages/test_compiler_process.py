@@ -135,14 +135,14 @@ def test_a_run_begins_while_what_is_recorded_is_still_being_compiled(
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path))
     monkeypatch.setattr(functions, "second_process", helper)
     texts = {
-        name: f"NAME = {name!r}\n{SOURCE.format(k=k)}" for k, name in enumerate(("prescribe", "observe", "advance"))
+        name: f"NAME = {name!r}\n{SOURCE.format(k=k)}" for k, name in enumerate(("evaluate", "observe", "advance"))
     }
     monkeypatch.setattr(sources, "sources", lambda parts, scheme: texts)
     late = functions._file(folder.writable(kernel_root(), nothing), "observe", texts["observe"])  # type: ignore[arg-type]
     parts, scheme = Parts(("free",)), Scheme("dop853")
     with held(late, root):
         found = functions.entry(parts, scheme, lambda _: None)
-        assert set(found.addresses) == {"prescribe", "advance"}
+        assert set(found.addresses) == {"evaluate", "advance"}
         assert late.stem not in loaded
         assert not ended
     found.complete()

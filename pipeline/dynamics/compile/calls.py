@@ -25,7 +25,7 @@ _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
 _FLOAT, _INTEGER = types.float64, types.int64
 _TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, rows, columns
 #: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, f, w, n, y, retractment, out,
-#: total); (h, f, w, n, t). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and
+#: total); (h, f, w, n, t); (h, f, w, n). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and
 #: columns, tolerance, out with its length); (h, f, w, n, t, repeat, outputs with their number, rows, events);
 #: (table, places, numbers)
 SIGNATURES = {
@@ -33,6 +33,7 @@ SIGNATURES = {
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
     "retract": types.int64(*_TABLES, _PLACE, _PLACE, _PLACE, _PLACE),
     "prescribe": types.int64(*_TABLES, _FLOAT),
+    "describe": types.int64(*_TABLES),
     "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, _FLOATS, _INTEGER),
     "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
     "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS),

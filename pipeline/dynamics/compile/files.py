@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.disk import checked, locked, publish, read_checked
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import machine_code
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 
 #: told the file that has to be compiled, or waited for
 Tell = Callable[[Path], None]
@@ -113,40 +113,28 @@ def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
     """
 
     def compiled_function(function: Callable) -> int:
-        name = function.__globals__["__name__"]
         if INTERPRETED:
-            _note(name, function)
+            interpreted[id(function)] = function
+            made = machine_code.Code(id(function), function)
         else:
             done = compiler(function)
-            loaded[name] = machine_code.Code(done.address, done)
-        return loaded[name].address
+            made = machine_code.Code(done.address, done)
+        loaded[function.__globals__["__name__"]] = made
+        return made.address
 
     return compiled_function
 
 
-def assembles(name: str, function: str, code: Callable[[], str], level: int, kernel: Callable) -> None:
-    """Make the function of a generated file of LLVM's text for it.
+def assembles(name: str, function: str, code: Callable[[], str], level: int) -> None:
+    """Make the function of a generated file of LLVM's text for it; there is none where that is not suited.
 
-    name: of the file.  level: as of `machine_code.assembled`.  kernel: what the text is made of, for where nothing is
-    compiled: rates(h, f, w, n, y, dy), which follow the laws at a time, or description(h, f, w, n).
+    name: of the file.  level: as of `machine_code.assembled`.
     """
-    if INTERPRETED:
-
-        def evaluate(h: Any, f: Any, w: Any, n: Any, *at: Any) -> None:
-            if at:
-                interpreted[int(h[m.PRESCRIBE])](h, f, w, n, at[0])
-            kernel(h, f, w, n, *at[1:])
-
-        _note(name, evaluate)
-        return
-    image = machine_code.stored(function, *machine_code.assembled(code(), level))
+    try:
+        image = machine_code.stored(function, *machine_code.assembled(code(), level, optimised=False))
+    except UnsuitedError:
+        image = machine_code.NOTHING
     loaded[name] = replace(machine_code.load(image), image=image)
-
-
-def _note(name: str, function: Callable) -> None:
-    """Take a function of Python for that of a generated file."""
-    interpreted[id(function)] = function
-    loaded[name] = machine_code.Code(id(function), function)
 
 
 def _compile(path: Path) -> None:

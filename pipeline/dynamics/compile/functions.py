@@ -38,19 +38,30 @@ from flexclear.pipeline.dynamics.kernels import INTERPRETED
 SOURCES = sources_of(TREE)
 #: what the functions are to who waits for them
 WORDS = {
+    "evaluate": "equations of motion",
     "project": "closing of the loops",
     "retract": "retractions",
     "observe": "recorded quantities",
     "advance": "integrator",
     "prescribe": "laws of time",
+    "describe": "recorded quantities",
     SPECIALISED: "equations of motion of this mechanism alone",
     WHOLE: "equations of motion of this mechanism alone",
     DESCRIBED: "recorded quantities of this mechanism alone",
 }
-#: what others call, and where the header keeps its address; that of straight code depends on the rows solved for
-ADDRESSES = {"project": m.PROJECT, "retract": m.RETRACT, "prescribe": m.PRESCRIBE}
-#: in this order this process compiles, and in the opposite one the second, so that they meet in the middle
-ORDER = ("advance", "prescribe", "project", "retract", "observe", DESCRIBED, WHOLE, SPECIALISED)
+#: what is compiled where there is no straight code
+KERNELS = ("evaluate", "describe")
+#: what others call, and where the header keeps its address; of straight code that depends on the rows solved for
+ADDRESSES = {
+    "evaluate": m.EVALUATE,
+    "describe": m.DESCRIBE,
+    "project": m.PROJECT,
+    "retract": m.RETRACT,
+    "prescribe": m.PRESCRIBE,
+}
+#: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the
+#: kernels have most kernels in common, which each process compiles once
+ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESCRIBED, WHOLE, SPECIALISED)
 #: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
 #: where the code of kernels is, and what they number by
@@ -184,7 +195,7 @@ def entry(
 ) -> Entry:
     """The compiled functions for these parts; `tell` receives what has to be compiled.
 
-    equations: sources by name of straight code.
+    equations: sources by name of KERNELS, or of straight code. Where there is none, kernels are compiled instead.
     """
     folder, began = writable(kernel_root(), tell), time.monotonic()
     texts = {**sources.sources(parts, scheme), **equations}
@@ -197,13 +208,17 @@ def entry(
                 _bring(folder, {LATE: late}, tell, began, more)
 
         _bring(folder, files, tell, began, helpers, {late})
+        if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
+            kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
+            _bring(folder, kernels, tell, began, helpers)
+            files |= kernels
         left = Late(late, bring_late, helpers.pop_all())
     return Entry({name: loaded[path.stem].address for name, path in files.items() if path != late}, left)
 
 
 def straight(name: str, source: str, tell: Callable[[str], None]) -> int:
-    """Address of code for one wiring, whose name and source are of `sources`; UnsuitedError when there is none of
-    several lanes or with changes."""
+    """Address of code for one wiring, whose name and source are of `sources`; 0 when there is none, UnsuitedError when
+    there is none of several lanes or with changes."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     path = _file(folder, name, source)
     with ExitStack() as helpers:

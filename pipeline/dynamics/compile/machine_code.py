@@ -26,13 +26,11 @@ NEVER_REACHED = {
     "numba_runtime_build_excinfo_struct",
     "numba_unpickle",
 }
-#: lines of LLVM's text beyond which its passes over them take too long for what they save
-LONG = 30_000
 
 
 @dataclass(frozen=True)
 class Code:
-    """A C function: where it is [address], and whatever keeps it there.
+    """A C function: where it is [address], 0 where there is none, and whatever keeps it there.
 
     image: of one that Numba has not compiled.
     """
@@ -40,6 +38,10 @@ class Code:
     address: int
     keeper: Any
     image: bytes = b""
+
+
+#: image of a function that there is not
+NOTHING = b"{}\n"
 
 
 def image(function: Any) -> bytes:
@@ -62,18 +64,18 @@ def stored(name: str, module: Any, binary: bytes) -> bytes:
     return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
 
-def assembled(code: str, level: int = 3) -> tuple[Any, bytes]:
+def assembled(code: str, level: int = 3, *, optimised: bool = True) -> tuple[Any, bytes]:
     """LLVM's module of a text, and its object file for this processor.
 
-    level: of what is done for speed, 0 to 3.
+    level: of what is done for speed, 0 to 3.  optimised: whether the text is already.
     """
     import llvmlite.binding as llvm
 
     module, features = llvm.parse_assembly(code), llvm.get_host_cpu_features().flatten()
     machine = _target().create_target_machine(llvm.get_host_cpu_name(), features, opt=level, jit=True)
-    if level and code.count("\n") < LONG:
+    if level and not optimised:
         module.data_layout = str(machine.target_data)
-        options = llvm.create_pipeline_tuning_options(speed_level=1)
+        options = llvm.create_pipeline_tuning_options(level)
         options.loop_vectorization = options.slp_vectorization = False
         passes = llvm.create_pass_builder(machine, options)
         passes.getModulePassManager().run(module, passes)
@@ -86,6 +88,8 @@ def load(stored: bytes) -> Code:
 
     line, _, binary = stored.partition(b"\n")
     facts = json.loads(line)
+    if not facts:
+        return Code(0, None)
     if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
         raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))

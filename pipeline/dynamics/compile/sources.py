@@ -4,7 +4,7 @@ A file composes exactly the kernels of the kinds present: what a scene does not 
 imported nor compiled. Of no more than it needs, so that mechanisms share files: steps depend on
 the integrator and on whether there are closures and contacts, not on joints or bodies.
 
-What effects add to a file they declare (`effects.effect`), at four points: "forces", "closures", "rates" (the
+What effects add to a file they declare (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
 right-hand side) and "observe" (what is recorded).
 """
 
@@ -109,6 +109,11 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
 
 
+def kernels(parts: Parts) -> dict[str, str]:
+    """Source by name of what a mechanism of these parts calls whose wiring has no code of its own."""
+    return {"evaluate": _evaluate(parts), "describe": _text(*_description(parts), DESCRIBE, _formulas(parts))}
+
+
 def modules(scene: Scene) -> tuple[str, ...]:
     """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
     files import.
@@ -125,7 +130,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
 @cache
 def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
     """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
-    texts = [*sources(parts, scheme).values(), straight(parts, ()), straight(parts, (), DESCRIBED)]
+    texts = [*sources(parts, scheme).values(), *kernels(parts).values(), straight(parts, ())]
     texts += [abreast(parts, (), lanes=2), along(parts, ())]
     return frozenset().union(*map(_reached, texts))
 
@@ -184,29 +189,34 @@ def _rows(wiring: Wiring) -> str:
 
 def rates(parts: Parts) -> str:
     """Source of the kernel `rates` alone, which Python runs (`specialise.dual`), without friction of ideal joints."""
-    return _text(*_equations(parts, whole=False), "", _formulas(parts))
+    return _text(*_equations(parts), "", _formulas(parts))
 
 
-def _equations(parts: Parts, *, whole: bool = True) -> tuple[Composition, str, str, str]:
-    """A file for the right-hand side, with what it is, the name of its kernel, and what makes that.
-
-    whole: with friction of ideal joints.
-    """
-    file = _forces(parts)
-    file.given["tree"] = file.tree
-    if parts.closures:
-        _close(file)
-    if whole:
-        file.add_effects("rates")
+def _equations(parts: Parts) -> tuple[Composition, str, str, str]:
+    """A file for the right-hand side, with what it is, the name of its kernel, and what makes that."""
+    file = _rates(parts)
     maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_rates")
     return file, f"right-hand side of {', '.join(parts.joints)}", "rates", maker
+
+
+def _evaluate(parts: Parts) -> str:
+    file = _rates(parts)
+    file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({_harmonics(file)})"
+    file.add_effects("evaluate")
+    maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
+    what = f"right-hand side of {', '.join(parts.joints)}"
+    return _text(file, what, "right_hand_side", maker, EVALUATE, _formulas(parts))
 
 
 def _prescribe(parts: Parts) -> str:
     file = Composition(parts)
     if parts.harmonics:
-        file.given["harmonics"] = file.take(f"{DYNAMICS}.drives.oscillation", "oscillate")
+        file.given["harmonics"] = _harmonics(file)
     return _text(file, "laws of time", "laws", file.take(PRESCRIBED, "make_laws"), PRESCRIBE)
+
+
+def _harmonics(file: Composition) -> str:
+    return file.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if file.parts.harmonics else ""
 
 
 def _project(parts: Parts) -> str:
@@ -289,6 +299,15 @@ def _joints(parts: Parts) -> Composition:
     return file
 
 
+def _rates(parts: Parts) -> Composition:
+    """What the rates of the state consist of."""
+    file = _forces(parts)
+    file.given["tree"] = file.tree
+    if parts.closures:
+        _close(file)
+    return file
+
+
 def _forces(parts: Parts) -> Composition:
     """What acts in the mechanism: joints, flexible bodies, contacts, loads."""
     file = _joints(parts)
@@ -351,6 +370,11 @@ def _text(
     )
 
 
+EVALUATE = """@calls.exported("evaluate")
+def evaluate(h, f, w, n, t, y, dy):
+    right_hand_side(h, f, w, n, t, y, dy)
+    return 0
+"""
 PRESCRIBE = """@calls.exported("prescribe")
 def prescribe(h, f, w, n, t):
     laws(h, f, w, n, t)
@@ -359,7 +383,7 @@ def prescribe(h, f, w, n, t):
 # laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
 STRAIGHT = """WIRING = (
 {wiring})
-files.assembles(__name__, NAME, lambda: straight({kernel}, WIRING, {options}), {level}, {kernel})
+files.assembles(__name__, NAME, lambda: straight({kernel}, WIRING, {options}), {level})
 """
 CHANGES = """WIRING = (
 {wiring})
@@ -393,6 +417,11 @@ def project(h, f, w, n, t, y, dy, tolerance):
 RETRACT = """@calls.exported("retract")
 def retract(h, f, w, n, y, displacement, out, total):
     retraction(h, f, w, n, y, displacement, out, total)
+    return 0
+"""
+DESCRIBE = """@calls.exported("describe")
+def describe(h, f, w, n):
+    description(h, f, w, n)
     return 0
 """
 OBSERVE = """@calls.exported("observe")

@@ -64,6 +64,22 @@ def make_forces(
     return forces
 
 
+def make_right_hand_side(laws: Callable, **parts: Any) -> Callable:
+    """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
+
+    laws: of time (`equations.prescribed_motion`).  parts: see `make_rates`.
+    """
+    rates = make_rates(**parts)
+
+    @kernel
+    def evaluate(h, f, w, n, t, y, dy):
+        """Rates dy of the state y at time t, both places in w; n[EVALUATION] says whether it could."""
+        laws(h, f, w, n, t)
+        rates(h, f, w, n, y, dy)
+
+    return evaluate
+
+
 def make_rates(
     joints: tuple[Any, ...],
     tree: Any,
@@ -74,8 +90,7 @@ def make_rates(
     closures: Any = None,
     friction: tuple[Callable, Callable] | None = None,
 ) -> Callable:
-    """The kernel rates(h, f, w, n, y, dy): rates dy of the state y, both places in w, at the present values of the laws
-    of time; n[EVALUATION] says whether it could.
+    """The kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
     joints: modules of the joint types.  tree: how the mass matrix is factored, the module `equations.articulated` or
     `equations.composite`.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels that apply

@@ -22,13 +22,13 @@ from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.specialised import side_by_side
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
@@ -101,7 +101,7 @@ class Runner:
             self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
             return False  # as each point reports by itself
-        return self.engine is not None and self.engine.method.staged and not INTERPRETED
+        return self.engine is not None and side_by_side(self.engine)
 
     def _rows(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[list[Values], int]:
         """Recorded values of each start, and the evaluations of all."""

@@ -15,10 +15,8 @@ from flexclear.pipeline.dynamics.kernels import Kernel
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.derivative import tangent
-from flexclear.pipeline.dynamics.specialise.straight import places, program
+from flexclear.pipeline.dynamics.specialise.straight import LONGEST_DIFFERENTIATED, places, program
 
-#: operations beyond which there is no code for several states at once, and none with a tangent
-LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
 _INTEGER = ir.IntType(64)
 
 
@@ -52,9 +50,7 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     where they are adjacent: numbers has room for all of f in all lanes.
     addresses: of all h, then of all f, w and n, then all addresses of y and dy, shape (6 lanes,).
     """
-    made = cache(
-        lambda: program(rates, wiring, longest=LONGEST)
-    )  # both functions are typed and written, and the tape is long
+    made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
 
     @intrinsic
     def note(typingctx: Any, h: Any, f: Any, numbers: Any, lane: Any) -> Any:

@@ -15,18 +15,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from flexclear.pipeline.dynamics.specialise.tape import (
-    BIT,
-    COMPARISONS,
-    FLOAT,
-    INTEGER,
-    Branch,
-    Loop,
-    Symbol,
-    UnsuitedError,
-    everything,
-    operands,
-)
+from flexclear.pipeline.dynamics.specialise.tape import BIT, COMPARISONS, FLOAT, INTEGER, Branch, Symbol
 
 #: as of all kernels (`dynamics.kernels`)
 FLAGS = ("contract", "reassoc", "nsz")
@@ -42,8 +31,6 @@ INTRINSICS = {
 }
 #: operations of a way that several states compute even where none of them goes it; for how many a call counts
 SHORT_WAY, CALL = 12, 40
-#: operations after which another block begins: LLVM's time grows faster than the length of a block
-BLOCK = 3_000
 _NUMBER = ir.IntType(32)
 LIBRARY = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh"}
 LIBRARY |= {"arctan2": "atan2", "pow": "pow"}
@@ -59,8 +46,14 @@ class Program:
 
 def loads(program: Program) -> list[tuple[str, Any]]:
     """Array and index of all that is loaded."""
-    operations = (item for item in everything(program.block) if isinstance(item, Symbol))
-    return [operation.arguments for operation in operations if operation.operation == "load"]
+    entries, blocks = list[tuple[str, Any]](), [program.block]
+    while blocks:
+        for item in blocks.pop():
+            if isinstance(item, Branch):
+                blocks += item.blocks
+            elif item.operation == "load":
+                entries.append(item.arguments)
+    return entries
 
 
 def uses(program: Program) -> Counter[Symbol]:
@@ -81,18 +74,15 @@ def _use(block: list[Any], counts: Counter[Symbol]) -> None:
                     counts[item.condition] += 1
             for inner in item.blocks:
                 _use(inner, counts)
-        elif isinstance(item, Loop):
-            counts.update(operands(item))
-            _use(item.blocks[0], counts)
         elif counts[item]:
-            counts.update(operands(item))
+            counts.update(a for a in item.arguments if isinstance(a, Symbol))
 
 
 def size(block: list[Any], counts: Counter[Symbol]) -> int:
     """How many operations a block has, each call for as many as it takes as long as."""
     total = 0
     for item in block:
-        if not isinstance(item, Symbol):
+        if isinstance(item, Branch):
             total += 1 + sum(size(inner, counts) for inner in item.blocks)
         elif counts[item]:
             total += CALL if item.operation in LIBRARY else 1
@@ -103,7 +93,7 @@ def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbo
     """By sum: the product in it that nothing else uses, of the same block, and what is added to it."""
     pairs, products = dict[Symbol, tuple[Symbol, Any]](), set[Symbol]()
     for item in block:
-        if not isinstance(item, Symbol):
+        if isinstance(item, Branch):
             for inner in item.blocks:
                 pairs |= fused(inner, counts)
         elif item.operation == "mul" and counts[item] == 1 and divisor(item, counts) is None:
@@ -131,7 +121,6 @@ class Emitter:
     where: address of an array's element: where(array, index as a number or a value of the code, lane) -> pointer.
     lanes: states at once.  exact: every operation is rounded as it is.
     number: of several states, what is at an index of f, of all of them.
-    divide: begins another of LLVM's blocks, after each `BLOCK` operations.
     """
 
     def __init__(
@@ -143,7 +132,6 @@ class Emitter:
         *,
         exact: bool = False,
         number: Callable[[int], Any] | None = None,
-        divide: Callable[[], None] | None = None,
     ):
         self.builder, self.program, self.where, self.lanes, self.number = builder, program, where, lanes, number
         self.uses = uses(program)
@@ -152,7 +140,6 @@ class Emitter:
         self.inside_sums = {product for product, _ in self.fused.values()}
         self.types = {kind: one if lanes == 1 else ir.VectorType(one, lanes) for kind, one in TYPES.items()}
         self.values: dict[Symbol, Any] = {}
-        self.divide, self.written = divide, 0
 
     def emit(self) -> None:
         """Write everything."""
@@ -191,13 +178,8 @@ class Emitter:
         for item in block:
             if isinstance(item, Branch):
                 self._branch(item)
-            elif isinstance(item, Loop):
-                self._loop(item)
             elif self.uses[item] and item not in self.inside_sums:
                 self.values[item] = self._operation(item)
-                self.written += 1
-                if self.divide and self.written % BLOCK == 0:
-                    self.divide()
 
     def _branch(self, branch: Branch) -> None:
         joins = [join for join in branch.joins if self.uses[join[0]]]
@@ -264,23 +246,6 @@ class Emitter:
             phi.add_incoming(ir.Constant(value.type, None), before)
             merged.append(phi)
         return merged
-
-    def _loop(self, loop: Loop) -> None:
-        if self.lanes > 1:
-            raise UnsuitedError("each of several states would repeat as often as another")
-        builder, before = self.builder, self.builder.block
-        firsts = [self._value(first, symbol.kind) for symbol, first, _ in loop.carried]
-        start, after = builder.append_basic_block(), builder.append_basic_block()
-        builder.branch(start)
-        builder.position_at_end(start)
-        for (symbol, _, _), first in zip(loop.carried, firsts, strict=True):
-            self.values[symbol] = builder.phi(TYPES[symbol.kind])
-            self.values[symbol].add_incoming(first, before)
-        self._block(loop.blocks[0])
-        for symbol, _, left in loop.carried:
-            self.values[symbol].add_incoming(self._value(left, symbol.kind), builder.block)
-        builder.cbranch(self._value(loop.condition, BIT), start, after)
-        builder.position_at_end(after)
 
     # Operations --------------------------------------------------------------------------------------------------
 

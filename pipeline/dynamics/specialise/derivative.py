@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.rules import RULES
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape, Undecided, UnsuitedError
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 #: a tangent has at most this many operations per operation of its tape
 LONGEST_TANGENT = 8
@@ -75,8 +75,6 @@ class _Forward:
     def block(self, items: list[Any]) -> None:
         """Write a block with its tangents."""
         for item in items:
-            if isinstance(item, Loop):
-                raise UnsuitedError("friction of ideal joints is solved for by iteration")
             if isinstance(item, Branch):
                 self._branch(item)
             else:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.choice import repeat
 from flexclear.pipeline.dynamics.kernels import INTERPRETED, Kernel
 
 #: of NumPy, that kernels apply
@@ -24,18 +23,13 @@ class Plain:
     """plain(value): what a kernel refers to, with kernels that Python runs instead of compiled ones.
 
     function(name): what does what NumPy's function does.  largest, smallest: of two values.  call(function, arguments):
-    result of a kernel; by default that of calling it.  repeats: what does what `choice.repeat` does.
+    result of a kernel; by default that of calling it.
     """
 
     def __init__(
-        self,
-        function: Callable[[str], Callable],
-        largest: Callable,
-        smallest: Callable,
-        call: Callable | None = None,
-        repeats: Callable = repeat,
+        self, function: Callable[[str], Callable], largest: Callable, smallest: Callable, call: Callable | None = None
     ) -> None:
-        self._largest, self._smallest, self._call, self._repeats = largest, smallest, call, repeats
+        self._largest, self._smallest, self._call = largest, smallest, call
         self._functions = SimpleNamespace(pi=np.pi, inf=np.inf, **{name: function(name) for name in FUNCTIONS})
         self._made: dict[int, Any] = {}
         self._alive: list[Any] = []
@@ -48,8 +42,6 @@ class Plain:
         return self._made[id(value)]
 
     def _plain(self, value: Any) -> Any:
-        if value is repeat:
-            return self._repeats
         if isinstance(value, Kernel):
             return self._kernel(value.py_func)
         if INTERPRETED and isinstance(value, FunctionType):

@@ -13,18 +13,17 @@ from typing import Any
 
 from llvmlite import ir
 
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError, same
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, same
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
-#: most operations of an evaluation: code of so many takes minutes and some gigabytes to make
-LONGEST = 1_000_000
+#: operations beyond which straight code takes longer to make than kernels do, and is hardly faster: it no longer fits
+#: the processor's first caches; and those that are differentiated, which kernels cannot be
+LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
-KEPT |= {m.NAMED[watched].place for watched in ("bends", "bearing")}
 #: integers of n that are left
 REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
@@ -78,17 +77,8 @@ def straight(
     It is evaluate(h, f, w, n, t, y, dy), which finds the laws at time t first, or where it describes describe(h, f, w,
     n).  whole, describes: see `program`.  exact: it gives what each lane of `abreast` gives, to the last bit; sums in
     any order are faster by a sixth.
-
-    Raises InputError for a mechanism whose code would be too long.
     """
-    try:
-        tape, module = program(kernel, wiring, whole=whole, describes=describes), ir.Module("straight")
-    except UnsuitedError:
-        raise InputError(
-            "[body], [joint]",
-            f"an evaluation of this mechanism has more than {LONGEST} operations, the most that code is made for",
-            "use fewer bodies, joints or modes, or join bodies that need not move against each other by 'fixed' joints",
-        ) from None
+    tape, module = program(kernel, wiring, whole=whole, describes=describes), ir.Module("straight")
     tables = [_INTEGER.as_pointer(), _FLOAT.as_pointer(), _FLOAT.as_pointer(), _INTEGER.as_pointer()]
     more = [] if describes else [_FLOAT, _INTEGER, _INTEGER]
     function = ir.Function(module, ir.FunctionType(_INTEGER, [*tables, *more]), NAME)
@@ -100,19 +90,8 @@ def straight(
         address = builder.load(builder.gep(arrays[0], [_INTEGER(m.PRESCRIBE)]))
         laws = ir.FunctionType(_INTEGER, [*tables, _FLOAT]).as_pointer()
         builder.call(builder.inttoptr(address, laws), function.args[:5])
-    # another way out of each block, which is never taken: LLVM makes one block of two that only follow each other
-    size, never = builder.load(builder.gep(arrays[0], [_INTEGER(m.NV)])), function.append_basic_block()
-    always = builder.icmp_signed(">=", size, _INTEGER(0))
-
-    def divide() -> None:
-        following = builder.append_basic_block()
-        builder.cbranch(always, following, never)
-        builder.position_at_end(following)
-
-    Emitter(builder, tape, places(builder, tape, [[*arrays, *given]]), exact=exact, divide=divide).emit()
-    for end in (builder.block, never):
-        builder.position_at_end(end)
-        builder.ret(_INTEGER(0))
+    Emitter(builder, tape, places(builder, tape, [[*arrays, *given]]), exact=exact).emit()
+    builder.ret(_INTEGER(0))
     return str(module)
 
 

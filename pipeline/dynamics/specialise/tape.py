@@ -1,7 +1,6 @@
 """A computation as it happens: arithmetic on symbols writes what it does on a tape.
 
-The tape is a tree of blocks: operations in their order, branches, each with two blocks and what they leave behind, and
-loops.
+The tape is a tree of blocks: operations in their order, and branches, each with two blocks and what they leave behind.
 Equal operations are written once, and what numbers of the wiring make trivial (times zero, plus zero) not at all.
 """
 
@@ -111,39 +110,6 @@ class Branch:
     condition: Symbol
     blocks: tuple[list[Any], list[Any]]
     joins: list[tuple[Symbol, Any, Any]] = field(default_factory=list)
-
-
-@dataclass
-class Loop:
-    """A block that runs again as long as its condition, which it computes, holds; what it computed last holds after it.
-
-    blocks: the one.  carried: (symbol in the block, its first value, the value that each turn leaves for the next).
-    """
-
-    blocks: tuple[list[Any]]
-    condition: Any = False
-    carried: list[tuple[Symbol, Any, Any]] = field(default_factory=list)
-
-
-def everything(block: list[Any]) -> Iterator[Any]:
-    """All operations, branches and loops of a block and of those in it."""
-    for item in block:
-        yield item
-        if not isinstance(item, Symbol):
-            for inner in item.blocks:
-                yield from everything(inner)
-
-
-def operands(item: Any) -> Iterator[Symbol]:
-    """Symbols that an operation, branch or loop is applied to."""
-    if isinstance(item, Symbol):
-        given = list(item.arguments)
-    else:
-        given = [
-            item.condition,
-            *(v for row in (item.joins if isinstance(item, Branch) else item.carried) for v in row[1:]),
-        ]
-    yield from (value for value in given if isinstance(value, Symbol))
 
 
 class Tape:
@@ -273,10 +239,6 @@ class Tape:
         joined = self._symbol(kind_of(a), "join", ())
         branch.joins.append((joined, a, b))
         return joined
-
-    def carry(self, first: Any) -> Symbol:
-        """What a turn of a loop gets from the one before, the first turn a value like this."""
-        return self._symbol(kind_of(first), "carried", ())
 
 
 def _negative(a: Any) -> bool:

@@ -3,7 +3,7 @@
 Sizes, offsets and tables of h are numbers, so loops are counted and indices known while the tape is written; w and f
 hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it is, and
 what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
-repeated. A kernel that is repeated (`choice.repeat`) is run once, on symbols for all that it leaves to itself.
+repeated.
 """
 
 from __future__ import annotations
@@ -14,16 +14,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics.specialise.plain import Plain
-from flexclear.pipeline.dynamics.specialise.tape import (
-    FLOAT,
-    Branch,
-    Loop,
-    Symbol,
-    Tape,
-    Undecided,
-    everything,
-    operands,
-)
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 
 class Number(float):
@@ -72,9 +63,7 @@ class Trace:
         self.tape = Tape(self.decide, longest)
         self.journal: list[Any] = []
         self.runs = [Run([], [])]
-        self.plain = Plain(
-            self._function, self._largest, self._smallest, self.call, lambda *given: self.call(self._repeat, given)
-        )
+        self.plain = Plain(self._function, self._largest, self._smallest, self.call)
 
     def decide(self, condition: Symbol) -> bool:
         """How a branch goes in the run that is under way; Undecided when it goes both ways."""
@@ -137,33 +126,6 @@ class Trace:
         if isinstance(a, tuple):
             return tuple(self._joined_results(branch, x, y) for x, y in zip(a, b, strict=True))
         return None if a is None else self.tape.join(branch, a, b)
-
-    def _repeat(self, step: Callable, *arguments: Any) -> None:
-        start, carried, firsts = len(self.journal), dict[Any, Symbol](), dict[Any, Any]()
-        while True:
-            loop = Loop(([],))
-            with self.tape.inside(loop.blocks[0]):
-                for (memory, index), symbol in carried.items():
-                    memory[index] = symbol
-                loop.condition = step(*arguments)
-            if not carried and not isinstance(loop.condition, Symbol):  # a number of the wiring, or all are numbers
-                self.tape.block += loop.blocks[0]
-                start = len(self.journal)
-                if loop.condition:
-                    continue
-                return
-            left = {(memory, index): value for memory, index, _, value in self.journal[start:]}
-            if left.keys() == carried.keys():
-                break
-            self._go_back(start)
-            firsts = {(memory, index): memory[index] for memory, index in left}
-            carried = {place: self.tape.carry(first) for place, first in firsts.items()}
-        read = {symbol for item in everything(loop.blocks[0]) for symbol in operands(item)} | {
-            loop.condition,
-            *left.values(),
-        }
-        loop.carried = [(symbol, firsts[place], left[place]) for place, symbol in carried.items() if symbol in read]
-        self.tape.block.append(loop)
 
     def _function(self, name: str) -> Callable:
         def apply(*arguments: Any) -> Any:

@@ -53,6 +53,11 @@ class Engine:
     rtol: float
     straight: Straight
 
+    @property
+    def has_straight_code(self) -> bool:
+        """Whether it evaluates with code for its wiring alone."""
+        return "evaluate" not in self.entry.addresses
+
     @cached_property
     def breaks(self) -> np.ndarray:
         """Start, breaks of drives and loads and samples in between, end [s]; times that differ by rounding only are
@@ -114,13 +119,15 @@ class Engine:
         some."""
         rows, known = self.selected.tobytes(), self.straight
         alone = rows in known.rows
-        self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
+        if self.has_straight_code:
+            self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
         self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate what is recorded of every row, in this thread."""
-        self.h[m.DESCRIBE] = address(self.model, self.h, self.straight, self.selected.tobytes(), DESCRIBED)
+        if self.has_straight_code:
+            self.h[m.DESCRIBE] = address(self.model, self.h, self.straight, self.selected.tobytes(), DESCRIBED)
         self.entry.observe(self.h, self.model.arrays.f, self.w, self.n, rows, pieces, tolerance, out)
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:

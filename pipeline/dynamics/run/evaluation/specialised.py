@@ -26,12 +26,13 @@ def settle(engine: Engine, progress: Progress) -> None:
     for all rows that it has met before.
     """
     straight, rows = engine.straight, engine.selected.tobytes()
-    if straight.place is not None and straight.group is None and engine.method.staged:
-        straight.group = _group(engine, rows, straight.place, progress)
-    if rows not in straight.rows and (len(straight.rows) < SELECTIONS or engine.h[m.N_CHANGES]):
-        straight.rows.append(rows)
-    for met in straight.rows:
-        address(engine.model, engine.h, straight, met, progress=progress)
+    if engine.has_straight_code or engine.h[m.N_CHANGES]:
+        if straight.place is not None and straight.group is None and side_by_side(engine):
+            straight.group = _group(engine, rows, straight.place, progress)
+        if rows not in straight.rows and (len(straight.rows) < SELECTIONS or engine.h[m.N_CHANGES]):
+            straight.rows.append(rows)
+        for met in straight.rows:
+            address(engine.model, engine.h, straight, met, progress=progress)
     engine.connect()
 
 
@@ -42,11 +43,16 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> P
     """
     engine.straight.exact, rows = True, engine.selected.tobytes()
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
-    together = members >= FEW * threads and engine.method.staged
+    together = members >= FEW * threads and side_by_side(engine)
     if together and made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
         return Places(lanes, threads)
     settle(engine, progress)
     return None
+
+
+def side_by_side(engine: Engine) -> bool:
+    """Whether its attempts can be made together with those of others."""
+    return bool(engine.method.staged and engine.has_straight_code)
 
 
 def _group(engine: Engine, rows: bytes, place: Place, progress: Progress) -> LaneGroup | None:

@@ -1,5 +1,8 @@
-"""Straight code for the wiring of a mechanism alone: which there is, and where. It is made once for all scenes of a
-wiring.
+"""Straight code for the wiring of a mechanism alone: which there is, and where.
+
+It is made once for all scenes of a wiring, and takes less time to make and to run than kernels do. Kernels are for what
+is too long for it, and for friction in ideal joints, which is solved for by iteration from what the last evaluation
+found. The wiring decides, no clock and no cache, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -47,11 +50,18 @@ class Straight:
     rows: list[bytes] = field(default_factory=list)
 
 
+def suited(model: Model) -> bool:
+    """Whether there can be straight code, unless it is too long."""
+    return not (INTERPRETED or any(effect.iterates for effect in model.parts.present))
+
+
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
     """Sources of what evaluates a model and describes it, by name, with all closure rows: no selection has longer code.
 
     Steps that solve for all of them have code of their own as well; where some are redundant, which is chosen later.
     """
+    if not suited(model):
+        return sources.kernels(model.parts)
     wired = wiring(model.arrays, model.arrays.h)
     names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
     return {name: sources.straight(model.parts, wired, name) for name in names}
@@ -77,10 +87,7 @@ def made(
     *,
     exact: bool = False,
 ) -> int:
-    """Address of code for closure rows, of several lanes where so many are requested; 0 where there is none of them.
-
-    Raises UnsuitedError where there is none with changes.
-    """
+    """Address of code for closure rows, of several lanes where so many are requested; 0 where there is none."""
     h, parts, of_steps = h.copy(), model.parts, name == SPECIALISED
     changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
     selection.write(model, h, np.frombuffer(rows, dtype=bool))
@@ -93,8 +100,6 @@ def made(
             else:
                 source = sources.along(parts, wired) if changes else sources.straight(parts, wired, name, exact=exact)
             try:
-                if INTERPRETED and (lanes > 1 or changes):
-                    raise UnsuitedError("Python runs the kernels")
                 _known[key] = functions.straight(name, source, partial(progress, None))
             except UnsuitedError:
                 if changes:
