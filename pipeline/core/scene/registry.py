@@ -63,8 +63,8 @@ def module_of(package: str, name: str, *, where: str = "") -> str:
 def lookup(package: str, name: str, *, where: str) -> Any:
     """The module or object that a family lists under `name`, imported now; InputError for others."""
     module, attribute = listed(package, name, where=where)
-    found = import_module(module)
-    return getattr(found, attribute) if attribute else found
+    part = import_module(module)
+    return getattr(part, attribute) if attribute else part
 
 
 def declared(models: Iterable[Any], key: str = "type", made: str = "") -> dict[str, str]:

@@ -41,8 +41,8 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: by how much members start apart where the scene does not say: a fraction of a contact's clearance or depth, which
-#: count as at least a fraction of the mechanism's size times that
+#: by how much starts of members differ where the scene does not say: a fraction of a contact's clearance or depth;
+#: depths count as at least the second fraction, of the mechanism's size
 FRACTION_OF_CLEARANCE, LEAST_OF_SIZE = 1e-3, 2.5e-8
 #: variables of one member by name, with the dimensions of the schema but `member`, and why its method was `switched`
 Member = dict[str, np.ndarray]
@@ -114,7 +114,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
-    """By how much members start apart [m] where the scene does not say.
+    """By how much starts of members differ [m] where the scene does not say.
 
     That is FRACTION_OF_CLEARANCE of the least clearance: no start is known better. It is at least LEAST_OF_SIZE of the
     mechanism's size, since the errors of a loose tolerance would make members that are nearer look like influences.
