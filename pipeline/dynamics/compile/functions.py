@@ -43,6 +43,7 @@ WORDS = {
     "retract": "retractions",
     "observe": "recorded quantities",
     "advance": "integrator",
+    "resolve": "integrator's events",
     "prescribe": "laws of time",
     "describe": "recorded quantities",
     SPECIALISED: "equations of motion of this mechanism alone",
@@ -57,11 +58,12 @@ ADDRESSES = {
     "describe": m.DESCRIBE,
     "project": m.PROJECT,
     "retract": m.RETRACT,
+    "resolve": m.RESOLVE,
     "prescribe": m.PRESCRIBE,
 }
 #: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the
 #: kernels have most kernels in common, which each process compiles once
-ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESCRIBED, WHOLE, SPECIALISED)
+ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESCRIBED, WHOLE, SPECIALISED, "resolve")
 #: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
 #: where the code of kernels is, and what they number by

@@ -106,6 +106,9 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
         by_name["project"] = _project(parts)
     if integrators.INTEGRATORS[scheme.integrator].retracts:
         by_name["retract"] = _retract(parts)
+    steps = _steps(parts, scheme)
+    if "events" in steps.given:
+        by_name["resolve"] = _resolve(steps, scheme)
     return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
 
 
@@ -256,6 +259,23 @@ def _observe(parts: Parts) -> str:
 
 
 def _advance(parts: Parts, scheme: Scheme) -> str:
+    file = _steps(parts, scheme)
+    file.given["stepping"] = file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive")
+    if "events" in file.given:
+        file.given["resolve"] = "calls.resolve"
+    file.take(DYNAMICS, "memory as m")
+    maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
+    return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
+
+
+def _resolve(file: Composition, scheme: Scheme) -> str:
+    file.take(f"{DYNAMICS}.fields", "data")
+    maker = file.take(f"{INTEGRATORS}.stepper", "make_resolution")
+    return _text(file, f"events in steps of {scheme}", "resolution", maker, RESOLVE)
+
+
+def _steps(parts: Parts, scheme: Scheme) -> Composition:
+    """What steps, and the events in them, are made of."""
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
     file = Composition(parts)
     file.given = {
@@ -263,7 +283,6 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "project": _projection(file),
         "retract": "calls.retract",
         "method": file.take(module, method),
-        "stepping": file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
     if integrators.INTEGRATORS[scheme.integrator].reads_all:
         file.given["complete"] = "calls.evaluate"
@@ -272,9 +291,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         file.given["events"] = events
     if parts.closures:
         file.given["poses"] = file.take(INTEGRATORS, "singular_step")
-    file.take(DYNAMICS, "memory as m")
-    maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
-    return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
+    return file
 
 
 def _events(file: Composition, scheme: Scheme) -> str:
@@ -429,6 +446,11 @@ def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out,
     rows, out = calls.carray(rows, (count, width)), calls.carray(out, (length,))
     observation(h, f, w, n, rows, calls.carray(pieces, (lines, laws)), tolerance, out)
     return 0
+"""
+RESOLVE = """@calls.exported("resolve")
+def resolve(h, f, w, n, step, t_new, rows, count, width, events, event_count, event_width):
+    rows, events = calls.carray(rows, (count, width)), calls.carray(events, (event_count, event_width))
+    return resolution(data(h, f, w, n), step, t_new, rows, events)
 """
 # one function for both tasks: each would be an object of its own to fetch
 ADVANCE = """@calls.exported("advance")
