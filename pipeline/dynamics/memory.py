@@ -372,8 +372,8 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # are, and whether the dense output of a step whose events have been resolved is there
 _INTEGERS = _numbered(
     "evaluation active mode state abridged together status evaluations steps rejected next_output n_recorded n_events "
-    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited rates_in "
-    "extended"
+    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited "
+    "rates_in extended"
 )
 # fmt: off
 (
