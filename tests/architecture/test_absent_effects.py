@@ -15,12 +15,12 @@ from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import fingerprint
 from flexclear.pipeline.dynamics import loads
-from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile import functions, reach
+from flexclear.pipeline.dynamics.compile.reach import imported
 from flexclear.pipeline.dynamics.compile.sources import (
     DESCRIBED,
     abreast,
     along,
-    imported,
     kernels,
     sources,
     straight,
@@ -154,7 +154,7 @@ def parts(path: Path) -> Parts:
 
 def reached(texts: dict[str, str]) -> set[str]:
     """Modules of this tower that the machine code depends on."""
-    return {name for text in texts.values() for name in functions.reached(text)}
+    return {name for text in texts.values() for name in reach.reached(text)}
 
 
 #: effect -> word that its generated source must have, modules it must reach

@@ -12,14 +12,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene import integrators
-from flexclear.pipeline.core.scene.events import with_switched
 from flexclear.pipeline.core.scene.registry import listed
-from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file
 from flexclear.pipeline.dynamics.compile import formulas
 from flexclear.pipeline.dynamics.effects import (
     FORMS,
@@ -30,14 +27,10 @@ from flexclear.pipeline.dynamics.effects import (
     SURFACES,
     Parts,
     Scheme,
-    most_parts,
-    named,
-    schemes,
 )
 from flexclear.pipeline.dynamics.effects.effect import PACKAGE, Effect
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 DYNAMICS = "flexclear.pipeline.dynamics"
@@ -115,39 +108,6 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
 def kernels(parts: Parts) -> dict[str, str]:
     """Source by name of what a mechanism of these parts calls whose wiring has no code of its own."""
     return {"evaluate": _evaluate(parts), "describe": _text(*_description(parts), DESCRIBE, _formulas(parts))}
-
-
-def modules(scene: Scene) -> tuple[str, ...]:
-    """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
-    files import.
-
-    Raises InputError when a name is not listed in its family.
-    """
-    scene = with_switched(scene) if scene.event else scene
-    names, parts = {part.module for part in named(scene)}, most_parts(scene)
-    names = names.union(*(effect.modules for effect in parts.present))
-    either = (parts, replace(parts, articulated=True))  # which, only the tree decides
-    return tuple(sorted(names.union(*(_composed(one, scheme) for one in either for scheme in schemes(scene)))))
-
-
-@cache
-def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
-    """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
-    texts = [*sources(parts, scheme).values(), *kernels(parts).values(), straight(parts, ())]
-    texts += [abreast(parts, (), lanes=2), along(parts, ())]
-    return frozenset().union(*map(_reached, texts))
-
-
-@cache
-def _reached(source: str) -> frozenset[str]:
-    """Modules that a generated file imports; steps depend on few of the parts."""
-    return frozenset(name for name in imported(source) if source_file(TREE, name))  # others are in modules
-
-
-def imported(source: str) -> set[str]:
-    """Modules and names that a generated file imports, as `fingerprint.imported` returns those of any other source."""
-    lines = re.findall(r"^from (\S+) import (\S+)", source, re.MULTILINE)
-    return {name for module, part in lines for name in (module, f"{module}.{part}")}
 
 
 def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bool = False) -> str:
