@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import xarray as xr
@@ -66,8 +65,7 @@ class Rung:
 
     bare: how to time its integration alone [s], whose samples are states.  alike: how to time its integration with the
     body's position and velocity in the samples, as two sensors of another code have them [s]; alike_error: how wrong
-    these are.  straight: how to time the whole run by the code for its wiring alone, with which sweeps and ensembles
-    step [s]; None where there is none.
+    these are.
     """
 
     integrator: str
@@ -79,7 +77,6 @@ class Rung:
     bare: Callable[[], float]
     alike: Callable[[], float]
     alike_error: Error
-    straight: Callable[[], float] | None
 
 
 @dataclass(frozen=True)
@@ -153,7 +150,7 @@ def ladder(here: Mechanism, body: str, reference: Reference, enough: Callable[[E
 
 
 def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> Rung:
-    engine = mine.general_engine()
+    engine = mine.engine()
     start, what = consistent_start(engine), mine.scene.solver
     error = reference.error(_regular(run, body, reference.sampling))
 
@@ -161,24 +158,19 @@ def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> 
         rows = integrate(engine, start, silent).rows
         return _sensed(engine, rows[_sampled(rows[:, 0], reference.sampling)], body)
 
-    def whole(engine: Engine) -> float:
+    def whole() -> float:
         return once(lambda: observed(engine, integrate(engine, start, silent)))
-
-    @cache
-    def straight() -> Engine:
-        return mine.engine()
 
     return Rung(
         what.integrator,
         what.rtol,
         int(run.attrs["evaluations"]),
-        whole(engine),
+        whole(),
         error,
-        lambda: whole(engine),
+        whole,
         lambda: once(lambda: integrate(engine, start, silent)),
         lambda: once(alike),
         reference.error(alike()),
-        lambda: whole(straight()),
     )
 
 

@@ -251,7 +251,7 @@ def _candidates(done: list[Run], level: float) -> list[Run]:
 def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: list[Rung]) -> Record:
     """One of their runs, and next to it, in turns, ours that is no worse and ours that reach some levels.
 
-    Times of ours: the whole run, its parts and, next to those that reach levels, straight code.
+    Times of ours: the whole run and, of those that reach levels, its parts.
     """
     assert run.error is not None
     requested = {"equal": errors.cheapest(ours, partial(_no_worse, run.error))}
@@ -262,7 +262,6 @@ def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: 
             tasks[_name(rung), "s"] = rung.time
             if name != "equal":
                 tasks |= {(_name(rung), "bare_s"): rung.bare, (_name(rung), "alike_s"): rung.alike}
-                tasks |= {(_name(rung), "straight_s"): rung.straight} if rung.straight else {}
     if run.outcome.seconds < LONG:
         tasks["theirs", "s"] = lambda: peer.run(run.method, run.step, sampling).seconds
     times = {task: found.median for task, found in interleaved(tasks, REPEATS).items()}
@@ -317,7 +316,6 @@ def show(records: list[Record]) -> str:
         "the same recorded",
         "its error",
         "integration alone",
-        "straight code",
     )
     columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "ours", "ours, no worse [s]", "ratio")
     texts = [pipe_table(head, levels)]
@@ -360,18 +358,16 @@ def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
     done = [r for r in runs if str(level) in r.get("ours", ())]
     reaching = [r for r in done if r["relative"] <= level]
     if not done:
-        return [name, *[""] * 11]
+        return [name, *[""] * 10]
     best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
     mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
     seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
     theirs = [seconds, _called(best), short(best["position_um"])]
     # records from before these were measured say nothing about them
-    alike, bare, straight = (
-        f"{mark}{best['s'] / ours[part]:.3g}" if part in ours else "" for part in ("alike_s", "bare_s", "straight_s")
-    )
+    alike, bare = (f"{mark}{best['s'] / ours[part]:.3g}" if part in ours else "" for part in ("alike_s", "bare_s"))
     error = f"{100 * ours['alike_relative']:.2g} %" if "alike_relative" in ours else ""
     mine = [f"{ours['s']:.3g}", ours["run"], short(ours["position_um"])]
-    return [name, *theirs, *mine, ratio, alike, error, bare, straight]
+    return [name, *theirs, *mine, ratio, alike, error, bare]
 
 
 def _called(run: Record) -> str:
