@@ -208,7 +208,7 @@ def _submit(
         if len(running) >= width or alone or (task.exclusive and running):
             return
         inputs = plan.inputs(task)
-        key = key_of(task, inputs, store, sources)
+        key = key_of(task, inputs, sources)
         if any(other.key == key for other in running.values()):
             continue
         plan.waiting.remove(task)
