@@ -122,7 +122,9 @@ def table(planned: xr.Dataset) -> Table:
         ]
         decision = "keep" if int(part["kept"]) else "drop"
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
-    requested = [written(float(value), 0.0, unit) for value, unit in zip(planned["requested"].values, units, strict=True)]
+    requested = [
+        written(float(value), 0.0, unit) for value, unit in zip(planned["requested"].values, units, strict=True)
+    ]
     rows.append(("requested", "", *requested, "", ""))
     decided = json.loads(planned.attrs["planned"])
     notes = [words(planned)]
