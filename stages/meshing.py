@@ -69,9 +69,7 @@ def modules(recipe: Path) -> tuple[str, ...]:
 
 def kind_of(recipe: Path) -> str:
     """Name of the kind of body that a recipe describes."""
-    shape = read_toml(recipe).get("shape")
-    kinds = import_module(KINDS).SHAPES
-    return str(kinds.get(str(shape.get("type")), "beam")) if isinstance(shape, Mapping) else "beam"
+    return str(import_module(KINDS).name_of(read_toml(recipe)))
 
 
 def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:

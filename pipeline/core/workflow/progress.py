@@ -35,7 +35,9 @@ class Job:
     name: str
     begun: float
     since: tuple[float, float] | None = None  #: time and finished fraction where the last sample began
-    samples: list[tuple[float, float]] = field(default_factory=list)  #: seconds, and fractions done in them
+    samples: int = 0
+    spent: float = 0.0  #: seconds of all samples, and the fractions done in them, the later ones counting more
+    advanced: float = 0.0
     fraction: float | None = None
     text: str = ""
     said: float = 0.0
@@ -100,8 +102,9 @@ class Monitor:
         if fraction is None or job.since is None or fraction < job.since[1]:  # begun anew, at another tolerance, say
             job.since = None if fraction is None else (self.clock(), fraction)
         elif fraction - job.since[1] >= ENOUGH:
-            job.samples.append((self.clock() - job.since[0], fraction - job.since[1]))
-            job.since = (self.clock(), fraction)
+            job.spent = FADING * job.spent + self.clock() - job.since[0]
+            job.advanced = FADING * job.advanced + fraction - job.since[1]
+            job.since, job.samples = (self.clock(), fraction), job.samples + 1
         job.fraction, job.text = fraction, text
         if self.rewrites or self.verbose or news or self.clock() - job.said >= SPARSE:
             job.said = self.clock()
@@ -136,17 +139,17 @@ class Monitor:
         parts = [job.name]
         if job.fraction is not None:
             parts.append(f"{job.fraction:4.0%}")
-            if len(job.samples) >= SAMPLES:
+            if job.samples >= SAMPLES:
                 parts.append(f"{duration(self._seconds_per_fraction(job) * (1.0 - job.fraction))} left")
         return " ".join([*parts, *([job.text] if job.text else [])])
 
     def _seconds_per_fraction(self, job: Job) -> float:
         """Seconds per fraction; what continues counts as soon as it is slower than what was before."""
-        known = seconds_per_fraction(job.samples)
+        known = job.spent / job.advanced
         if job.since is None or job.fraction is None:
             return known
         spent, fraction = self.clock() - job.since[0], job.fraction - job.since[1]
-        return seconds_per_fraction([*job.samples, (spent, fraction)]) if spent > known * fraction else known
+        return max(known, (FADING * job.spent + spent) / (FADING * job.advanced + fraction))
 
     def _show(self, text: str) -> None:
         if self.quiet:
@@ -161,12 +164,6 @@ class Monitor:
     def _write(self, text: str) -> None:
         self.out.write(text)
         self.out.flush()
-
-
-def seconds_per_fraction(samples: list[tuple[float, float]]) -> float:
-    """Seconds per fraction of the work, of samples (seconds, fraction), the later ones counting more."""
-    faded = [(FADING**k * spent, FADING**k * fraction) for k, (spent, fraction) in enumerate(reversed(samples))]
-    return sum(spent for spent, _ in faded) / sum(fraction for _, fraction in faded)
 
 
 def duration(seconds: float) -> str:
