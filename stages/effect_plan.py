@@ -107,7 +107,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
     progress(None, "chart")
-    requested = dict(zip(dataset["quantity"].values.tolist(), dataset["wanted"].values.tolist(), strict=True))
+    requested = dict(zip(dataset["quantity"].values.tolist(), dataset["requested"].values.tolist(), strict=True))
     result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))
     return result | chart("plan", shown.drawn(dataset), f"What the accuracy calls for: {params['title']}", requested)
 

@@ -1,4 +1,4 @@
-"""Stages 5 to 8: what is drawn and judged of runs: a verdict on sections, general figures, comparisons."""
+"""Stages 5 to 8: what is drawn and judged of runs: a verdict on sections, general figures, comparisons, stability."""
 
 from __future__ import annotations
 
@@ -37,7 +37,6 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
     where there is one.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.overview import comparison
     from flexclear.pipeline.post.overview import comparison as compared_runs
     from flexclear.pipeline.post.plotting.table import files
 
@@ -49,4 +48,23 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
     result: dict[str, Any] = {"nc": compared}
     result |= files("differences", compared_runs.table(compared)) | files("costs", compared_runs.costs(compared))
     progress(None, "figures")
-    return result | comparison.make("compare", runs, chosen)
+    return result | compared_runs.make("compare", runs, chosen)
+
+
+def stability(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """``stability.nc`` (value, limit, verdict, remedy over `check`; the answer as an attribute) and a figure.
+
+    params: `by_need`, whether the program chose the integrator.
+    inputs: ``run``, ``study`` where there is one, and ``post`` where the scene has an ensemble.
+    """
+    import xarray as xr
+
+    from flexclear.pipeline.post.answers import stability as checked
+
+    members = float(inputs["post"]["ensemble_horizon"]) if "post" in inputs else None
+    result = checked.checks(inputs["run"], inputs.get("study"), members, by_need=params["by_need"])
+    columns = {name: ("check", [str(getattr(c, name)) for c in result]) for name in ("value", "limit", "verdict")}
+    columns["remedy"] = ("check", [c.advice for c in result])
+    attributes = {"Conventions": "CF-1.11", "answer": checked.answer(inputs["run"], result, members)}
+    data = xr.Dataset(columns, {"check": [c.name for c in result]}, attributes)
+    return {"nc": data} | checked.figure(inputs["run"])

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.load import edited, read_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import of_run
@@ -67,6 +67,7 @@ class Graph:
                 part=body,
                 modules=meshing.modules(recipe),
                 context={"folder": str(recipe.parent.resolve()), "file": self.scene.recipes()[body]},
+                files=meshing.files(read_toml(recipe), recipe.parent),
             )
             for body, recipe in recipes.items()
         }
@@ -170,7 +171,8 @@ class Graph:
             inputs["linear"] = self.linear(time)
         elif what != "modes":
             inputs["run"] = self.simulate
-        task = self._task("render", "rendering:run", rendering.params(self.scene, what, kind), inputs)
+        params, files = rendering.params(self.scene, what, kind), rendering.files(self.scene, what)
+        task = self._task("render", "rendering:run", params, inputs, files=files)
         return replace(task, part=f"{what} {kind}", folder=self._folder("paraview" if kind == "pvd" else ""))
 
     def linear(
@@ -285,6 +287,7 @@ class Graph:
         shown: str = "",
         modules: tuple[str, ...] = (),
         context: Mapping[str, Any] | None = None,
+        files: Mapping[str, Path] | None = None,
     ) -> Task:
         """run: ``module:function`` of `stages`.  part: of a body, which then has its files in a folder of the stage.
 
@@ -303,4 +306,5 @@ class Graph:
             inputs=inputs or {},
             names=names,
             modules=modules,
+            files=files or {},
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -12,6 +13,7 @@ from flexclear.pipeline.core.scene.limits import Limits, check_cells
 from flexclear.pipeline.core.scene.load import RECIPE, is_file, read_toml, require_kind
 from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.external_files import companions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +39,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     factor = changes.pop("elements", None)
     if factor is not None and isinstance(table.get("elements"), int):
         changes["elements"] = factor * table["elements"]
-    for path in files(table, recipe.parent):
+    for path in _named(table, recipe.parent):
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
@@ -67,16 +69,26 @@ def modules(recipe: Path) -> tuple[str, ...]:
 
 def kind_of(recipe: Path) -> str:
     """Name of the kind of body that a recipe describes."""
-    shape = read_toml(recipe).get("shape")
-    kinds = import_module(KINDS).SHAPES
-    return str(kinds.get(str(shape.get("type")), "beam")) if isinstance(shape, Mapping) else "beam"
+    return str(import_module(KINDS).name_of(read_toml(recipe)))
 
 
-def files(table: Mapping[str, Any], folder: Path) -> list[Path]:
-    """The files that a recipe names; others that their formats need are not known before they are read."""
+def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:
+    """The files that a recipe names, and those that their formats read with them, by their paths from the recipe."""
+    opened = [file for path in _named(table, folder) for file in (path, *companions(path))]
+    return {_relative(path, folder): path for path in opened}
+
+
+def _named(table: Mapping[str, Any], folder: Path) -> list[Path]:
     shape = table.get("shape")
-    named = shape if isinstance(shape, Mapping) else {}
-    return [folder / str(named[key]) for key in FILES if key in named]
+    return [folder / str(shape[key]) for key in FILES if key in shape] if isinstance(shape, Mapping) else []
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """A path from a folder; on another drive there is no way from there."""
+    try:
+        return os.path.relpath(path, folder)
+    except ValueError:
+        return str(path)
 
 
 def in_recipe(error: InputError, path: Path) -> InputError:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core.scene.load import is_file
 from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.external_files import companions
 from flexclear.stages.simulation import bundles
 
 if TYPE_CHECKING:
@@ -71,6 +72,13 @@ def _looks(scene: Scene) -> dict[str, Any]:
         if look:
             looks[name] = look
     return looks
+
+
+def files(scene: Scene, what: str) -> dict[str, Path]:
+    """The files of shapes that are shown, with those that their formats read with them, by their paths."""
+    looks = _looks(scene).values() if what != "modes" else ()
+    named = [Path(shape["file"]) for look in looks for shape in look.get("geometry", ()) if shape["type"] == "file"]
+    return {str(file): file for path in named for file in (path, *companions(path))}
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -127,7 +127,7 @@ class Answers:
         study = cost.Study(self.scene, self.workplace, (self.seconds or LEAST) / self.questions)
         study.begin()
         if self.seconds is None:
-            study.seconds = max(LEAST, TIMES * study.own * study.pace) / self.questions
+            study.seconds = max(LEAST, TIMES * study.own * study.seconds_each) / self.questions
         return study
 
     @cached_property
@@ -145,7 +145,7 @@ class Answers:
 
     @cached_property
     def stability(self) -> Made:
-        """Whether the run is stable (`stages.stability_checks`), with what the costs of accuracy were measured with."""
+        """Whether the run is stable (`stages.evaluation`), with what the costs of accuracy were measured with."""
         try:
             study = {"study": self._study.task()}
         except SolverError:
@@ -155,7 +155,7 @@ class Answers:
         task = Task(
             stage="stability",
             scene=self.scene.name,
-            run="flexclear.stages.stability_checks:run",
+            run="flexclear.stages.evaluation:stability",
             params={"by_need": self.scene.by_need()},
             inputs={"run": graph.simulate, **study, **members},
             folder=f"stability/{self.scene.name.replace('/', '_')}",
@@ -268,7 +268,7 @@ class _Comparison:
     def _seconds(self, name: str, members: int) -> float:
         """Of wall time that so many members are predicted to take: as in the last round, else as the scene's run."""
         runs = members if self._touching(name) else 1
-        return (runs * self.took.get(name, self.study.own * self.study.pace) + cost.POINT) / AT_ONCE
+        return (runs * self.took.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
 
     def _fitting(self, names: Sequence[str], members: int) -> list[str]:
         """Those that the rest of the budget holds, the first ones first: what the summary says before the others."""

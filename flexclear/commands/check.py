@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from flexclear.commands import scenes
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, kind_of_file, read_toml
+from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
 from flexclear.stages import meshing, rigid_body
@@ -294,8 +294,8 @@ def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
 
     table = meshing.params(path)["recipe"]
     parse(table, str(path))
-    named = meshing.files(table, path.parent)
-    if any(file.stat().st_size > LARGEST_FILE for file in named):
+    opened = meshing.files(table, path.parent).values()
+    if any(is_file(file) and file.stat().st_size > LARGEST_FILE for file in opened):
         return
     try:
         mesh = kind.build(table, path.parent)

@@ -102,7 +102,8 @@ class Study:
     """A cost study while its points are made, each from the cache where it is there.
 
     seconds: of processor that the points may take; a point counts what it took when it was made.  models: whether
-    other meshes, mode sets and beam theories are among them.
+    other meshes, mode sets and beam theories are among them.  own, seconds_each: evaluations of the scene's own run,
+    and what each took.
     """
 
     scene: Scene
@@ -117,7 +118,7 @@ class Study:
     spent: float = 0.0
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
     own: float = 0.0
-    pace: float = 0.0
+    seconds_each: float = 0.0
     _complete: bool = False
     _ensembles: dict[str, Task] = field(default_factory=dict)
     _compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
@@ -133,7 +134,7 @@ class Study:
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
         self.own = float(record.attrs["evaluations"])
-        self.pace = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
+        self.seconds_each = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
 
     def first(self) -> None:
         """Make a few points about the scene's own setting."""
@@ -206,7 +207,7 @@ class Study:
         for rtol in ENSEMBLES if ensemble is not None else ():
             change = edited(self.scene, {"solver.rtol": rtol, "accuracy": None})
             design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
-            if self.spent + self.own * self.pace * (ensemble.members if ensemble else 1) > self.seconds:
+            if self.spent + self.own * self.seconds_each * (ensemble.members if ensemble else 1) > self.seconds:
                 self.undone.append(design)
                 continue
             task = _measured(design, "run_ensemble", {"quantities": names}, self._kernels(design))
@@ -216,7 +217,7 @@ class Study:
     def _queue(self, designs: Sequence[cost_design.Design]) -> None:
         """Make points in this order; those that the budget no longer holds are left undone."""
         for design in designs:
-            seconds = design.evaluations(self.evaluations, self.own) * self.pace + POINT
+            seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
             compiling = COMPILING if kernels.shared(design.scene) not in self._compiled else 0.0
             if self.spent + seconds + compiling > self.seconds:
                 self.undone.append(design)
@@ -237,7 +238,9 @@ class Study:
         self.points.append(design)
         solver = design.scene.solver
         if "refused" in record.attrs:
-            self.spent += POINT + (self._most() * self.pace if "evaluations" in record.attrs["refused"] else 0.0)
+            self.spent += POINT + (
+                self._most() * self.seconds_each if "evaluations" in record.attrs["refused"] else 0.0
+            )
         else:
             self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
             if solver.step is None and design.group in ("tolerance", "sampling"):
@@ -247,7 +250,7 @@ class Study:
 
     def _most(self) -> int:
         """Evaluations that a point may take: a power of ten, so that its key does not change with each budget."""
-        affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.pace / MOST_EVALUATIONS, 1e5)
+        affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
         return int(10.0 ** math.ceil(math.log10(affordable)))
 
     def _kernels(self, design: cost_design.Design) -> Task:

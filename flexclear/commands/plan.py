@@ -119,7 +119,7 @@ def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))
         result = result.assign(
-            {name: compared[name] for name in ("wanted", "error", "chance", "allowed", "horizon", "scatter")}
+            {name: compared[name] for name in ("requested", "error", "chance", "allowed", "horizon", "scatter")}
         )
         table = as_html(verified(compared)) + table
     return planned.planned, answered(result, words(result), planned.made.read("plan.png"), table)
@@ -263,7 +263,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
     asked, begun = planned.scene.accuracy.quantities, time.monotonic()
     chosen = [parse(name, planned.scene.owners()) for name in asked]
     full = edited(planned.scene, {"accuracy": None})
-    result, first = planned.made.dataset()[["wanted"]].copy(), list[float]()
+    result, first = planned.made.dataset()[["requested"]].copy(), list[float]()
 
     def compared(members: int) -> list[effect_size.Agreement]:
         both = full, planned.planned
@@ -275,11 +275,11 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
         for k, q in enumerate(chosen):
             relative = asked[q.name].relative
             if relative is not None:  # what it is relative to is known now
-                result["wanted"][k] = relative * effect_size.size(one, q)
+                result["requested"][k] = relative * effect_size.size(one, q)
         result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
         result.attrs |= {"full_evaluations": one.evaluations, "planned_evaluations": two.evaluations}
         first.append(time.monotonic() - begun)
-        requested = result["wanted"].values
+        requested = result["requested"].values
         return [effect_size.agreement(two, one, q, members, float(r)) for q, r in zip(chosen, requested, strict=True)]
 
     def affordable(members: int) -> bool:

@@ -17,11 +17,10 @@ from typing import Any
 from flexclear.commands import scenes
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
-from flexclear.pipeline.core.scene.load import compose, is_file
-from flexclear.pipeline.core.system import file_dependencies
+from flexclear.pipeline.core.scene.load import FILES as NAMING_FILES
+from flexclear.pipeline.core.scene.load import is_file, overridden, read_toml
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
-from flexclear.pipeline.core.system.external_files import require_file
-from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.core.system.external_files import companions, require_file
 from flexclear.pipeline.core.system.version import version
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.stages import meshing
@@ -107,26 +106,34 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
 
 
 def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
-    """The scene, what it extends, recipes, tables, meshes and whatever their readers note."""
-    files = [scene]
-    with file_dependencies.watched(scene.parent) as read:
-        # what is wrong is what the file is made for: each is taken as far as it goes
+    """The scene, what it extends, recipes, tables, meshes and what their formats read with them.
+
+    What is wrong is what the file is made for, so each is taken as far as it goes.
+    """
+    files: list[Path] = []
+    waiting: list[Path] = [scene]
+    for changed in (settings, ()):
         with contextlib.suppress(FlexclearError):
-            scenes.loaded(str(scene), settings)
-        for recipe in _recipes(scene):
+            waiting += _named(overridden(scene, scenes.overrides(changed)))
+    for path in waiting:
+        if path.suffix != ".toml":
+            files += [path, *companions(path)]
+        elif path.resolve() not in files and is_file(path):
+            files.append(path.resolve())
             with contextlib.suppress(FlexclearError):
-                meshing.run({**meshing.params(recipe), "folder": str(recipe.parent)}, {}, silent)
-    files += [Path(os.path.normpath(scene.parent / where)) for where in read]
-    return sorted({path.resolve() for path in files if path.is_file()})
+                table = read_toml(path)
+                extended = table.get("extends")
+                waiting += [path.parent / extended] if isinstance(extended, str) else []
+                waiting += meshing.files(table, path.parent).values()
+    return sorted({path.resolve() for path in files if is_file(path)})
 
 
-def _recipes(scene: Path) -> list[Path]:
-    """Recipes that bodies of a scene name, which need not be sound otherwise."""
-    with contextlib.suppress(FlexclearError):
-        bodies = compose(scene).get("body", {}).values()
-        named = [body.get("mesh") for body in bodies if isinstance(body, dict)]
-        return [Path(name) for name in named if isinstance(name, str) and is_file(Path(name))]
-    return []
+def _named(node: object) -> list[Path]:
+    """Files that a scene's table names, at any depth."""
+    if isinstance(node, dict):
+        own = [Path(node[key]) for key in NAMING_FILES if isinstance(node.get(key), str)]
+        return own + _named(list(node.values()))
+    return [path for item in node for path in _named(item)] if isinstance(node, list) else []
 
 
 def _run(

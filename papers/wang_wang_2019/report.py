@@ -16,7 +16,6 @@ import xarray as xr
 
 from flexclear.papers.wang_wang_2019 import figures
 from flexclear.papers.wang_wang_2019.published import CITATION, DISCREPANCIES
-from flexclear.pipeline.core.system.file_dependencies import note
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.pages import Part, downloads, figures_of, media, page, prose
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, from_markdown
@@ -101,7 +100,6 @@ def _variants(folder: Path) -> list[tuple[str, str]]:
     """Name and title of each scene in a folder."""
     variants = []
     for path in sorted(folder.glob("*.toml")):
-        note(path)
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
         variants.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
     return variants
@@ -218,7 +216,6 @@ def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | 
     headings: only what is below these; "" is what is before the first of them.  pictures: endings of the
     names of those that are shown; default: all.
     """
-    note(page)
     if not page.is_file():
         return ""
     parts = _parts(COMMENT.sub("", page.read_text(encoding="utf-8")))
@@ -252,7 +249,6 @@ def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
         path = folder / name
         if not path.is_file() or (requested is not None and not name.endswith(tuple(requested))):
             return ""
-        note(path)
         data = base64.b64encode(path.read_bytes()).decode()
         return f"<figure class='plot'><img src='data:image/png;base64,{data}' alt='{alt}'></figure>"
 

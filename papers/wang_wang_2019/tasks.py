@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flexclear.papers.wang_wang_2019 import figures, timing
-from flexclear.pipeline.core.artifacts.paths import DATA
+from flexclear.pipeline.core.artifacts.paths import DATA, TREE
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.registry import module_of
@@ -20,6 +20,10 @@ from flexclear.stages import derived_series, kernels, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, check
 
+#: files that the page shows parts of, below the folder of the sources: pages, their pictures, variants of scenes
+DOCUMENTS = ("accuracy", "chaos", "reference-conditions", "stability")
+PAGES = [pattern for name in DOCUMENTS for pattern in (f"docs/{name}.md", f"docs/{name}/*.png")]
+PAGES += ["scenes/sps4/variants/*.toml"]
 #: the scene whose film and pictures the page shows: the paper's full model
 HEADLINE = "sps4/far_csj_cb"
 
@@ -132,6 +136,7 @@ def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list
             "rendered": HEADLINE,
             "digests": sorted(record.digest for record in records.values()),
         },
+        files={path.relative_to(TREE).as_posix(): path for pattern in PAGES for path in sorted(TREE.glob(pattern))},
         folder="report",
     )
 
@@ -150,5 +155,6 @@ def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
         params={"figure": name},
         inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
         modules=(module_of(figures.__name__, name),),
+        files={file: TREE / file for file in entry["files"]},
         folder="tables" if name.startswith("table") else "figures",
     )

@@ -70,18 +70,18 @@ class Engine:
         families: what `stages.sweeps.sweep_points.work` is given of each.  Raises ResourceError when workers keep
         dying, StoppedError when all is to stop.
         """
-        waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
+        waiting, running, seconds_each, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
         evaluations, together = 0.0, False  # of the points that were finished last; whether code is made for several
         while waiting or running:
             stopping.check()
             # nothing is compiled twice: until the first point is there nothing else begins
             width = self.width()
-            while waiting and len(running) < (QUEUED * width if pace else 1):
+            while waiting and len(running) < (QUEUED * width if seconds_each else 1):
                 left = sum(map(len, waiting))
                 enough = together or (left >= POINTS_TOGETHER * width and left * evaluations >= WORTH_CODE)
                 together = evaluations >= WORTH_TOGETHER and enough
-                mine = _take(waiting, _portion(left, pace, width, together) if pace else 1)
-                running[self._given(mine, families, alone=not pace, together=together)] = mine
+                mine = _take(waiting, _portion(left, seconds_each, width, together) if seconds_each else 1)
+                running[self._given(mine, families, alone=not seconds_each, together=together)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
@@ -100,8 +100,8 @@ class Engine:
                     break
                 done(list(zip(mine, points, strict=True)), seconds)
                 evaluations = sum(point.evaluations for point in points) / len(points)
-                first, lost = not pace, 0  # what the first one took held compiling and fetching
-                pace = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
+                first, lost = not seconds_each, 0  # what the first one took held compiling and fetching
+                seconds_each = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
     def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, together: bool) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
@@ -123,19 +123,21 @@ def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
     return [list(reversed(mine)) for mine in reversed(families.values())]
 
 
-def _portion(left: int, pace: float, width: int, together: bool) -> int:
-    """Points that are handed out at a time. left: those that wait; pace: seconds of each.
+def _portion(left: int, seconds_each: float, width: int, together: bool) -> int:
+    """Points that are handed out at a time. left: those that wait; seconds_each: seconds of each.
 
     together: whether they are run side by side; of few, most would wait for the last one.
     """
     asking = PER_WORKER * width
     seconds_of_work = BATCH_SECONDS_TOGETHER if together else BATCH_SECONDS
-    seconds = min(max(seconds_of_work, asking), max(LEAST_SECONDS, asking, left * pace / (QUEUED * width)))
+    seconds = min(max(seconds_of_work, asking), max(LEAST_SECONDS, asking, left * seconds_each / (QUEUED * width)))
     if together and left < POINTS_TOGETHER * width:  # the last ones
         return max(POINTS_TOGETHER // 2, ceil(left / width))
     if together:
-        return POINTS_TOGETHER * min(MOST_POINTS // POINTS_TOGETHER, max(1, round(seconds / pace / POINTS_TOGETHER)))
-    return min(MOST_POINTS, max(1, int(seconds / pace)))
+        return POINTS_TOGETHER * min(
+            MOST_POINTS // POINTS_TOGETHER, max(1, round(seconds / seconds_each / POINTS_TOGETHER))
+        )
+    return min(MOST_POINTS, max(1, int(seconds / seconds_each)))
 
 
 def _take(waiting: list[list[Job]], count: int) -> list[Job]:

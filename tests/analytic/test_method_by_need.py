@@ -51,7 +51,7 @@ def test_forces_of_rounding_are_requested_by_no_default() -> None:
     turned = {"body.ground.frames.axle": frame, "body.disc.pose": None, "drive.axle.law.coefficients": speed}
     run = simulated(load_scene(rotor, {**turned, "time.end": "1 s", "solver.by_need": True}))
     assert run.attrs["accuracy_verdict"] == "met"
-    assert "force" not in run.attrs["accuracy_wanted"]
+    assert "force" not in run.attrs["accuracy_requested"]
 
 
 def test_ringing_modes_get_the_method_that_follows_them() -> None:

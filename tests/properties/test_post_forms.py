@@ -16,7 +16,7 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, surfaces, vibrations
+from flexclear.pipeline.post.render import film_speed, forms, gl, joint_view, player, surfaces, vibrations
 from flexclear.pipeline.post.render.forms import Seat, equivalent, wheels
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
@@ -159,13 +159,13 @@ def test_a_shape_file_that_is_not_there_is_told_with_its_place():
 
 def test_a_film_is_slow_around_the_strongest_impact_and_even_without():
     run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
-    strong = pace.strongest(run)
+    strong = film_speed.strongest(run)
     assert strong.size
-    shown = pace.pace(run, seconds=4.0, slower=10.0)
+    shown = film_speed.frame_times(run, seconds=4.0, slower=10.0)
     slowest = shown.times[np.argmax(shown.slower)]
-    assert np.abs(strong - slowest).min() < pace.AROUND * np.ptp(run.time.values) * 2.0
+    assert np.abs(strong - slowest).min() < film_speed.AROUND * np.ptp(run.time.values) * 2.0
     assert (np.diff(shown.times) > 0.0).all()
-    even = pace.pace(run, seconds=4.0, slower=1.0)
+    even = film_speed.frame_times(run, seconds=4.0, slower=1.0)
     np.testing.assert_allclose(np.diff(even.times), np.diff(even.times)[0], rtol=1e-3)  # by the grid of the pace
     assert even.times[[0, -1]] == pytest.approx(run.time.values[[0, -1]], abs=1e-12)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import sys
 from pathlib import Path
@@ -12,8 +13,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system import file_dependencies
-from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.core.system.external_files import companions, read_mesh
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.execute import execute, find, states
@@ -22,9 +22,8 @@ from flexclear.pipeline.core.workflow.task import Task, facts
 from flexclear.pipeline.post import pages
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.stages import simulation
+from flexclear.stages import meshing, simulation
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace
 from tests.analytic.solid_models import block, build
 
 SCENE = """
@@ -121,11 +120,15 @@ def test_a_companion_file_counts(
     assert find(task, {}, store, sources) == first
 
 
+#: files of two bodies, and whether they are equal
+FILES = {"file body.ele": True, "file body.node": False}
+
+
 def test_equal_recipes_with_other_companions_are_kept_apart(tmp_path: Path, sources: Sources) -> None:
     """As of one mesh that was morphed: the same cells, other nodes."""
     store = Store(tmp_path / "results")
     tasks = [mesh_task(tetrahedra(tmp_path / name, length)) for name, length in (("a", 1.0), ("b", 2.0))]
-    assert facts(tasks[0], {}, sources) == facts(tasks[1], {}, sources)
+    assert {name: facts(tasks[0], {}, sources)[name] == facts(tasks[1], {}, sources)[name] for name in FILES} == FILES
     records = [made(task, store, sources) for task in tasks]
     assert records[0].digest != records[1].digest
     assert [find(task, {}, store, sources) for task in tasks] == records
@@ -136,18 +139,6 @@ def test_a_folder_that_was_moved_stays_fresh(tmp_path: Path, sources: Sources) -
     here = tetrahedra(tmp_path / "here")
     record = made(mesh_task(here), store, sources)
     assert find(mesh_task(Path(shutil.move(here, tmp_path / "there"))), {}, store, sources) == record
-
-
-def test_names_of_opened_files_are_checked(tmp_path: Path, sources: Sources) -> None:
-    """Damaged or lost, they are found again by making the artifact again; nothing stale is taken for fresh."""
-    store = Store(tmp_path / "results")
-    task = mesh_task(tetrahedra(tmp_path / "body"))
-    record = made(task, store, sources)
-    (names,) = (store.root / "cache" / "mesh").glob("*.names")
-    names.write_text(names.read_text().replace("body.node", "body.nodf"))
-    assert find(task, {}, store, sources) is None
-    assert made(task, store, sources) == record
-    assert find(task, {}, store, sources) == record
 
 
 ABAQUS = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n"
@@ -161,17 +152,21 @@ REGIONS = """<dolfin><mesh_function type="int" dim="3" size="1"><entity index="0
 
 
 def several_files(folder: Path) -> dict[str, tuple[Path, set[str]]]:
-    """For each format of several files the one to read, and the names of all."""
-    (folder / "a.inp").write_text(ABAQUS + "*Include, input=b.inp\n")
-    (folder / "b.inp").write_text("*INCLUDE,INPUT=c.inp\n")
+    """For each format of several files the one to read, and the names of all.
+
+    With what meshio takes as well: endings in capitals, blanks before a keyword, longer names of DOLFIN's parts.
+    """
+    (folder / "a.INP").write_text(ABAQUS + "** INCLUDE, INPUT=no.inp\n *Include, input=b.inp\n")
+    (folder / "b.inp").write_text("*INCLUDE,INPUT=c.inp\r\n")
     (folder / "c.inp").write_text(ABAQUS + ELEMENT)
     tetrahedra(folder / "t")
     (folder / "d.xml").write_text(DOLFIN)
-    (folder / "d_part.xml").write_text(REGIONS)
+    for name in ("d_part.xml", "d_other.xml.old"):
+        (folder / name).write_text(REGIONS)
     return {
-        "abaqus": (folder / "a.inp", {"a.inp", "b.inp", "c.inp"}),
+        "abaqus": (folder / "a.INP", {"a.INP", "b.inp", "c.inp"}),
         "tetgen": (folder / "t" / "body.ele", {"t/body.ele", "t/body.node"}),
-        "dolfin": (folder / "d.xml", {"d.xml", "d_part.xml"}),
+        "dolfin": (folder / "d.xml", {"d.xml", "d_part.xml", "d_other.xml.old"}),
     }
 
 
@@ -188,32 +183,53 @@ def test_companions_of_a_format_are_what_its_reader_opens(tmp_path: Path, name: 
     sys.addaudithook(hook)
     meshio.read(path)
     listening.clear()
-    with file_dependencies.watched(tmp_path) as read:
-        read_mesh(path, "recipe", "cannot be read", "remedy")
-    assert opened == set(read) == names
+    read_mesh(path, "recipe", "cannot be read", "remedy")
+    assert opened == {file.relative_to(tmp_path).as_posix() for file in (path, *companions(path))} == names
 
 
-@pytest.mark.parametrize("numbers", ["points.bin", "points.h5:/data0"])
-def test_numbers_next_to_xdmf_are_companions(tmp_path: Path, numbers: str) -> None:
-    """Its reader needs h5py, which is not required here."""
-    written = 'Format="HDF"' if ":" in numbers else 'Format="Binary"'
-    item = f'<DataItem Dimensions="4 3" {written} Precision="8">\n  {numbers}\n</DataItem>'
-    (tmp_path / "x.xdmf").write_text(f'<Xdmf><DataItem Format="XML">0 1</DataItem>{item}</Xdmf>')
-    assert companions(tmp_path / "x.xdmf") == [tmp_path / numbers.partition(":")[0]]
+def test_numbers_next_to_xdmf_are_companions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its reader needs h5py, which is not required here. It searches for plain bytes where the process is."""
+    monkeypatch.chdir(tmp_path.parent)
+    items = "<DataItem Format='HDF'>\n  x&#46;h5:/data0\n</DataItem><DataItem Format='Binary'>b.bin</DataItem>"
+    (tmp_path / "x.xdmf").write_text(f'<Xdmf><DataItem Format="XML">0 1</DataItem>{items}</Xdmf>')
+    assert companions(tmp_path / "x.xdmf") == [tmp_path / "x.h5", Path("b.bin")]
+    (tmp_path / "x.xdmf").write_text("<Xdmf>")
+    assert companions(tmp_path / "x.xdmf") == []
 
 
-def test_a_file_that_changes_while_it_is_read_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "a.dat"
-    path.write_text("old")
-    (tmp_path / "new").write_text("new")
+def test_includes_in_a_circle_end(tmp_path: Path) -> None:
+    (tmp_path / "a.inp").write_text("*INCLUDE, INPUT=b.inp\n")
+    (tmp_path / "b.inp").write_text("*INCLUDE, INPUT=a.inp\n*INCLUDE, INPUT=/dev/zero\n")
+    assert companions(tmp_path / "a.inp") == [tmp_path / "b.inp", Path("/dev/zero")]
 
-    def read() -> None:
-        with file_dependencies.watched(tmp_path):
-            file_dependencies.note(path)
-            (tmp_path / "new").rename(path)
 
-    with pytest.raises(ResourceError, match="changed while it was read"):
-        read()
+def test_parts_of_hdf5_in_other_files_are_refused(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    mesh = meshio.Mesh(np.eye(4, 3), [("tetra", np.array([[0, 1, 2, 3]]))])
+    mesh.write(tmp_path / "a.med")
+    assert len(read_mesh(tmp_path / "a.med", "recipe", "cannot be read", "remedy").points) == 4
+    with h5py.File(tmp_path / "a.med", "a") as file:
+        file["elsewhere"] = h5py.ExternalLink("other.h5", "/data")
+    with pytest.raises(InputError, match=r"parts in other files, such as 'elsewhere'"):
+        read_mesh(tmp_path / "a.med", "recipe", "cannot be read", "remedy")
+
+
+def test_a_file_that_changes_while_it_is_read_stores_nothing(
+    tmp_path: Path, sources: Sources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, task = Store(tmp_path / "results"), mesh_task(tetrahedra(tmp_path / "body"))
+    run = meshing.run
+
+    def edited_meanwhile(*arguments: object) -> object:
+        made = run(*arguments)
+        with (tmp_path / "body" / "body.node").open("a") as file:
+            file.write("# later\n")
+        return made
+
+    monkeypatch.setattr(meshing, "run", edited_meanwhile)
+    with pytest.raises(ResourceError, match=r"file body\.node changed while it was read"):
+        made(task, store, sources)
+    assert not list((store.root / "cache" / "mesh").glob("*.json"))
 
 
 def test_names_of_files_are_no_facts(tmp_path: Path, root: Path, sources: Sources) -> None:
@@ -239,27 +255,10 @@ def test_libraries_that_write_and_draw_count(sources: Sources) -> None:
     assert drawn["library pillow"][0].isdigit()
 
 
-def test_what_a_page_opens_counts_each_time(root: Path) -> None:
-    """Whatever the process did before: a second page of one process depends on the same files as its first."""
-    found = []
-    for _ in range(2):
-        with file_dependencies.watched(root) as read:
-            for name in ("page.css", "page.js", "viewer.js"):
-                assert pages.asset(name)
-        found.append(read)
-    assert found[0] == found[1]
-    assert {Path(name).name for name in found[0]} == {"page.css", "page.js", "viewer.js"}
-
-
-def test_a_page_made_twice_in_one_process_depends_on_the_same_files(root: Path, tmp_path: Path, sources: Sources):
-    """Equal inputs have equal keys, and an edit of the viewer makes the second page stale as well."""
-    seen = []
-    for k in range(2):
-        store = Store(tmp_path / f"results{k}")
-        page = Graph(load_scene(root / "scenes" / "checks" / "pendulum.toml")).picture("motion", "html")
-        outcome = Workplace(store, sources).bring([page], jobs=1)
-        assert not outcome.failures
-        record = outcome.records[page]
-        seen.append((record.key, sorted(path.read_text() for path in store.root.glob("cache/render/*.names"))))
-    assert seen[0] == seen[1]
-    assert "viewer.js" in str(seen[1])
+def test_an_edit_of_the_viewer_makes_pages_again(sources: Sources) -> None:
+    """Style and scripts count with the code that puts them into pages."""
+    page = facts(Task("s", "scene", "flexclear.stages.rendering:run", {}, ""), {}, sources)
+    assets = {name for name in page if name.startswith("asset ")}
+    assert assets == {"asset page.css", "asset page.js", "asset viewer.js"}
+    folder = Path(pages.__file__).parent
+    assert page["asset viewer.js"] == hashlib.sha256((folder / "viewer.js").read_bytes()).hexdigest()

@@ -10,7 +10,7 @@ import pytest
 
 from flexclear.pipeline.post.pages import Part, downloads, listed, media, page, viewer
 from flexclear.pipeline.post.plotting.table import Table, as_html
-from flexclear.pipeline.post.render import pace, player
+from flexclear.pipeline.post.render import film_speed, player
 from flexclear.pipeline.post.render.mechanism import mechanism
 from flexclear.pipeline.post.render.pictures import png
 from tests.browser import Browser, browser, needs_browser
@@ -31,7 +31,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page with one of everything: film, picture, views of a motion and of modes, tables, files to take away."""
     run, bundle = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7), synthetic.bundle()
     shades = [np.full((64, 96, 3), 40 * k, dtype=np.uint8) for k in range(6)]
-    suffix, film = pace.write(iter(shades * 4), 24)
+    suffix, film = film_speed.write(iter(shades * 4), 24)
     rows = (("b", "2.5 mm", "10.0 ± 0.1 N"), ("a", "900 µm", "9.0 ± 0.1 N"), ("c", "1.2 m", "–"))
     table = Table("Numbers", ("name of a quantity that is long", "length", "force"), rows)
     parts = [

@@ -400,7 +400,7 @@ def test_from_python_a_scene_without_a_requested_accuracy_is_planned_for_a_fract
     planned, found = fc.plan(write("pendulum", tmp_path)[0], budget=30.0, accuracy="1 %")
     assert "gravity" in planned.load
     # the planned run has another tolerance: its error is within the accuracy that it was chosen for
-    assert (found["error"] <= found["wanted"]).all()
+    assert (found["error"] <= found["requested"]).all()
     assert (found["scatter"] == 0.0).all()
     shown = found._repr_html_()
     assert "must stay" in shown

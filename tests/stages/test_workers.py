@@ -23,10 +23,10 @@ from flexclear.pipeline.core.workflow.task import Task
 from tests.processes import python
 
 
-def one(width: int = 1) -> tuple[int, int]:
-    """Number of the process that does something for a crew of that width, and of the one that keeps its queue."""
-    with workers.team(width) as crew:
-        return crew.pool.submit(os.getpid).result(), crew.server._process.pid
+def one(width: int = 1) -> int:
+    """Number of the process that does something for a team of that width."""
+    with workers.team(width) as team, workers.lost():
+        return int(team.pool.submit(os.getpid).result())
 
 
 def alive(process: int) -> bool:
@@ -52,13 +52,12 @@ def test_a_command_starts_its_workers_once() -> None:
     with workers.reused():
         first = one()
         assert one(cores.cores()) == first
-        assert all(map(alive, first))
-    assert not any(map(alive, first))
+        assert alive(first)
+    assert not alive(first)
 
 
 def test_outside_of_a_command_they_end_with_the_call() -> None:
-    first = one()
-    assert not any(map(alive, first))
+    assert not alive(one())
 
 
 @pytest.mark.parametrize("end", [fail, stop])
@@ -66,7 +65,7 @@ def test_workers_of_what_failed_or_was_stopped_are_not_kept(end: Callable[[], No
     with workers.reused():
         first = one()
         end()
-        assert not alive(first[1])
+        wait_until(lambda: not running(first))
         assert one() != first
 
 
@@ -127,16 +126,15 @@ def test_a_broken_pipe_is_that_of_the_output_or_of_a_helper(root: Path, whose: s
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize("who", ["the idle worker", "the process of the progress"])
-def test_a_helper_that_is_killed_between_two_calls_is_one_sentence(who: str):
+def test_a_worker_that_is_killed_between_two_calls_is_one_sentence() -> None:
     """As by the system where memory is full; before, a traceback or an end without a word."""
     with workers.reused():
-        worker, server = one()
-        os.kill(worker if who == "the idle worker" else server, signal.SIGKILL)
-        wait_until(lambda: not running(worker if who == "the idle worker" else server))
+        worker = one()
+        os.kill(worker, signal.SIGKILL)
+        wait_until(lambda: not running(worker))
         with pytest.raises(ResourceError, match="a helper process was killed"), workers.lost():
             often()
-    assert one() != (worker, server)
+    assert one() != worker
 
 
 def often() -> None:
@@ -158,3 +156,20 @@ def wait_until(condition: Callable[[], bool]) -> None:
     end = time.monotonic() + 60.0
     while not condition() and time.monotonic() < end:
         time.sleep(0.02)
+
+
+def chatty(count: int) -> int:
+    """More reports than a pipe holds."""
+    for k in range(count):
+        workers.report("task", k / count, "x" * 100)
+    return count
+
+
+def test_many_reports_arrive_in_their_order() -> None:
+    """Whoever writes waits while the queue is full, and goes on when the parent reads."""
+    with workers.team(1) as team:
+        future, news = team.pool.submit(chatty, 3000), []
+        while not future.done() or not team.channel.reports.empty():
+            news += team.channel.received()
+        assert future.result() == len(news) == 3000
+    assert [fraction for _, fraction, _ in news] == [k / 3000 for k in range(3000)]

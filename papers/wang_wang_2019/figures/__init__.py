@@ -55,11 +55,13 @@ class Figure:
 
     title: what it shows.  needs: references of the artifacts that it cannot be made without,
     ``<scene>:<artifact>[/<body>]``.  make: from these artifacts; a drawing is made in the style of all.
+    files: that `make` opens, below the folder of the sources.
     """
 
     title: str
     needs: tuple[str, ...]
     make: Callable[[Data], Drawing | Table]
+    files: tuple[str, ...] = ()
 
 
 def figure(name: str) -> Figure:
@@ -78,9 +80,10 @@ def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: 
 
 
 def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Stage: ``index.json``, for each name what it needs.
+    """Stage: ``index.json``, for each name what it needs and the files that it opens.
 
     An artifact of its own, because asking the modules themselves takes the import of matplotlib.
     """
-    entries = {name: {"needs": list(figure(name).needs)} for name in params["names"]}
+    listed = {name: figure(name) for name in params["names"]}
+    entries = {name: {"needs": one.needs, "files": one.files} for name, one in listed.items()}
     return {"index.json": json.dumps(entries, indent=1).encode()}

@@ -12,7 +12,7 @@ import contextlib
 import errno
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -249,17 +249,6 @@ class Store:
         if not folder:
             return None
         return read_record(self._facts(folder, label))
-
-    def names(self, stage: str, plain: str) -> tuple[str, ...]:
-        """Files that the tasks of one plain key have opened so far; none where none was made yet."""
-        table = read_checked(self.path(stage, plain, "names"))
-        return tuple(map(str, table.get("names", ()))) if table is not None else ()
-
-    def keep_names(self, stage: str, plain: str, names: Sequence[str]) -> None:
-        """Remember them."""
-        path = self.path(stage, plain, "names")
-        with disk_limits(path.parent):
-            publish(path, checked({"names": list(names)}))
 
     @contextlib.contextmanager
     def lock(self, stage: str, key: str, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:

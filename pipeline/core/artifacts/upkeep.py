@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked, sha256
+from flexclear.pipeline.core.artifacts.disk import digest_of, sha256
 from flexclear.pipeline.core.artifacts.store import FAMILY, PARTIAL, Record, Store, read_record
 from flexclear.pipeline.core.system import platforms
 
 #: what is next to artifacts and is none of their files
-NO_ARTIFACT = (".json", ".lock", ".names", ".part", ".tmp")
+NO_ARTIFACT = (".json", ".lock", ".part", ".tmp")
 DAY = 86400.0
 #: a file of an artifact may be so long without its record [s]
 YOUNG = 3600.0
@@ -53,7 +53,6 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
             damaged.append(fault)
         there = [file.stat() for file in files if file.is_file()]
         artifacts.append(Artifact(record, sum(s.st_size for s in there), time.time() - path.stat().st_mtime))
-    unreadable += [path for path in (store.root / "cache").rglob("*.names") if read_checked(path) is None]
     damaged += [f"{store.below(path)} is no record, or damaged" for path in unreadable]
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 

@@ -1,5 +1,7 @@
 """Rotations in NumPy, for data and set-up; the compiled kernels have their own, on tuples.
 
+Used instead of SciPy's `Rotation`, whose import takes 0.6 s of the processor in every command.
+
 Quaternions are ``w x y z``; matrices ``R_AB`` take components in B to components in A. The
 functions broadcast over leading dimensions unless they say otherwise.
 """
@@ -13,7 +15,7 @@ import numpy as np
 
 from flexclear.pipeline.core.numerics.axes import check_axes, check_axis
 
-#: share by which values differ at most that count as equally large
+#: fraction by which values differ at most that count as equally large
 _EQUAL = 1e-6
 #: square of the sine of the angle to -z below which a direction counts as that
 _OPPOSITE = 1e-18

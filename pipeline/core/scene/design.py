@@ -63,7 +63,7 @@ class Design:
 def design(sweep: Sweep) -> Design:
     """The points of a sweep; the same ones whenever it is asked."""
     if sweep.sample is not None:
-        fractions = _shares(sweep.sample, len(sweep.vary)).T
+        fractions = _unit_points(sweep.sample, len(sweep.vary)).T
         axes = [_sampled(sweep, name, fraction) for name, fraction in zip(sweep.vary, fractions, strict=True)]
         return Design(tuple(axes), grid=False)
     return Design(tuple(_listed(sweep, name) for name in sweep.vary), grid=sweep.combine == "grid")
@@ -80,7 +80,7 @@ def _listed(sweep: Sweep, name: str) -> Axis:
 
 
 def _sampled(sweep: Sweep, name: str, fractions: np.ndarray) -> Axis:
-    """A parameter whose distribution has these shares below each value, shape (points,)."""
+    """A parameter whose distribution has these fractions below each value, shape (points,)."""
     parameter = sweep.vary[name]
     if parameter.mean is not None:
         from scipy.special import ndtri
@@ -98,7 +98,7 @@ def _numbered(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:
     return Axis(name, sweep.places(name), values, unit)
 
 
-def _shares(sample: Sample, parameters: int) -> np.ndarray:
+def _unit_points(sample: Sample, parameters: int) -> np.ndarray:
     """Points of the unit cube, shape (points, parameters), none on its faces."""
     from scipy.stats import qmc
 

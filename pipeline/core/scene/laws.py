@@ -14,7 +14,6 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, mo
 
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
 from flexclear.pipeline.core.scene.units import any_quantity, quantity, unit, unknown
-from flexclear.pipeline.core.system.file_dependencies import note
 
 _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits the quantity"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
@@ -355,7 +354,6 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
             raise ValueError(f"the table {path.name} cannot be read: it is no ordinary file")
         if path.stat().st_size > LARGEST_TABLE:
             raise ValueError(f"the table {path.name} is larger than {LARGEST_TABLE >> 20} MB: leave rows out")
-        note(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if row and not row[0].lstrip().startswith("#")]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -24,7 +24,6 @@ from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, ResourceError, shown
-from flexclear.pipeline.core.system.file_dependencies import note
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
@@ -62,15 +61,21 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     """
     path = Path(path)
     name = scene_name(path)
-    table = compose(path)
-    for where, value in (override or {}).items():
-        _put(table, where, value, f"override of {path}")
-    _absolute_files(table, path)
+    table = overridden(path, override or {})
     check_parts(table, path, FAMILIES)
     scene = _read(table, path)
     scene._name = name
     scene._path = path
     return scene
+
+
+def overridden(path: Path, override: Mapping[str, object]) -> dict[str, Any]:
+    """The plain table of a scene file, as `compose` makes it, with these values changed; files by their full paths."""
+    table = compose(path)
+    for where, value in override.items():
+        _put(table, where, value, f"override of {path}")
+    _absolute_files(table, path)
+    return table
 
 
 def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
@@ -265,7 +270,6 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a table; InputError when it cannot be read or parsed."""
     try:
-        note(path)
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise InputError(str(path), "cannot be read: it is no ordinary file", "name a TOML file")

@@ -1,4 +1,8 @@
-"""Quantities as users write them, converted to SI once, at the edge."""
+"""Quantities as users write them, converted to SI once, at the edge.
+
+Used instead of Pint, for which radians are numbers, so that torques, energies and torsional stiffnesses are one; its
+import and first quantity take 0.3 s of the processor in every command.
+"""
 
 from __future__ import annotations
 

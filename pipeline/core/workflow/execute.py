@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.pipeline.core.system import file_dependencies, machine, threads
+from flexclear.pipeline.core.system import machine, threads
+from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.fingerprint import Sources
@@ -23,43 +24,40 @@ class State:
     why: tuple[str, ...]
 
 
-def key_of(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> str:
-    """Key of the artifact that a task makes from these inputs and from the files that it opens, as they are now.
-
-    Which files these are is known since it was made for the first time; before, there is nothing under any key.
-    """
-    return _with_files(task, _facts(task, inputs, sources), store)[1]
+def key_of(task: Task, inputs: Mapping[str, Record], sources: Sources) -> str:
+    """Key of the artifact that a task makes from these inputs and from its files as they are now."""
+    return key(_facts(task, inputs, sources))
 
 
 def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
     """The fresh artifact of a task whose inputs are fresh, now also shown in its folder; or None."""
-    record = store.find(task.stage, key_of(task, inputs, store, sources))
+    record = store.find(task.stage, key_of(task, inputs, sources))
     if record is not None:
         store.show(record, task.folder, task.names, task.label)
     return record
 
 
 def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress) -> Record:
-    """The artifact of a task whose inputs are fresh, run if need be (once, over all processes)."""
+    """The artifact of a task whose inputs are fresh, run if need be (once, over all processes).
+
+    Raises ResourceError when one of its files changes meanwhile.
+    """
     known = _facts(task, inputs, sources)
-    plain = key(known)
-    with store.lock(task.stage, plain, lambda: progress(None, "waiting for another process that makes the same")):
-        # whoever requested the task has reported its faults
-        record = Store(store.root).find(task.stage, _with_files(task, known, store)[1])
+    name = key(known)
+    with store.lock(task.stage, name, lambda: progress(None, "waiting for another process that makes the same")):
+        record = Store(store.root).find(task.stage, name)  # whoever requested the task has reported its faults
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
             load = store.arrays if hasattr(run, ARRAYS) else store.load
-            data = {name: load(above) for name, above in inputs.items()}
-            begun = store.path(task.stage, _with_files(task, known, store)[1], "part")
-            with (
-                threads.one(),
-                journal.storage(begun.parent, begun.stem) as storage,
-                file_dependencies.watched(task.base) as read,
-            ):
+            data = {role: load(above) for role, above in inputs.items()}
+            begun = store.path(task.stage, name, "part")
+            with threads.one(), journal.storage(begun.parent, begun.stem) as storage:
                 product = run({**task.params, **task.context}, data, progress)
-            known |= _noted(task, plain, read, store)
-            record = store.put(task.stage, key(known), product, known, machine.instruction_set())
+            changed = [fact for fact, value in _facts(task, inputs, sources).items() if known[fact] != value]
+            if changed:
+                raise ResourceError(f"{changed[0]} changed while it was read; run again")
+            record = store.put(task.stage, name, product, known, machine.instruction_set())
             storage.remove()
     store.show(record, task.folder, task.names, task.label)
     return record
@@ -77,13 +75,13 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
-    now, name = _with_files(task, _facts(task, fresh, sources), store)
+    now = _facts(task, fresh, sources)
     last = store.last(task.folder, task.label)
     if last is None and stale:
         return State(task, None, ("never run",))
     above = [f"its input {name} would be made again" for name in sorted(stale)]
     if not stale:
-        record = store.find(task.stage, name)
+        record = store.find(task.stage, key(now))
         if record is not None:
             return State(task, record, ())
     why = reasons(now, None if last is None else last.facts, stale) + above
@@ -98,22 +96,3 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
 
 def _facts(task: Task, inputs: Mapping[str, Record], sources: Sources) -> dict[str, str]:
     return facts(task, {name: record.digest for name, record in inputs.items()}, sources)
-
-
-def _with_files(task: Task, known: Mapping[str, str], store: Store) -> tuple[Mapping[str, str], str]:
-    """Facts with those of the files that the task has ever read when all else was as it is, and their key."""
-    plain = key(known)
-    names = store.names(task.stage, plain)
-    if not names:
-        return known, plain
-    whole = {**known, **file_dependencies.facts(file_dependencies.digests(names, task.base))}
-    return whole, key(whole)
-
-
-def _noted(task: Task, plain: str, read: Mapping[str, str], store: Store) -> dict[str, str]:
-    """Facts of the files that were read now, and of others that once were; their names are stored for the next
-    time."""
-    names = set(store.names(task.stage, plain))
-    if not names >= read.keys():
-        store.keep_names(task.stage, plain, sorted(names | read.keys()))
-    return file_dependencies.facts(file_dependencies.digests(names - read.keys(), task.base) | dict(read))

@@ -14,14 +14,14 @@ import hashlib
 import os
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
+from flexclear.pipeline.core.artifacts.disk import checked, digest_of, publish, read_checked
 from flexclear.pipeline.core.artifacts.paths import TREE as TREE
 
 OWN = ("flexclear", "benchmarks")
@@ -30,6 +30,8 @@ _SCENE = "flexclear.pipeline.core.scene"
 WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
 #: the functions that `import flexclear` offers are above the stages: no result reaches them
 ABOVE = {"flexclear.public"}
+#: what the code of a package reads next to its modules
+ASSETS = (".css", ".js")
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
 _PARSING = Lock()
@@ -91,12 +93,21 @@ class Sources:
         return self.closures[requested]
 
     def code(self, roots: Iterable[str]) -> dict[str, str]:
-        """Facts of the code that `roots` reach, by kind and name: digests of modules, versions of libraries."""
+        """Facts of the code that `roots` reach, by kind and name: digests of modules and of the assets of packages,
+        versions of libraries."""
         closure = self.closure(roots)
         libraries = frozenset().union(*(module.libraries for module in closure.values())) - MACHINE
         return {f"module {name}": module.digest for name, module in closure.items() if name not in WORDING} | {
-            f"library {name}": version for name, version in library_versions(libraries).items()
+            **{f"asset {path.name}": digest_of(path) for path in self._assets(closure)},
+            **{f"library {name}": version for name, version in library_versions(libraries).items()},
         }
+
+    def _assets(self, closure: Mapping[str, Module]) -> Iterator[Path]:
+        """Files next to the modules of packages that their code reads."""
+        for name, module in closure.items():
+            source = source_file(self.root, name) if module.package else None
+            if source is not None:
+                yield from (source.parent / entry for entry in os.listdir(source.parent) if entry.endswith(ASSETS))
 
     def module(self, name: str) -> Module | None:
         """The module called `name`, or None when there is no such file (an attribute, say)."""

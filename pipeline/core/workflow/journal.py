@@ -57,7 +57,7 @@ class Journal:
         except OSError:
             return None
         content = whole[DIGEST + 1 :]
-        if not hmac.compare_digest(sealed(content).encode(), whole[:DIGEST]):
+        if not hmac.compare_digest(signature(content).encode(), whole[:DIGEST]):
             return None
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             return {key: file[key] for key in file.files}
@@ -82,7 +82,7 @@ class Journal:
                     buffer = io.BytesIO()
                     np.savez(buffer, allow_pickle=False, **arrays())
                     content = buffer.getvalue()
-                    publish(self._path(name), sealed(content).encode() + b"\n" + content)
+                    publish(self._path(name), signature(content).encode() + b"\n" + content)
                 self._waiting = {}
             self._written, self._took = self.clock(), self.clock() - begun
 
@@ -118,7 +118,7 @@ def storage(folder: Path, key: str) -> Iterator[Journal]:
         _current.reset(before)
 
 
-def sealed(content: bytes) -> str:
+def signature(content: bytes) -> str:
     """Hexadecimal digest that only this user can make, of as many characters as that of `disk.sha256`.
 
     What a work space holds decides where compiled code reads and writes, so work that somebody else put into a folder

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.store import MAIN, Record, Store
 from flexclear.pipeline.core.system.errors import INTERRUPTED, FlexclearError, ResourceError, StoppedError
@@ -149,25 +149,26 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
     running: dict[Future[Record | Failure], _Running] = {}
     with workers.team(width) as team, stopping.heeded():
         while (plan.waiting or running) and not stopping.requested():
-            _submit(plan, running, team.pool, width, (store, sources, team.reports), monitor)
+            _submit(plan, running, team.pool, width, store, sources, monitor)
             _collect(plan, running, monitor)
-            _relay(team.reports, monitor)
+            _relay(team.channel, monitor)
         if stopping.requested():
-            _end_in_good_order(plan, running, team.bell, monitor)
+            _end_in_good_order(plan, running, team.channel, monitor)
 
 
 def _end_in_good_order(
-    plan: _Plan, running: dict[Future[Record | Failure], _Running], bell: workers.Bell, monitor: Monitor
+    plan: _Plan, running: dict[Future[Record | Failure], _Running], channel: workers.Channel, monitor: Monitor
 ) -> None:
     """Ask the workers to stop, and wait for what they leave: not for those that cannot leave anything, nor for ever."""
     from concurrent.futures import wait
 
     why, end = stopping.requested(), time.monotonic() + GRACE
-    bell.ring(why)
+    channel.request_stop(why)
     while time.monotonic() < end:
         _, late = wait(running, timeout=TICK)
-        if len(late) <= bell.deaf.value:
+        if len(late) <= channel.deaf.value:
             break
+        _relay(channel, monitor)
     for future, job in running.items():
         if future.done() and future.exception() is None:
             result = future.result()
@@ -193,7 +194,8 @@ def _submit(
     running: dict[Future[Record | Failure], _Running],
     pool: ProcessPoolExecutor,
     width: int,
-    common: tuple[Store, Sources, Any],
+    store: Store,
+    sources: Sources,
     monitor: Monitor,
 ) -> None:
     """Hand out ready tasks while workers are free; an exclusive one only to an idle pool.
@@ -201,14 +203,13 @@ def _submit(
     Tasks whose artifact is being made already wait for it; those whose artifact is there by now,
     made for another scene, are done.
     """
-    store, sources, reports = common
     others_idle = not running and len(plan.ready()) == 1
     for task in sorted(plan.ready(), key=lambda t: t.exclusive):
         alone = any(other.task.exclusive for other in running.values())
         if len(running) >= width or alone or (task.exclusive and running):
             return
         inputs = plan.inputs(task)
-        key = key_of(task, inputs, store, sources)
+        key = key_of(task, inputs, sources)
         if any(other.key == key for other in running.values()):
             continue
         plan.waiting.remove(task)
@@ -220,7 +221,7 @@ def _submit(
             continue
         where = (store.root, sources.root, sources.memo)
         with workers.lost(), workers.without_main():  # an idle one; a script without a guard is not run again
-            future = pool.submit(_work, task, inputs, name, where, reports, others_idle)
+            future = pool.submit(_work, task, inputs, name, where, others_idle)
         running[future] = _Running(task, key, name)
 
 
@@ -245,14 +246,9 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
     plan.give_up_below_failures()
 
 
-def _relay(reports: Any, monitor: Monitor) -> None:
-    """Progress of the workers, out of the process that keeps it."""
-    with workers.lost():
-        news = []
-        while not reports.empty():
-            news.append(reports.get())
-    for one in news:
-        monitor.update(*one)
+def _relay(channel: workers.Channel, monitor: Monitor) -> None:
+    for news in channel.received():
+        monitor.update(*news)
 
 
 def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:
@@ -267,15 +263,18 @@ def _work(
     inputs: Mapping[str, Record],
     name: str,
     where: tuple[Path, Path, Path | None],
-    reports: Any,
     others_idle: bool,
 ) -> Record | Failure:
-    """In a worker: the same as in `_alone`, with progress sent home."""
+    """In a worker: the same as in `_alone`, with progress sent home, as often as it is read there."""
     root, source, memo = where
     cores.set_idle(others_idle)
+    last = 0.0
 
     def progress(fraction: float | None, text: str) -> None:
-        reports.put((name, fraction, text))
+        nonlocal last
+        if fraction is None or time.monotonic() - last > TICK:
+            last = time.monotonic()
+            workers.report(name, fraction, text)
 
     with stopping.busy():
         return attempt(task, inputs, Store(root, say=partial(progress, None)), sources_of(source, memo), progress)

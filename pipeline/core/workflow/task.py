@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
+from flexclear.pipeline.core.artifacts.disk import digest_of
+from flexclear.pipeline.core.workflow.fingerprint import Sources
 
 #: libraries that every artifact passes through on its way to disk
 STORE = "flexclear.pipeline.core.artifacts.store"
@@ -35,7 +36,8 @@ class Task:
     stage: name of the stage and of its folder in the cache.
     part: the body (or figure) it is about; empty when the stage has one artifact per scene.
     run: ``"module:function"``, called as ``run(params, inputs, progress)``; see `execute`.
-    params: all that its result may depend on, as JSON, next to `inputs` and the files that it opens.
+    params: all that its result may depend on, as JSON, next to `inputs` and `files`.
+    files: every file that it opens, by the name that users know it by: its content counts, its path does not.
     context: what the function is given as well, and its result must not show: where files lie, names for messages.
     inputs: tasks whose artifact ``nc`` it is given, by name.
     modules: modules that it reaches by a name in `params`, next to those it imports.
@@ -55,11 +57,7 @@ class Task:
     names: Mapping[str, str] = field(default_factory=dict)
     exclusive: bool = False
     context: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def base(self) -> Path:
-        """Folder to which the paths of opened files are relative."""
-        return Path(self.context.get("folder", TREE))
+    files: Mapping[str, Path] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -82,15 +80,23 @@ def in_order(tasks: list[Task]) -> list[Task]:
 
 
 def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:
-    """Everything that decides the artifact and is known before it is made, in words: kind and name -> value.
+    """Everything that decides the artifact, in words: kind and name -> value.
 
-    The files that it opens come on top, see `execute`.
     digests: digest of each input that is known; leave one out to compare the rest.
     """
     result = {f"parameter {name}": value for name, value in flatten(task.params)}
     result |= {f"input {name}": digest for name, digest in digests.items()}
+    result |= {f"file {name}": _digest(path) for name, path in sorted(task.files.items())}
     result |= sources.code((task.run.partition(":")[0], STORE, *task.modules))
     return {**result, "function": task.run}
+
+
+def _digest(path: Path) -> str:
+    """The sha256 of a file; of what is not there, or no file, a word instead: its reader refuses it."""
+    try:
+        return digest_of(path)
+    except (OSError, ValueError):
+        return "absent"
 
 
 def key(task_facts: Mapping[str, str]) -> str:

@@ -1,4 +1,8 @@
-"""Worker processes of this machine: spawned, ended with their parent, deaf to Ctrl-C, which is left to the parent."""
+"""Worker processes of this machine: spawned, ended with their parent, deaf to Ctrl-C, which is left to the parent.
+
+`concurrent.futures` starts them and hands out the work. Own is what asks them to stop in good order: without it each
+would lose what it has computed since it was last written, up to `journal.WRITING_INTERVAL`.
+"""
 
 from __future__ import annotations
 
@@ -24,51 +28,68 @@ LOST = "a helper process was killed; is the memory full? Finished results are st
 
 
 @dataclass(frozen=True)
-class Bell:
-    """How workers are asked to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
+class Channel:
+    """What the workers of a pool share with their parent: the request to stop and its reason, and their progress.
 
-    rung: Any
+    deaf: how many have a task that cannot leave anything in good order.  reports: arguments of `Monitor.update`; a
+    queue without a process or a thread of its own, whose writers wait while it is full.
+    """
+
+    stop: Any
     why: Any
     deaf: Any
+    reports: Any
 
     @staticmethod
-    def made() -> Bell:
-        """A bell for the workers of one pool."""
+    def made() -> Channel:
+        """A channel for the workers of one pool."""
         context = _context()
-        return Bell(context.Event(), context.Array("c", 1000), context.Value("i", 0))
+        return Channel(context.Event(), context.Array("c", 1000), context.Value("i", 0), context.SimpleQueue())
 
-    def ring(self, why: str) -> None:
+    def request_stop(self, why: str) -> None:
         """Ask all workers."""
         self.why.value = why.encode()[:999]
-        self.rung.set()
+        self.stop.set()
 
     def count_deaf(self) -> None:
         """In a worker: one more."""
         with self.deaf.get_lock():
             self.deaf.value += 1
 
+    def received(self) -> list[Any]:
+        """In the parent: what workers have reported since it was last asked."""
+        news = []
+        while not self.reports.empty():
+            news.append(self.reports.get())
+        return news
 
-def pool(width: int, bell: Bell | None = None) -> ProcessPoolExecutor:
-    """That many workers at most; spawned, because compiled kernels and forks do not mix.
 
-    bell: what asks them to stop in good order.
-    """
+def pool(width: int, channel: Channel | None = None) -> ProcessPoolExecutor:
+    """That many workers at most; spawned, because compiled kernels and forks do not mix."""
     # imported here, because a run that finds everything fresh must start quickly
     from concurrent.futures import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(bell,))
+    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(channel,))
 
 
-def _begin(bell: Bell | None) -> None:
-    _follow()
-    if bell is not None:
-        stopping.obey(bell.rung.wait, lambda: bell.why.value.decode(errors="replace"), bell.count_deaf)
+#: in a worker: that of its pool
+_channel: Channel | None = None
 
 
-def _follow() -> None:
-    """In a process that another one started: end when that does; Ctrl-C is left to it."""
+def _begin(channel: Channel | None) -> None:
+    """In a worker: end when its parent does; Ctrl-C is left to that."""
+    global _channel
+    _channel = channel
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch, daemon=True).start()
+    if channel is not None:
+        stopping.obey(channel.stop.wait, lambda: channel.why.value.decode(errors="replace"), channel.count_deaf)
+
+
+def report(name: str, fraction: float | None, text: str) -> None:
+    """In a worker: how far the task of this name is, for its parent."""
+    if _channel is not None:
+        _channel.reports.put((name, fraction, text))
 
 
 def _watch() -> None:
@@ -100,39 +121,17 @@ def lost() -> Iterator[None]:
 
     try:
         yield
-    except (BrokenProcessPool, EOFError, ConnectionError):
+    except (BrokenProcessPool, ConnectionError):
         raise ResourceError(LOST) from None
 
 
 @dataclass(frozen=True)
 class Team:
-    """Workers, what asks them to stop, and the queue of their progress, which a process of its own keeps."""
+    """Workers, each started when there is something for it to do, and what they share with their parent."""
 
     width: int
     pool: ProcessPoolExecutor
-    bell: Bell
-    server: Any
-    reports: Any
-
-    @staticmethod
-    def begun(width: int) -> Team:
-        """That many workers at most; each is started when there is something for it to do."""
-        from multiprocessing.managers import SyncManager
-
-        server, bell = SyncManager(ctx=_context()), Bell.made()
-        with without_main():
-            server.start(_follow)
-        return Team(width, pool(width, bell), bell, server, server.Queue())
-
-    def end(self) -> None:
-        """Let them go, who have nothing to do any more."""
-        self.pool.shutdown()
-        self.server.shutdown()
-
-    def kill(self) -> None:
-        """End them at once, whatever they do."""
-        kill(self.pool)
-        self.server.shutdown()
+    channel: Channel
 
 
 #: the idle team, stored for the next call
@@ -153,7 +152,7 @@ def reused() -> Iterator[None]:
     finally:
         _keeping -= 1
         while _idle and not _keeping:
-            _idle.pop().end()
+            _idle.pop().pool.shutdown()
 
 
 @contextmanager
@@ -161,20 +160,23 @@ def team(width: int) -> Iterator[Team]:
     """Workers, that many at least; killed where the block fails, or ends because all is to stop."""
     with ExitStack() as stack:
         while _idle and _idle[-1].width < width:
-            _idle.pop().end()
+            _idle.pop().pool.shutdown()
         # a reused one may serve a wider call next; who is never needed is never started
-        with lost():
-            mine = _idle.pop() if _idle else Team.begun(max(width, cores.cores()) if _keeping else width)
-            stack.callback(mine.kill)
-            while not mine.reports.empty():  # of the last call
-                mine.reports.get()
+        mine = _idle.pop() if _idle else _team(max(width, cores.cores()) if _keeping else width)
+        stack.callback(kill, mine.pool)
+        mine.channel.received()  # of the last call
         yield mine
         if not stopping.requested():
             stack.pop_all()
             if _keeping:
                 _idle.append(mine)
             else:
-                mine.end()
+                mine.pool.shutdown()
+
+
+def _team(width: int) -> Team:
+    channel = Channel.made()
+    return Team(width, pool(width, channel), channel)
 
 
 @contextmanager

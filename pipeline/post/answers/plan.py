@@ -50,7 +50,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         ),
         "evidence": (("effect",), _texts(d.evidence for d in plan.decisions), "what the decision rests on"),
         "reason": (("effect",), _texts(d.reason for d in plan.decisions), "the decision in words"),
-        "wanted": (("quantity",), np.array([plan.requested[name] for name in names]), "requested accuracy"),
+        "requested": (("quantity",), np.array([plan.requested[name] for name in names]), "requested accuracy"),
         "integration": (
             ("quantity",),
             np.array([plan.integration.get(name, np.nan) for name in names]),
@@ -122,7 +122,9 @@ def table(planned: xr.Dataset) -> Table:
         ]
         decision = "keep" if int(part["kept"]) else "drop"
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
-    requested = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
+    requested = [
+        written(float(value), 0.0, unit) for value, unit in zip(planned["requested"].values, units, strict=True)
+    ]
     rows.append(("requested", "", *requested, "", ""))
     decided = json.loads(planned.attrs["planned"])
     notes = [words(planned)]
@@ -218,7 +220,7 @@ def verified(planned: xr.Dataset) -> Table:
     rows = []
     for k, name in enumerate(planned["quantity"].values):
         unit, one = str(planned["unit"].values[k]), agreement_of(planned, k)
-        requested = written(float(planned["wanted"][k]), 0.0, unit)
+        requested = written(float(planned["requested"][k]), 0.0, unit)
         rows.append((str(name), requested, written(one.error, one.chance, unit), _verdict(planned, k)))
     notes = [
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "

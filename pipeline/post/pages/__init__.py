@@ -11,17 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.system.file_dependencies import note
-
 
 def asset(name: str) -> str:
-    """Text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``.
-
-    Read anew for each page: what a task reads is among the facts of its key.
-    """
-    path = Path(__file__).parent / name
-    note(path)
-    return path.read_text(encoding="utf-8")
+    """Text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``."""
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
 def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:

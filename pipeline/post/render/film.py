@@ -14,8 +14,8 @@ from vtkmodules.vtkCommonCore import vtkLogger
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render import mechanism, pace, ruler
-from flexclear.pipeline.post.render.pace import rate, write
+from flexclear.pipeline.post.render import film_speed, mechanism, ruler
+from flexclear.pipeline.post.render.film_speed import rate, write
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
@@ -59,7 +59,7 @@ def film(
 
     watched: names of bodies, joints and contacts, of which the first of each is shown next to the mechanism.  curves:
     quantities that are shown instead of them.
-    Around the strongest impacts time is stretched, so that they are seen (`pace`).
+    Around the strongest impacts time is stretched, so that they are seen (`film_speed`).
     """
     pictures = _frames(drawn, post, watched, curves, progress, rate(kind))
     return write(pictures, rate(kind), kind)
@@ -73,14 +73,14 @@ def _frames(
     progress: Progress,
     rate: int,
 ) -> Iterator[np.ndarray]:
-    shown = pace.pace(drawn.run, drawn.looks.duration, drawn.looks.impact_slowdown, rate)
+    shown = film_speed.frame_times(drawn.run, drawn.looks.duration, drawn.looks.impact_slowdown, rate)
     steps = shown.steps(drawn.run)
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
     margin = 0 if drawn.stress is None else ruler.BAR
     look(scene, drawn, margin)
     # words are drawn by matplotlib below: a text in the scene costs as much as the mechanism
-    caption = pace.Caption((VIEW, 26), SOFT)
+    caption = film_speed.Caption((VIEW, 26), SOFT)
     larger = "".join(f", {text}" for text in ruler.exaggeration(drawn))
     scale = ruler.pixels_per_metre(drawn, (VIEW, HEIGHT), margin)
     bar = ruler.round_length(0.2 * VIEW / scale)
@@ -92,7 +92,7 @@ def _frames(
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
             picture = image(scene)
-            caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{larger}, bar: {ruler.words(bar)}")
+            caption.onto(picture, f"{film_speed.speed_text(float(shown.slower[k]))}{larger}, bar: {ruler.words(bar)}")
             picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
             if legend is not None:
                 ruler.with_color_bar(picture, legend)

@@ -11,7 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from flexclear.pipeline.post.overview.figures import centre, orbit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render import pace, surfaces
+from flexclear.pipeline.post.render import film_speed, surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View
 from flexclear.pipeline.post.single_run.series import derive, parameters
@@ -94,7 +94,7 @@ def frames(
         clock = figure.text(0.5, 0.965, "", ha="center", va="center", fontsize=12, fontweight="bold", animated=True)
         canvas.draw()
         still = canvas.copy_from_bbox(figure.bbox)
-        shown = pace.pace(run, seconds, slower, rate)
+        shown = film_speed.frame_times(run, seconds, slower, rate)
         steps = shown.steps(run)
         first = np.searchsorted(time, time[steps] - TRAIL * (time[-1] - time[0]))
         for k, step in enumerate(steps):
@@ -102,7 +102,7 @@ def frames(
             trail.set_data(x[first[k] : step + 1], y[first[k] : step + 1])
             dot.set_data([x[step]], [y[step]])
             mark.set_data([time[step]], [force[step]])
-            clock.set_text(f"t = {time[step]:.2f} ms, {pace.speed_text(float(shown.slower[k]))}")
+            clock.set_text(f"t = {time[step]:.2f} ms, {film_speed.speed_text(float(shown.slower[k]))}")
             for artist in (trail, dot, mark):
                 artist.axes.draw_artist(artist)
             figure.draw_artist(clock)

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.pages import media, viewer, viewer_page
 from flexclear.pipeline.post.plotting import mode_sheet
-from flexclear.pipeline.post.render import gl, gltf, joint_view, pace, paraview, player, vibrations
+from flexclear.pipeline.post.render import film_speed, gl, gltf, joint_view, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
 from flexclear.pipeline.post.single_run.series import derive
 
@@ -110,13 +110,13 @@ def _motion_gltf(shown: Shown, kind: str) -> dict[str, bytes]:
     drawn = shown.mechanism()
     time = drawn.run["time"].values
     steps = np.unique(np.linspace(0, time.size - 1, KEYS).astype(int))
-    slower = (shown.looks.duration or pace.SECONDS) / float(time[-1] - time[0])
+    slower = (shown.looks.duration or film_speed.SECONDS) / float(time[-1] - time[0])
     return {"motion.glb": gltf.motion(drawn, steps, slower)}
 
 
 def _motion_series(shown: Shown, kind: str) -> dict[str, bytes]:
     drawn = shown.mechanism()
-    steps = pace.pace(drawn.run, None, shown.looks.impact_slowdown).steps(drawn.run, SERIES)
+    steps = film_speed.frame_times(drawn.run, None, shown.looks.impact_slowdown).steps(drawn.run, SERIES)
     return paraview.series(drawn, np.unique(steps))
 
 
@@ -140,11 +140,11 @@ def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import pace
+    from flexclear.pipeline.post.render import film_speed
 
     files = {}
     for body, bundle in _bodies(shown).items():
-        suffix, content = pace.write(mode_sheet.frames(body, bundle, *_side(bundle)), 12, kind)
+        suffix, content = film_speed.write(mode_sheet.frames(body, bundle, *_side(bundle)), 12, kind)
         files[f"modes_{body}.{suffix}"] = content
     return files
 
@@ -200,12 +200,12 @@ def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import joint_view, pace
+    from flexclear.pipeline.post.render import film_speed, joint_view
 
-    files, rate = {}, pace.rate(kind)
+    files, rate = {}, film_speed.rate(kind)
     for k, name in _joints(shown).items():
         pictures = joint_view.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
-        suffix, content = pace.write(pictures, rate, kind)
+        suffix, content = film_speed.write(pictures, rate, kind)
         files[f"joint_{name}.{suffix}"] = content
     return files
 
@@ -232,8 +232,8 @@ def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
-    rate = pace.rate(kind)
-    suffix, content = pace.write(vibrations.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
+    rate = film_speed.rate(kind)
+    suffix, content = film_speed.write(vibrations.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
     return {f"vibrations.{suffix}": content}
 
 

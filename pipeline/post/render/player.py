@@ -14,7 +14,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.post.overview.curves import scaled
-from flexclear.pipeline.post.render import joint_view, mechanism, pace, surfaces
+from flexclear.pipeline.post.render import film_speed, joint_view, mechanism, surfaces
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, axes_of, eye
 from flexclear.pipeline.post.shapes import body_shape
@@ -43,7 +43,7 @@ def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
         "meshes": meshes,
         "tracks": [_floats(track) for track in tracks_of],
         "times": _rounded(run, steps),
-        "rate": len(steps) / (drawn.looks.duration or pace.SECONDS),
+        "rate": len(steps) / (drawn.looks.duration or film_speed.SECONDS),
         "exaggeration": max((body.scale for body in drawn.flexible), default=1.0),
         **({"readings": [_largest_stress(drawn, steps)]} if drawn.stress else {}),
         **_camera(drawn.view, drawn.cloud, drawn.looks.zoom),
@@ -79,7 +79,7 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks, frames: int = F
         ],
         "tracks": [_floats(np.column_stack([centre, unturned]))],
         "times": _rounded(run, steps),
-        "rate": len(steps) / (looks.duration or pace.SECONDS),
+        "rate": len(steps) / (looks.duration or film_speed.SECONDS),
         "readings": readings,
         "exaggeration": 1.0,
         **_camera(shown.view, np.concatenate([shown.room.points, shown.path.points])),
@@ -142,7 +142,7 @@ def _steps(run: xr.Dataset, looks: mechanism.Looks, frames: int) -> np.ndarray:
     """The outputs that are shown."""
     if run.sizes["time"] == 1:
         return np.zeros(1, dtype=int)
-    return pace.pace(run, looks.duration, looks.impact_slowdown).steps(run, frames)
+    return film_speed.frame_times(run, looks.duration, looks.impact_slowdown).steps(run, frames)
 
 
 def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.post.render import pace, surfaces
+from flexclear.pipeline.post.render import film_speed, surfaces
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
 from flexclear.pipeline.post.shapes.body_shape import hertz, linear_fields
 
@@ -186,7 +186,7 @@ def _stage(
     """
     from flexclear.pipeline.post.render import film
 
-    stage, caption, skins = film.plotter(size), pace.Caption((size[0], 26), film.SOFT), []
+    stage, caption, skins = film.plotter(size), film_speed.Caption((size[0], 26), film.SOFT), []
     for piece in modes.pieces:
         mesh = film.polydata(piece.surface)
         if piece.plain:

@@ -19,7 +19,7 @@ def _pair(value: Any) -> Any:
     return value if isinstance(value, (list, tuple)) else (value, value)
 
 
-def _shares(value: tuple[float, float]) -> tuple[float, float]:
+def _fractions(value: tuple[float, float]) -> tuple[float, float]:
     if not all(0.0 < kappa <= 1.0 for kappa in value):
         raise ValueError(f"a shear coefficient is a fraction of the area, above 0 and at most 1, not {list(value)}")
     return value
@@ -28,7 +28,7 @@ def _shares(value: tuple[float, float]) -> tuple[float, float]:
 ShearCoefficient = Annotated[
     tuple[Number, Number],
     BeforeValidator(_pair, json_schema_input_type=Number | tuple[Number, Number]),
-    AfterValidator(_shares),
+    AfterValidator(_fractions),
 ]
 
 

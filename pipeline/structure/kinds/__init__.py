@@ -5,6 +5,9 @@ To add one: a module here with ``KIND: Kind``, and its shapes below.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 KIND = "kind of body"
 NAMES = {
     "beam": "beam:KIND",
@@ -18,3 +21,9 @@ SHAPES = {
     "mesh-file": "solid",
     "matrices": "matrices",
 }
+
+
+def name_of(recipe: Mapping[str, Any]) -> str:
+    """Name of the kind of body that a recipe's table describes."""
+    shape = recipe.get("shape")
+    return SHAPES.get(str(shape.get("type")), "beam") if isinstance(shape, Mapping) else "beam"

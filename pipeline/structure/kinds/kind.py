@@ -13,7 +13,7 @@ import xarray as xr
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.fe.recipe import parse
-from flexclear.pipeline.structure.kinds import SHAPES
+from flexclear.pipeline.structure.kinds import name_of
 
 FAMILY = "flexclear.pipeline.structure.kinds"
 #: name of a recipe in messages, for callers that have no better one
@@ -37,12 +37,6 @@ class Kind:
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
     exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] | None = None
-
-
-def name_of(recipe: Mapping[str, Any]) -> str:
-    """Name of the kind of body that a recipe's table describes."""
-    shape = recipe.get("shape")
-    return SHAPES.get(str(shape.get("type")), "beam") if isinstance(shape, Mapping) else "beam"
 
 
 def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLACE) -> xr.Dataset:

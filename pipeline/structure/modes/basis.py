@@ -123,10 +123,10 @@ def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested
     basis = _joined(body, static, modes, count)
     if requested.compliance is not None:
         return compliance.least(body.flexibility(), body.interfaces, basis.vectors)[0] >= requested.compliance
-    return requested.mass is not None and _mass_share(body.model, basis.vectors) >= requested.mass
+    return requested.mass is not None and _mass_fraction(body.model, basis.vectors) >= requested.mass
 
 
-def _mass_share(model: Model, vectors: np.ndarray) -> float:
+def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
     """Least fraction, over three directions, of the mass that moves with the basis when the body is translated."""
     momentum = model.mass @ model.rigid[:, :3]
     inner = vectors.T @ (model.mass @ vectors)
@@ -140,6 +140,6 @@ def _unreachable(body: Body, static: np.ndarray, modes: Normal, requested: ModeR
         fraction, where = compliance.least(body.flexibility(), body.interfaces, vectors)
         problem = f"with every mode of this reference condition the basis has {fraction:.3g} of the compliance {where}"
         return InputError("modes.compliance", problem, 'take one with static shapes, as reference = "craig-bampton"')
-    fraction = _mass_share(body.model, vectors)
+    fraction = _mass_fraction(body.model, vectors)
     problem = f"with every mode of this reference condition {fraction:.3g} of the mass moves with the basis"
     return InputError("modes.mass", problem, "shapes without momentum carry no mass: select by count or up_to")

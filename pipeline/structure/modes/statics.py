@@ -51,14 +51,14 @@ class Flexibility:
         return shapes - self.model.rigid @ np.linalg.solve(self.inertia, self.momentum.T @ shapes)
 
 
-def support(model: Model, tell: Callable[[float], None]) -> Flexibility:
+def support(model: Model, progress: Callable[[float], None]) -> Flexibility:
     """Factorise a body on six supports; InputError when it is a mechanism."""
     size = np.linalg.norm(model.rigid, axis=0)
     _, places = scipy.linalg.qr(model.rigid.T / size[:, None], pivoting=True, mode="r")
     free = np.setdiff1d(np.arange(model.size), places[:6])
     inner = sp.csr_array(model.stiffness[free][:, free])
     try:
-        factor = cholesky(inner, model.position[free], tell)
+        factor = cholesky(inner, model.position[free], progress)
     except SolverError:
         raise _mechanism() from None
     if factor.smallest_pivot(inner.diagonal()) < PIVOT:

@@ -18,7 +18,7 @@ from scipy.linalg import blas, lapack
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.structure.sparse.dissection import Tree, dissect
 
-Tell = Callable[[float], None]
+Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -104,15 +104,15 @@ def _add_lower(matrix: np.ndarray, runs: Runs, theirs: np.ndarray) -> None:
             matrix[row, column] += theirs[rows, columns]
 
 
-def cholesky(matrix: sp.csr_array, positions: np.ndarray, tell: Tell = lambda fraction: None) -> Factor:
+def cholesky(matrix: sp.csr_array, positions: np.ndarray, progress: Progress = lambda fraction: None) -> Factor:
     """Factor of a symmetric positive definite matrix, shape (n, n).
 
     positions: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
-    tell: receives the finished fraction.  Raises SolverError when the matrix is not positive definite.
+    progress: receives the finished fraction.  Raises SolverError when the matrix is not positive definite.
     """
     tree = dissect(matrix, positions)
     blocks = []
-    for front in _fronts(matrix, tree, tell):
+    for front in _fronts(matrix, tree, progress):
         diagonal, info = lapack.dpotrf(front.diagonal, lower=1, clean=1, overwrite_a=1)
         if info != 0:
             raise SolverError(f"modes: a matrix of {len(tree.order)} rows is not positive definite")
@@ -153,7 +153,7 @@ def _eliminate(front: Front) -> int:
     return int(np.count_nonzero(np.diag(factor)[pivots > 0] < 0.0)) + int(np.count_nonzero(pivots < 0)) // 2
 
 
-def _fronts(matrix: sp.csr_array, tree: Tree, tell: Tell) -> Iterator[Front]:
+def _fronts(matrix: sp.csr_array, tree: Tree, progress: Progress) -> Iterator[Front]:
     """Each dense block in turn; the caller eliminates in place."""
     n = len(tree.order)
     lower = sp.csc_array(sp.tril(sp.csr_array(matrix[tree.order][:, tree.order]), format="csc"))
@@ -181,4 +181,4 @@ def _fronts(matrix: sp.csr_array, tree: Tree, tell: Tell) -> Iterator[Front]:
             yield front
         if r:
             left[tree.parent[index]].append((below, front.rest))
-        tell(float(work[index] / work[-1]))
+        progress(float(work[index] / work[-1]))

@@ -205,7 +205,7 @@ def _delivered(search: Search, progress: Progress) -> xr.Dataset:
     if search.predictable:
         meaning += f"; requested by default: {BY_DEFAULT:g} of the range, up to the predictability horizon"
     return best.run.assign_attrs(
-        accuracy_wanted=json.dumps({name: f"{w:.3g}" for name, w in requested.items()}, sort_keys=True),
+        accuracy_requested=json.dumps({name: f"{w:.3g}" for name, w in requested.items()}, sort_keys=True),
         accuracy_estimated=json.dumps({name: f"{e:.3g}" for name, e in best.errors.items()}, sort_keys=True),
         accuracy_verdict=verdict,
         accuracy_rtol=best.rtol,

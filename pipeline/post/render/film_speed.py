@@ -21,7 +21,7 @@ SHOWN, AROUND = 3, 0.008
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class FrameTimes:
     """times: of the run at each frame [s].  slower: how many times slower than in reality the film is there."""
 
     times: np.ndarray
@@ -35,7 +35,9 @@ class Pace:
         return np.clip(np.searchsorted(time, times - 1e-12 * (time[-1] - time[0])), 0, time.size - 1)
 
 
-def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = None, rate: int = 24) -> Pace:
+def frame_times(
+    run: xr.Dataset, seconds: float | None = None, slower: float | None = None, rate: int = 24
+) -> FrameTimes:
     """The times of the frames of a film, so many a second, in which impacts take `slower` times longer."""
     time, seconds = run["time"].values, seconds or SECONDS
     start, span = float(time[0]), float(time[-1] - time[0])
@@ -51,7 +53,7 @@ def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = N
     total = max(round(seconds * rate * min(1.4, passed[-1])), 2)
     fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
     length = total / rate
-    return Pace(start + span * fraction, length / passed[-1] * np.interp(fraction, way, weight) / span)
+    return FrameTimes(start + span * fraction, length / passed[-1] * np.interp(fraction, way, weight) / span)
 
 
 def strongest(run: xr.Dataset) -> np.ndarray:
@@ -72,7 +74,7 @@ def strongest(run: xr.Dataset) -> np.ndarray:
 
 
 def speed_text(slower: float) -> str:
-    """The pace in words."""
+    """The speed in words."""
     if 0.95 < slower < 1.05:
         return "as fast as it is"
     return f"{slower:.2g} times slower" if slower > 1.0 else f"{1.0 / slower:.2g} times faster"
