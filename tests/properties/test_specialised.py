@@ -149,7 +149,7 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pyte
     """A stroke with impacts, as exactly as its own tolerance tells, with equal events; so for what is too long."""
     alone = engine(integrator)
     with monkeypatch.context() as patch:
-        patch.setattr(straight_code, "suited", lambda model: False)
+        patch.setattr(straight_code, "INTERPRETED", True)
         general = engine(integrator)
     assert (alone.has_straight_code, general.has_straight_code) == (True, False)
     straight, kernels = (integrate(one, consistent_start(one), silent) for one in (alone, general))

@@ -24,6 +24,7 @@ from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
+KEPT |= {m.NAMED[watched].place for watched in ("bends", "bearing")}
 #: integers of n that are left
 REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()

@@ -3,7 +3,8 @@
 Sizes, offsets and tables of h are numbers, so loops are counted and indices known while the tape is written; w and f
 hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it is, and
 what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
-repeated.
+repeated. A kernel that is called until it has converged (`choice.repeat`) is run on symbols for all that it leaves to
+itself.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.pipeline.dynamics.choice import repeat
 from flexclear.pipeline.dynamics.specialise.plain import Plain
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Carried, Loop, Symbol, Tape, Undecided
 
 
 class Number(float):
@@ -63,7 +65,8 @@ class Trace:
         self.tape = Tape(self.decide, longest)
         self.journal: list[Any] = []
         self.runs = [Run([], [])]
-        self.plain = Plain(self._function, self._largest, self._smallest, self.call)
+        repeats = (repeat, lambda *arguments: self.call(self._repeated, arguments))
+        self.plain = Plain(self._function, self._largest, self._smallest, self.call, [repeats])
 
     def decide(self, condition: Symbol) -> bool:
         """How a branch goes in the run that is under way; Undecided when it goes both ways."""
@@ -126,6 +129,30 @@ class Trace:
         if isinstance(a, tuple):
             return tuple(self._joined_results(branch, x, y) for x, y in zip(a, b, strict=True))
         return None if a is None else self.tape.join(branch, a, b)
+
+    def _repeated(self, turn: Callable, *arguments: Any) -> None:
+        """A loop, as long as a turn decides it by symbols; of numbers the turns themselves."""
+        start, carried = len(self.journal), dict[tuple[Memory, int], Carried]()
+        while True:
+            loop = Loop(([],), list(carried.values()))
+            with self.tape.inside(loop.blocks[0]):
+                for (memory, index), one in carried.items():
+                    memory[index] = one.inside
+                loop.condition = turn(*arguments)
+            if not carried and not isinstance(loop.condition, Symbol):
+                self.tape.block += loop.blocks[0]
+                start = len(self.journal)
+                if not loop.condition:
+                    return
+                continue
+            left = {(memory, index): value for memory, index, _, value in self.journal[start:]}
+            self._go_back(start)
+            if left.keys() == carried.keys():
+                break
+            carried = {(memory, index): self.tape.carry(memory[index]) for memory, index in left}
+        self.tape.block.append(loop)
+        for (memory, index), one in carried.items():
+            memory[index], one.left = one.after, left[memory, index]
 
     def _function(self, name: str) -> Callable:
         def apply(*arguments: Any) -> Any:
