@@ -77,7 +77,8 @@ class Symbol:
         return self.tape.write(FLOAT, "fabs", self)
 
     def __lt__(self, other: Any) -> Any:
-        return self.tape.write(BIT, "<", self, other)
+        never = self.operation == "fabs" and not isinstance(other, Symbol) and other == 0.0
+        return False if never else self.tape.write(BIT, "<", self, other)
 
     def __le__(self, other: Any) -> Any:
         return self.tape.write(BIT, "<=", self, other)
