@@ -4,6 +4,7 @@ Mechanisms without loops stand side by side in one scene, so that one set of ker
 """
 
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,9 @@ from scipy.optimize import brentq
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.effects.joint_friction.equations import eliminate
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BALL
+from flexclear.pipeline.dynamics.effects.joint_friction.equations import eliminate, find_loads
 from flexclear.pipeline.dynamics.specialise import dual
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene, simulate
@@ -283,6 +286,18 @@ def test_friction_that_takes_load_off_is_what_it_grows_to_not_another_solution()
     s, c = np.sin(TILT), np.cos(TILT)
     smooth = CART * G + c * BOB * (G * c - s * BOB * G * s * c / (CART + BOB * s * s))
     assert found.joint_bearing_load.values[0, 0] == pytest.approx(smooth / 4.0, rel=1e-9)  # rounding
+
+
+def test_strides_begin_afresh_where_newtons_method_ends_nowhere() -> None:
+    """N = |N - 1| + 1/2: at 3/2, the load without friction, the slopes are singular; the solution is 3/4."""
+    part = [SimpleNamespace(moment=(0.0, 0.0, 0.0), force=(x, 0.0, 0.0)) for x in (-1.0, 1.0)]
+    d = SimpleNamespace(n_bearings=1, reactions=part, bearing=[SimpleNamespace(load=0.0)], evaluation=m.OK)
+    d.bearings, d.bearing_numbers = [SimpleNamespace(joint=0, kind=BALL)], [SimpleNamespace(preload=0.5)]
+    d.bearing_slopes, d.bearing_residuals, d.search = np.zeros(1), np.zeros(1), [SimpleNamespace()]
+    with np.errstate(all="ignore"):
+        dual.plain(find_loads)(d)
+    assert d.evaluation == m.OK
+    assert d.bearing[0].load == pytest.approx(0.75, rel=1e-12)  # Newton's method ends at 1e-13
 
 
 def test_friction_that_jams_on_the_way_is_named_there() -> None:

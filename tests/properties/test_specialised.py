@@ -30,7 +30,7 @@ from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
 from flexclear.pipeline.dynamics.specialise import straight as tracing
 from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
-from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
 from flexclear.pipeline.dynamics.specialise.trace import Trace
 from flexclear.pipeline.dynamics.specialise.wiring import wiring
 from tests.analytic.mechanism_runs import TREE
@@ -252,6 +252,14 @@ def test_equal_wirings_give_equal_code(lanes: int) -> None:
         return str(builder.module)
 
     assert told() == told()
+
+
+def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:
+    tape = Trace(100).tape
+    x = tape.write(FLOAT, "load", "w", 0)
+    assert (abs(x) < 0.0) is False
+    assert (0.0 > abs(x)) is False
+    assert all(isinstance(one, Symbol) for one in (abs(x) < 0.5, x < 0.0, abs(x) > 0.0))
 
 
 INT = ir.IntType(64)
