@@ -9,7 +9,7 @@ import xarray as xr
 from flexclear.pipeline.core.scene.load import edited, load_scene, number_at
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
@@ -181,4 +181,9 @@ def test_friction_of_ideal_joints_that_feeds_back() -> None:
     """
     scene = load("rubbing_slider_crank", **{"time.end": 0.06})
     of = ["slider.position.x.final", "crank.angular_velocity.z.final"]
-    agree(scene, of, dict.fromkeys(("joint.P.friction.dynamic", "joint.P.friction.length", "body.slider.mass"), 1e-3), 1e-5)
+    agree(
+        scene,
+        of,
+        dict.fromkeys(("joint.P.friction.dynamic", "joint.P.friction.length", "body.slider.mass"), 1e-3),
+        1e-5,
+    )
