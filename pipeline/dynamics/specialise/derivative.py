@@ -3,7 +3,7 @@ r"""The exact derivative of a tape along a direction: every operation is followe
 For an operation :math:`z = \varphi(x, y)` the tangent is :math:`\dot z = \varphi_x\dot x + \varphi_y\dot y`. Branches
 differentiate the way that is taken; the root of zero, which has no derivative, gives zero. Loops repeat with their
 changes: the last turn of Newton's method, from what has converged already, leaves
-:math:`-F_x^{-1} F_p\\dot p`, which is the implicit function's. A change of the state is in
+:math:`-F_x^{-1} F_p\dot p`, which is the implicit function's. A change of the state is in
 w as the state is; changes of the numbers f, of the laws of time and of impact rates are in `df` and `dw`, arranged as f
 and w are. So are, in `dw`, the changes of what is stored next to the rates.
 

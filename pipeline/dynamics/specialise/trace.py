@@ -131,7 +131,7 @@ class Trace:
         return None if a is None else self.tape.join(branch, a, b)
 
     def _repeated(self, turn: Callable, *arguments: Any) -> None:
-        """A loop, as long as a turn decides it by symbols; of numbers the turns themselves."""
+        """Turns of a kernel, as a loop; where numbers alone decide, one after the other."""
         start, carried = len(self.journal), dict[tuple[Memory, int], Carried]()
         while True:
             loop = Loop(([],), list(carried.values()))
