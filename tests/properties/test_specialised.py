@@ -1,6 +1,7 @@
 """Straight code for one wiring computes what the kernels do, with any numbers, and is made again for no number."""
 
 from contextlib import suppress
+from ctypes import CFUNCTYPE, c_void_p
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +16,9 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, sources
+from flexclear.pipeline.dynamics.choice import repeat
+from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, machine_code, sources
+from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.model import initial, selection
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
@@ -27,11 +30,12 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
+from flexclear.pipeline.dynamics.specialise import dual
 from flexclear.pipeline.dynamics.specialise import straight as tracing
-from flexclear.pipeline.dynamics.specialise.code import Emitter
+from flexclear.pipeline.dynamics.specialise.code import Emitter, Program
 from flexclear.pipeline.dynamics.specialise.straight import program
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
-from flexclear.pipeline.dynamics.specialise.trace import Trace
+from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 from flexclear.pipeline.dynamics.specialise.wiring import wiring
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
@@ -264,12 +268,58 @@ def test_equal_wirings_give_equal_code(lanes: int) -> None:
     assert told() == told()
 
 
+def test_friction_of_ideal_joints_is_in_what_steps_evaluate_and_not_in_linear_analyses() -> None:
+    parts = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {})).parts
+    assert "joint_friction" in sources.straight(parts, ())
+    assert "joint_friction" not in sources.rates(parts)
+
+
 def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:
     tape = Trace(100).tape
     x = tape.write(FLOAT, "load", "w", 0)
     assert (abs(x) < 0.0) is False
     assert (abs(x) < 0.0) is False
     assert all(isinstance(one, Symbol) for one in (abs(x) < 0.5, x < 0.0, abs(x) > 0.0))
+
+
+@kernel
+def halve_error(w):
+    """A turn of Newton's method for the root w[0] of w[1]; w[2] counts."""
+    before = w[0]
+    w[0] = 0.5 * (before + w[1] / before)
+    w[2] += 1.0
+    return abs(w[0] - before) > 1e-9 * before
+
+
+@kernel
+def find_root(w):
+    w[2] = 0.0
+    repeat(halve_error, w)
+
+
+@pytest.mark.parametrize("lanes", [1, 4])
+def test_lanes_of_a_loop_turn_as_often_as_each_alone(lanes: int) -> None:
+    """The first ends after one turn, the last after thirty."""
+    states = np.array([[2.0, 4.0, np.nan], [1.0, 2.0, np.nan], [1.0, 1e6, np.nan], [1.0, 1e15, np.nan]])
+    known = states.copy()
+    for row in known:
+        dual.plain(find_root)(row)
+    trace = Trace(100)
+    w = Memory(trace, "w", FLOAT)
+    trace.plain(find_root)(w)
+    made = Program(trace.tape.block, [("w", index, value) for index, value in w.values.items()])
+    function = ir.Function(ir.Module("m"), ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()]), "f")
+    builder = ir.IRBuilder(function.append_basic_block())
+    where = lambda array, index, lane: builder.gep(function.args[0], [INT(3 * lane + index)])  # noqa: E731
+    Emitter(builder, made, where, lanes, exact=True).emit()
+    builder.ret_void()
+    code = machine_code.load(machine_code.stored("f", *machine_code.assembled(str(builder.module))))
+    for k in range(0, len(states), lanes):
+        CFUNCTYPE(None, c_void_p)(code.address)(states[k:].ctypes.data)
+    assert states[:, 0] == pytest.approx(np.sqrt(states[:, 1]), rel=1e-15)
+    assert np.array_equal(states, known)
+    assert states[0, 2] == 1.0
+    assert states[3, 2] > 25.0
 
 
 INT = ir.IntType(64)
