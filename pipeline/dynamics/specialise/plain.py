@@ -7,7 +7,7 @@ source is compiled, traced and differentiated.
 from __future__ import annotations
 
 import builtins
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from types import CellType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
@@ -23,20 +23,15 @@ class Plain:
     """plain(value): what a kernel refers to, with kernels that Python runs instead of compiled ones.
 
     function(name): what does what NumPy's function does.  largest, smallest: of two values.  call(function, arguments):
-    result of a kernel; by default that of calling it.  instead: what replaces which kernel, in pairs.
+    result of a kernel; by default that of calling it.
     """
 
     def __init__(
-        self,
-        function: Callable[[str], Callable],
-        largest: Callable,
-        smallest: Callable,
-        call: Callable | None = None,
-        instead: Iterable[tuple[Any, Callable]] = (),
+        self, function: Callable[[str], Callable], largest: Callable, smallest: Callable, call: Callable | None = None
     ) -> None:
         self._largest, self._smallest, self._call = largest, smallest, call
         self._functions = SimpleNamespace(pi=np.pi, inf=np.inf, **{name: function(name) for name in FUNCTIONS})
-        self._made: dict[int, Any] = {id(kernel): other for kernel, other in instead}
+        self._made: dict[int, Any] = {}
         self._alive: list[Any] = []
 
     def __call__(self, value: Any) -> Any:

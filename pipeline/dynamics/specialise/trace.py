@@ -18,6 +18,9 @@ from flexclear.pipeline.dynamics.choice import repeat
 from flexclear.pipeline.dynamics.specialise.plain import Plain
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Carried, Loop, Symbol, Tape, Undecided
 
+#: by which the kernel is known that is a loop on the tape
+REPEAT = getattr(repeat, "py_func", repeat).__code__
+
 
 class Number(float):
     """A number of the wiring by which kernels divide as they do when they are compiled."""
@@ -65,8 +68,7 @@ class Trace:
         self.tape = Tape(self.decide, longest)
         self.journal: list[Any] = []
         self.runs = [Run([], [])]
-        repeats = (repeat, lambda *arguments: self.call(self._repeated, arguments))
-        self.plain = Plain(self._function, self._largest, self._smallest, self.call, [repeats])
+        self.plain = Plain(self._function, self._largest, self._smallest, self.call)
 
     def decide(self, condition: Symbol) -> bool:
         """How a branch goes in the run that is under way; Undecided when it goes both ways."""
@@ -78,6 +80,7 @@ class Trace:
 
     def call(self, function: Callable, arguments: tuple[Any, ...]) -> Any:
         """Result of a kernel."""
+        function = self._repeated if function.__code__ is REPEAT else function
         caller = self.runs[-1]
         if caller.position == len(caller.done):
             start = len(self.journal)
