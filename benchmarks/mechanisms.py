@@ -42,11 +42,11 @@ class Mechanism:
 
     def general_engine(self) -> Engine:
         """Its engine that evaluates with the kernels for all wirings, as what is too long for straight code does."""
-        proper, straight_code.suited = straight_code.suited, lambda model: False
+        proper, straight_code.INTERPRETED = straight_code.INTERPRETED, True
         try:
             return self.engine()
         finally:
-            straight_code.suited = proper
+            straight_code.INTERPRETED = proper
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
         """The same bundles under an edited scene."""

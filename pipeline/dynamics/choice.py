@@ -1,4 +1,4 @@
-"""Choice between the kinds present, as compiled branches; one kind needs no branch."""
+"""Choice between the kinds present, as compiled branches; one kind needs no branch. And what is repeated."""
 
 from __future__ import annotations
 
@@ -10,6 +10,13 @@ from flexclear.pipeline.dynamics.kernels import kernel
 @kernel
 def nothing(d):
     """Do what the parts do of which a mechanism has none."""
+
+
+@kernel
+def repeat(turn, d):
+    """Call the kernel `turn` as long as it returns true; on a tape that is a loop (`specialise.trace`)."""
+    while turn(d):
+        pass
 
 
 def choose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:

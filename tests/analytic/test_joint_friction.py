@@ -4,6 +4,7 @@ Mechanisms without loops stand side by side in one scene, so that one set of ker
 """
 
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ from scipy.optimize import brentq
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BALL
+from flexclear.pipeline.dynamics.effects.joint_friction.equations import eliminate, find_loads
+from flexclear.pipeline.dynamics.specialise import dual
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene, simulate
 from tests.reference.rubbing_slider_crank import released
@@ -260,6 +265,57 @@ def test_friction_that_feeds_itself_grows_to_the_limit_beyond_which_it_jams() ->
     assert load == pytest.approx(smooth / (1.0 - 0.5 / JAMMING), rel=1e-9)  # rounding, times some digits of the limit
     with pytest.raises(SolverError, match=r"joint rail presses the joint the more.*Painleve"):
         simulate(workshop(1.01 * JAMMING))
+
+
+def cart(tilt: float, speed: float, coefficient: float, spin: float = 0.0) -> Table:
+    """The cart with a rod on it alone, that turns."""
+    table = workshop()
+    s, c, lever = np.sin(tilt), np.cos(tilt), spin * table["body"]["bob"]["com"][2]
+    cart = table["body"]["cart"] | {"velocity": [speed, 0.0, 0.0]}
+    bob = table["body"]["bob"] | {"pose": {"rotation_vector": [0.0, tilt, 0.0]}, "angular_velocity": [0.0, spin, 0.0]}
+    bob["velocity"] = [speed + c * lever, 0.0, -s * lever]  # of its mass
+    bodies = {"ground": {"type": "ground", "frames": {"level": guide(0.0)}}, "cart": cart, "bob": bob}
+    rail = joint("prismatic", "ground.level", "cart.rail") | {"friction": SMOOTH | {"dynamic": coefficient}}
+    joints = {"rail": rail, "hinge": table["joint"]["hinge"]}
+    return scene(bodies, joints, end=0.3, rtol=1e-10, load=GRAVITY)
+
+
+def test_friction_that_takes_load_off_is_what_it_grows_to_not_another_solution() -> None:
+    """N = |N_0 - 3 N| has a second solution, which Newton's method finds from N_0: friction is turned on in strides."""
+    found = simulate(cart(TILT, 1.0, 3.0 * JAMMING) | {"time": {"end": 1e-3}, "output": {"interval": 1e-3}})
+    s, c = np.sin(TILT), np.cos(TILT)
+    smooth = CART * G + c * BOB * (G * c - s * BOB * G * s * c / (CART + BOB * s * s))
+    assert found.joint_bearing_load.values[0, 0] == pytest.approx(smooth / 4.0, rel=1e-9)  # rounding
+
+
+def test_strides_begin_afresh_where_newtons_method_ends_nowhere() -> None:
+    """N = |N - 1| + 1/2: at 3/2, the load without friction, the slopes are singular; the solution is 3/4."""
+    part = [SimpleNamespace(moment=(0.0, 0.0, 0.0), force=(x, 0.0, 0.0)) for x in (-1.0, 1.0)]
+    d = SimpleNamespace(n_bearings=1, reactions=part, bearing=[SimpleNamespace(load=0.0)], evaluation=m.OK)
+    d.bearings, d.bearing_numbers = [SimpleNamespace(joint=0, kind=BALL)], [SimpleNamespace(preload=0.5)]
+    d.bearing_slopes, d.bearing_residuals, d.search = np.zeros(1), np.zeros(1), [SimpleNamespace()]
+    with np.errstate(all="ignore"):
+        dual.plain(find_loads)(d)
+    assert d.evaluation == m.OK
+    assert d.bearing[0].load == pytest.approx(0.75, rel=1e-12)  # Newton's method ends at 1e-13
+
+
+def test_friction_that_jams_on_the_way_is_named_there() -> None:
+    """The rod falls; the limit, 0.76 at first, is least at 17 degrees: 0.66."""
+    with pytest.raises(SolverError, match=r"at t = 0\.[0-9]+ s: the friction of joint rail presses the joint the more"):
+        simulate(cart(np.radians(10.0), -5.0, 0.7, 5.0))
+
+
+def test_the_loads_equations_are_solved_with_the_sign_of_their_determinant() -> None:
+    """Of equations whose largest entries are off the diagonal, as under strong friction; and of singular ones."""
+    solve, random = dual.plain(eliminate), np.random.default_rng(3)
+    for size in (1, 2, 3, 5, 5, 5):
+        A, b = random.normal(size=(size, size)), random.normal(size=size)
+        entries, found = A.ravel().copy(), b.copy()
+        assert solve(entries, found, size) == np.sign(np.linalg.det(A))
+        assert found == pytest.approx(np.linalg.solve(A, b), rel=1e-11)  # conditions up to a thousand
+    with np.errstate(all="ignore"):
+        assert solve(np.array([1.0, 2.0, 2.0, 4.0]), np.ones(2), 2) == 0.0
 
 
 @pytest.mark.parametrize(

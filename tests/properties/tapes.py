@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics.specialise.code import Program
-from flexclear.pipeline.dynamics.specialise.tape import Branch, Symbol
+from flexclear.pipeline.dynamics.specialise.tape import Branch, Loop, Symbol
 from flexclear.pipeline.dynamics.specialise.wiring import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
@@ -91,6 +91,13 @@ def run(
                 which = 0 if values[item.condition] else 1
                 go(item.blocks[which])
                 values.update({joined: known(ways[which]) for joined, *ways in item.joins})
+            elif isinstance(item, Loop):
+                values.update({one.inside: known(one.first) for one in item.carried})
+                go(item.blocks[0])
+                while known(item.condition):
+                    values.update([(one.inside, known(one.left)) for one in item.carried])
+                    go(item.blocks[0])
+                values.update([(one.after, known(one.left)) for one in item.carried])
             elif item.operation == "load":
                 array, place = item.arguments
                 place = values[place] if isinstance(place, Symbol) else where(place)

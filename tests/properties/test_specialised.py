@@ -1,6 +1,7 @@
 """Straight code for one wiring computes what the kernels do, with any numbers, and is made again for no number."""
 
 from contextlib import suppress
+from ctypes import CFUNCTYPE, c_void_p
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +16,9 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, sources
+from flexclear.pipeline.dynamics.choice import repeat
+from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, machine_code, sources
+from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.model import initial, selection
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
@@ -27,11 +30,12 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
+from flexclear.pipeline.dynamics.specialise import dual
 from flexclear.pipeline.dynamics.specialise import straight as tracing
-from flexclear.pipeline.dynamics.specialise.code import Emitter
+from flexclear.pipeline.dynamics.specialise.code import Emitter, Program
 from flexclear.pipeline.dynamics.specialise.straight import program
-from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
-from flexclear.pipeline.dynamics.specialise.trace import Trace
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
+from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 from flexclear.pipeline.dynamics.specialise.wiring import wiring
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
@@ -93,6 +97,19 @@ def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> flo
     return worst
 
 
+def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
+    """Places in w of all that steps read of an evaluation besides its rates."""
+    sizes = {m.TOUCH: len(model.contacts), m.LOAD_BENDS: model.arrays.size(m.N_LOAD_BENDS)}
+    sizes |= {m.NAMED[name]: model.arrays.size(m.SIZES["n_bearings"]) for name in ("bends", "bearing")}
+    stretches = {table.place: table.size * rows for table, rows in sizes.items()}
+    rows, kept = model.arrays.size(m.N_CLOSURE_ROWS), int(h[m.N_KEPT_ROWS])
+    stretches |= {m.RESIDUAL: rows, m.RESIDUAL_RATE: rows, m.PIVOT: 1}
+    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[:kept]
+    diagonal = h[m.SCHUR] + envelope["origin"] + np.arange(kept)
+    scales = h[m.ROW_SCALE] + rows + np.arange(kept)
+    return [*(slice(h[place], h[place] + size) for place, size in stretches.items()), diagonal, scales]
+
+
 @pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,15 +142,11 @@ def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPa
         tapes.run(whole, h, by_whole, y, dy)
         assert [arrays["n"][m.ABRIDGED] for arrays in (by_kernels, by_tape, by_whole)] == [0, 1, 0]
         assert all(arrays["n"][m.EVALUATION] == m.OK for arrays in (by_kernels, by_tape, by_whole))
-        rates, touch = (
-            slice(dy, dy + model.ny),
-            slice(h[m.TOUCH.place], h[m.TOUCH.place] + m.TOUCH.size * len(model.contacts)),
-        )
         one, other = by_kernels["w"], by_tape["w"]
-        assert apart(model, one[rates], other[rates]) < ROUNDING
-        assert other[touch] == pytest.approx(
-            one[touch], rel=ROUNDING, abs=ROUNDING * np.abs(one[touch]).max(initial=1.0)
-        )
+        assert apart(model, one[dy : dy + model.ny], other[dy : dy + model.ny]) < ROUNDING
+        for read in read_by_steps(model, h):
+            room = ROUNDING * np.abs(one[read]).max(initial=1.0)
+            assert other[read] == pytest.approx(one[read], rel=ROUNDING, abs=room)
         assert largest_difference(h, one, by_whole["w"]) < ROUNDING
         Trace(0).plain(described)(h.tolist(), f, by_kernels["w"], by_kernels["n"])
         tapes.run(record, h, by_whole, y, dy)
@@ -149,7 +162,7 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pyte
     """A stroke with impacts, as exactly as its own tolerance tells, with equal events; so for what is too long."""
     alone = engine(integrator)
     with monkeypatch.context() as patch:
-        patch.setattr(straight_code, "suited", lambda model: False)
+        patch.setattr(straight_code, "INTERPRETED", True)
         general = engine(integrator)
     assert (alone.has_straight_code, general.has_straight_code) == (True, False)
     straight, kernels = (integrate(one, consistent_start(one), silent) for one in (alone, general))
@@ -172,6 +185,16 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pyte
         a, b = (getattr(one, name) for one in seen)
         fields = a.dtype.names or [...]
         assert all(np.abs(a[k] - b[k]).max() <= 1e-6 * np.abs(a[k]).max() for k in fields), name
+
+
+def test_friction_of_ideal_joints_is_iterated_by_the_kernels_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, rates = load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), []
+    for general in (False, True):
+        monkeypatch.setattr(straight_code, "INTERPRETED", general)
+        one = engine_of(scene, {}, silent)
+        assert one.has_straight_code == (not general)
+        rates.append(closure_rows.evaluate(one, consistent_start(one), one.start))
+    assert apart(one.model, *rates) < ROUNDING
 
 
 def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -243,6 +266,60 @@ def test_equal_wirings_give_equal_code(lanes: int) -> None:
         return str(builder.module)
 
     assert told() == told()
+
+
+def test_friction_of_ideal_joints_is_in_what_steps_evaluate_and_not_in_linear_analyses() -> None:
+    parts = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {})).parts
+    assert "joint_friction" in sources.straight(parts, ())
+    assert "joint_friction" not in sources.rates(parts)
+
+
+def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:
+    tape = Trace(100).tape
+    x = tape.write(FLOAT, "load", "w", 0)
+    assert (abs(x) < 0.0) is False
+    assert (abs(x) < 0.0) is False
+    assert all(isinstance(one, Symbol) for one in (abs(x) < 0.5, x < 0.0, abs(x) > 0.0))
+
+
+@kernel
+def halve_error(w):
+    """A turn of Newton's method for the root w[0] of w[1]; w[2] counts."""
+    before = w[0]
+    w[0] = 0.5 * (before + w[1] / before)
+    w[2] += 1.0
+    return abs(w[0] - before) > 1e-9 * before
+
+
+@kernel
+def find_root(w):
+    w[2] = 0.0
+    repeat(halve_error, w)
+
+
+@pytest.mark.parametrize("lanes", [1, 4])
+def test_lanes_of_a_loop_turn_as_often_as_each_alone(lanes: int) -> None:
+    """The first ends after one turn, the last after thirty."""
+    states = np.array([[2.0, 4.0, np.nan], [1.0, 2.0, np.nan], [1.0, 1e6, np.nan], [1.0, 1e15, np.nan]])
+    known = states.copy()
+    for row in known:
+        dual.plain(find_root)(row)
+    trace = Trace(100)
+    w = Memory(trace, "w", FLOAT)
+    trace.plain(find_root)(w)
+    made = Program(trace.tape.block, [("w", index, value) for index, value in w.values.items()])
+    function = ir.Function(ir.Module("m"), ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()]), "f")
+    builder = ir.IRBuilder(function.append_basic_block())
+    where = lambda array, index, lane: builder.gep(function.args[0], [INT(3 * lane + index)])  # noqa: E731
+    Emitter(builder, made, where, lanes, exact=True).emit()
+    builder.ret_void()
+    code = machine_code.load(machine_code.stored("f", *machine_code.assembled(str(builder.module))))
+    for k in range(0, len(states), lanes):
+        CFUNCTYPE(None, c_void_p)(code.address)(states[k:].ctypes.data)
+    assert states[:, 0] == pytest.approx(np.sqrt(states[:, 1]), rel=1e-15)
+    assert np.array_equal(states, known)
+    assert states[0, 2] == 1.0
+    assert states[3, 2] > 25.0
 
 
 INT = ir.IntType(64)

@@ -20,6 +20,8 @@ from flexclear.pipeline.dynamics.run import run as runs
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.stages.sweeps import sweep_engine, sweep_points
 
+#: coefficients of a pin, from none to one that jams it on the way
+FRICTION = (0.0, 3.0, 10.0, 13.0)
 BALL = ("ball.velocity.largest", "contact.peak_force", "contact.impact_times.last", "ball.position.final")
 
 
@@ -84,6 +86,20 @@ def test_points_of_a_closed_mechanism_with_friction_are_the_same_to_the_last_bit
     known = alone(paper, points, keep=keep)
     assert all(p.values["A1.impact_times.count"] > 5 for p in known)
     assert_same(abreast(paper, points, keep=keep), known)
+
+
+def test_points_whose_friction_takes_different_numbers_of_turns_are_the_same_to_the_last_bit(
+    root: Path, evaluations_abreast: list[int]
+) -> None:
+    """Next to one without friction, and one that friction jams on the way."""
+    crank = load_scene(root / "scenes/checks/rubbing_slider_crank.toml", override={"time.end": 0.06})
+    points: list[dict[str, Any]] = [{"joint.A.friction.dynamic": mu, "joint.A.friction.static": mu} for mu in FRICTION]
+    points += [{"body.slider.mass": 3.0}, {"joint.B.friction.preload": 20.0}]
+    keep = ("crank.angular_velocity.final", "P.bearing_load.largest")
+    known = alone(crank, points, keep=keep)
+    assert [bool(p.refused) for p in known] == [False, False, False, True, False, False]
+    assert_same(abreast(crank, points, keep=keep), known)
+    assert evaluations_abreast == ([points_of.ABREAST] if not INTERPRETED else [])
 
 
 def test_a_point_that_fails_fails_alone_and_in_the_same_words(root: Path) -> None:

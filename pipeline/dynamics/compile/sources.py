@@ -152,22 +152,28 @@ def _rows(wiring: Wiring) -> str:
 
 def rates(parts: Parts) -> str:
     """Source of the kernel `rates` alone, which Python runs (`specialise.dual`), without friction of ideal joints."""
-    return _text(*_equations(parts), "", _formulas(parts))
+    return _text(*_equations(parts, whole=False), "", _formulas(parts))
 
 
-def _equations(parts: Parts) -> tuple[Composition, str, str, str]:
-    """A file for the right-hand side, with what it is, the name of its kernel, and what makes that."""
-    file = _rates(parts)
+def _equations(parts: Parts, *, whole: bool = True) -> tuple[Composition, str, str, str]:
+    """A file for the right-hand side, with what it is, the name of its kernel, and what makes that.
+
+    whole: with friction of ideal joints.
+    """
+    file = _forces(parts)
+    file.given["tree"] = file.tree
+    if parts.closures:
+        _close(file)
+    if whole:
+        file.add_effects("evaluate")
     maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_rates")
     return file, f"right-hand side of {', '.join(parts.joints)}", "rates", maker
 
 
 def _evaluate(parts: Parts) -> str:
-    file = _rates(parts)
+    file, what, _, _ = _equations(parts)
     file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({_harmonics(file)})"
-    file.add_effects("evaluate")
     maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
-    what = f"right-hand side of {', '.join(parts.joints)}"
     return _text(file, what, "right_hand_side", maker, EVALUATE, _formulas(parts))
 
 
@@ -273,15 +279,6 @@ def _events(file: Composition, scheme: Scheme) -> str:
 def _joints(parts: Parts) -> Composition:
     file = Composition(parts)
     file.given["joints"] = file.family(JOINTS, parts.joints)
-    return file
-
-
-def _rates(parts: Parts) -> Composition:
-    """What the rates of the state consist of."""
-    file = _forces(parts)
-    file.given["tree"] = file.tree
-    if parts.closures:
-        _close(file)
     return file
 
 

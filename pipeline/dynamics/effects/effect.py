@@ -33,7 +33,6 @@ class Effect:
     and ``{kinds}`` the tuple of the modules of its kinds.
     changeable: keys of a scene, as ``table.key``, that decide none but numbers of the effect (`model.refill`).
     touches: whether it has contacts, which open and close at events.
-    iterates: whether it solves its equations by iteration from the last evaluation's result, which only kernels can.
     fill: ``fill(filling)`` -> rows of the tables by name (`model.filling`).
     ledger: ``ledger(mechanism, energies, lengths)`` -> groups of its block of the ledger (`model.filling.blocks`).
     guards: ``guards(mechanism)`` -> rows of the table GUARDS, on which steps end.
@@ -60,7 +59,6 @@ class Effect:
     compose: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     changeable: tuple[str, ...] = ()
     touches: bool = False
-    iterates: bool = False
     fill: str = ""
     ledger: str = ""
     guards: str = ""

@@ -15,7 +15,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from flexclear.pipeline.dynamics.specialise.tape import BIT, COMPARISONS, FLOAT, INTEGER, Branch, Symbol
+from flexclear.pipeline.dynamics.specialise.tape import BIT, COMPARISONS, FLOAT, INTEGER, Branch, Loop, Symbol
 
 #: as of all kernels (`dynamics.kernels`)
 FLAGS = ("contract", "reassoc", "nsz")
@@ -49,7 +49,7 @@ def loads(program: Program) -> list[tuple[str, Any]]:
     entries, blocks = list[tuple[str, Any]](), [program.block]
     while blocks:
         for item in blocks.pop():
-            if isinstance(item, Branch):
+            if not isinstance(item, Symbol):
                 blocks += item.blocks
             elif item.operation == "load":
                 entries.append(item.arguments)
@@ -74,6 +74,10 @@ def _use(block: list[Any], counts: Counter[Symbol]) -> None:
                     counts[item.condition] += 1
             for inner in item.blocks:
                 _use(inner, counts)
+        elif isinstance(item, Loop):
+            used = [item.condition, *(value for one in item.carried for value in (one.first, one.left))]
+            counts.update(value for value in used if isinstance(value, Symbol))
+            _use(item.blocks[0], counts)
         elif counts[item]:
             counts.update(a for a in item.arguments if isinstance(a, Symbol))
 
@@ -82,7 +86,7 @@ def size(block: list[Any], counts: Counter[Symbol]) -> int:
     """How many operations a block has, each call for as many as it takes as long as."""
     total = 0
     for item in block:
-        if isinstance(item, Branch):
+        if not isinstance(item, Symbol):
             total += 1 + sum(size(inner, counts) for inner in item.blocks)
         elif counts[item]:
             total += CALL if item.operation in LIBRARY else 1
@@ -93,7 +97,7 @@ def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbo
     """By sum: the product in it that nothing else uses, of the same block, and what is added to it."""
     pairs, products = dict[Symbol, tuple[Symbol, Any]](), set[Symbol]()
     for item in block:
-        if isinstance(item, Branch):
+        if not isinstance(item, Symbol):
             for inner in item.blocks:
                 pairs |= fused(inner, counts)
         elif item.operation == "mul" and counts[item] == 1 and divisor(item, counts) is None:
@@ -178,6 +182,8 @@ class Emitter:
         for item in block:
             if isinstance(item, Branch):
                 self._branch(item)
+            elif isinstance(item, Loop):
+                self._loop(item)
             elif self.uses[item] and item not in self.inside_sums:
                 self.values[item] = self._operation(item)
 
@@ -246,6 +252,28 @@ class Emitter:
             phi.add_incoming(ir.Constant(value.type, None), before)
             merged.append(phi)
         return merged
+
+    def _loop(self, loop: Loop) -> None:
+        """Turns as long as a lane goes on; those that do not keep what they have."""
+        builder, before, word = self.builder, self.builder.block, ir.IntType(self.lanes)
+        firsts = [self._value(one.first, one.inside.kind) for one in loop.carried]
+        start, after = builder.append_basic_block(), builder.append_basic_block()
+        builder.branch(start)
+        builder.position_at_end(start)
+        going = builder.phi(self.types[BIT])
+        for one, first in zip(loop.carried, firsts, strict=True):
+            phi = self.values[one.inside] = builder.phi(self.types[one.inside.kind])
+            phi.add_incoming(first, before)
+        self._block(loop.blocks[0])
+        for one in loop.carried:
+            phi, left = self.values[one.inside], self._value(one.left, one.inside.kind)
+            self.values[one.after] = left if self.lanes == 1 else builder.select(going, left, phi)
+            phi.add_incoming(self.values[one.after], builder.block)
+        goes_on = builder.and_(going, self._value(loop.condition, BIT))
+        going.add_incoming(self._value(True, BIT), before)
+        going.add_incoming(goes_on, builder.block)
+        builder.cbranch(builder.icmp_unsigned("!=", builder.bitcast(goes_on, word), word(0)), start, after)
+        builder.position_at_end(after)
 
     # Operations --------------------------------------------------------------------------------------------------
 

@@ -1,7 +1,9 @@
 r"""The exact derivative of a tape along a direction: every operation is followed by what it does to small changes.
 
 For an operation :math:`z = \varphi(x, y)` the tangent is :math:`\dot z = \varphi_x\dot x + \varphi_y\dot y`. Branches
-differentiate the way that is taken; the root of zero, which has no derivative, gives zero. A change of the state is in
+differentiate the way that is taken; the root of zero, which has no derivative, gives zero. Loops repeat with their
+changes: the last turn of Newton's method, from what has converged already, leaves
+:math:`-F_x^{-1} F_p\dot p`, which is the implicit function's. A change of the state is in
 w as the state is; changes of the numbers f, of the laws of time and of impact rates are in `df` and `dw`, arranged as f
 and w are. So are, in `dw`, the changes of what is stored next to the rates.
 
@@ -16,7 +18,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.rules import RULES
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape, Undecided
 
 #: a tangent has at most this many operations per operation of its tape
 LONGEST_TANGENT = 8
@@ -77,6 +79,8 @@ class _Forward:
         for item in items:
             if isinstance(item, Branch):
                 self._branch(item)
+            elif isinstance(item, Loop):
+                self._loop(item)
             else:
                 self._operation(item)
 
@@ -90,6 +94,19 @@ class _Forward:
             self.values[joined] = self.tape.join(new, *map(self.value, ways))
             if joined.kind == FLOAT:
                 self.changes[joined] = self.tape.join(new, *map(self.change, ways))
+
+    def _loop(self, old: Loop) -> None:
+        kept = [(one, self.values, self.value) for one in old.carried]
+        kept += [(one, self.changes, self.change) for one in old.carried if one.inside.kind == FLOAT]
+        new = Loop(([],), [self.tape.carry(of(one.first)) for one, _, of in kept])
+        for (one, known, _), its in zip(kept, new.carried, strict=True):
+            known[one.inside], known[one.after] = its.inside, its.after
+        with self.tape.inside(new.blocks[0]):
+            self.block(old.blocks[0])
+        for (one, _, of), its in zip(kept, new.carried, strict=True):
+            its.left = of(one.left)
+        new.condition = self.value(old.condition)
+        self.tape.block.append(new)
 
     def _operation(self, s: Symbol) -> None:
         arguments = tuple(map(self.value, s.arguments))

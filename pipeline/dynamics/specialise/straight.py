@@ -24,6 +24,7 @@ from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
+KEPT |= {m.NAMED[watched].place for watched in ("bends", "bearing")}
 #: integers of n that are left
 REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
@@ -59,8 +60,7 @@ def _stores(array: str, values: dict[int, Any], kept: Callable[[int], bool] = la
 def _kept(h: list[int]) -> Callable[[int, int], bool]:
     """Whether an index is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last."""
     o = h[m.CLOSURE_ENVELOPE.place]
-    rows = [(h[o + 2 * r], h[o + 2 * r + 1]) for r in range(h[m.N_KEPT_ROWS])]
-    diagonal = {start - first + r for r, (first, start) in enumerate(rows)}
+    diagonal = {h[o + m.CLOSURE_ENVELOPE.size * r + m.CLOSURE_ENVELOPE.origin] + r for r in range(h[m.N_KEPT_ROWS])}
 
     def kept(stretch: int, index: int) -> bool:
         scale = stretch == m.ROW_SCALE and index >= h[m.N_CLOSURE_ROWS]

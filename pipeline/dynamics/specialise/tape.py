@@ -1,6 +1,7 @@
 """A computation as it happens: arithmetic on symbols writes what it does on a tape.
 
-The tape is a tree of blocks: operations in their order, and branches, each with two blocks and what they leave behind.
+The tape is a tree of blocks: operations in their order, branches, each with two blocks and what they leave behind, and
+loops, each with the block that is repeated.
 Equal operations are written once, and what numbers of the wiring make trivial (times zero, plus zero) not at all.
 """
 
@@ -76,7 +77,8 @@ class Symbol:
         return self.tape.write(FLOAT, "fabs", self)
 
     def __lt__(self, other: Any) -> Any:
-        return self.tape.write(BIT, "<", self, other)
+        never = self.operation == "fabs" and not isinstance(other, Symbol) and other == 0.0
+        return False if never else self.tape.write(BIT, "<", self, other)
 
     def __le__(self, other: Any) -> Any:
         return self.tape.write(BIT, "<=", self, other)
@@ -110,6 +112,25 @@ class Branch:
     condition: Symbol
     blocks: tuple[list[Any], list[Any]]
     joins: list[tuple[Symbol, Any, Any]] = field(default_factory=list)
+
+
+@dataclass
+class Carried:
+    """What a loop keeps at a place: in a turn and after the loop, before the loop, and what each turn leaves there."""
+
+    inside: Symbol
+    after: Symbol
+    first: Any
+    left: Any = None
+
+
+@dataclass
+class Loop:
+    """A block that runs once, and again as long as the condition holds that it computes."""
+
+    blocks: tuple[list[Any]]
+    carried: list[Carried]
+    condition: Any = False
 
 
 class Tape:
@@ -231,6 +252,11 @@ class Tape:
             self.block = before
             for key in self._scopes.pop():
                 del self._known[key]
+
+    def carry(self, first: Any) -> Carried:
+        """What a loop keeps of a value that is `first` before it."""
+        inside, after = (self._symbol(kind_of(first), "carried", ()) for _ in range(2))
+        return Carried(inside, after, first)
 
     def join(self, branch: Branch, a: Any, b: Any) -> Any:
         """Value at an index after a branch."""

@@ -3,7 +3,8 @@
 Sizes, offsets and tables of h are numbers, so loops are counted and indices known while the tape is written; w and f
 hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it is, and
 what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
-repeated.
+repeated. A kernel that is called until it has converged (`choice.repeat`) is run on symbols for all that it leaves to
+itself.
 """
 
 from __future__ import annotations
@@ -13,8 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.pipeline.dynamics.choice import repeat
 from flexclear.pipeline.dynamics.specialise.plain import Plain
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Carried, Loop, Symbol, Tape, Undecided
+
+#: by which the kernel is known that is a loop on the tape
+REPEAT = getattr(repeat, "py_func", repeat).__code__
 
 
 class Number(float):
@@ -75,6 +80,7 @@ class Trace:
 
     def call(self, function: Callable, arguments: tuple[Any, ...]) -> Any:
         """Result of a kernel."""
+        function = self._repeated if function.__code__ is REPEAT else function
         caller = self.runs[-1]
         if caller.position == len(caller.done):
             start = len(self.journal)
@@ -126,6 +132,30 @@ class Trace:
         if isinstance(a, tuple):
             return tuple(self._joined_results(branch, x, y) for x, y in zip(a, b, strict=True))
         return None if a is None else self.tape.join(branch, a, b)
+
+    def _repeated(self, turn: Callable, *arguments: Any) -> None:
+        """Turns of a kernel, as a loop; where numbers alone decide, one after the other."""
+        start, carried = len(self.journal), dict[tuple[Memory, int], Carried]()
+        while True:
+            loop = Loop(([],), list(carried.values()))
+            with self.tape.inside(loop.blocks[0]):
+                for (memory, index), one in carried.items():
+                    memory[index] = one.inside
+                loop.condition = turn(*arguments)
+            if not carried and not isinstance(loop.condition, Symbol):
+                self.tape.block += loop.blocks[0]
+                start = len(self.journal)
+                if not loop.condition:
+                    return
+                continue
+            left = {(memory, index): value for memory, index, _, value in self.journal[start:]}
+            self._go_back(start)
+            if left.keys() == carried.keys():
+                break
+            carried = {(memory, index): self.tape.carry(memory[index]) for memory, index in left}
+        self.tape.block.append(loop)
+        for (memory, index), one in carried.items():
+            memory[index], one.left = one.after, left[memory, index]
 
     def _function(self, name: str) -> Callable:
         def apply(*arguments: Any) -> Any:

@@ -40,6 +40,8 @@ JOINT_FRICTION = Effect(
         # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
         # what it takes per normal force [m/s]
         "bearing": ("n_bearings", "load slip loss unit_moment:3 unit_force:3"),
+        # the search for the loads: part of the friction that is there, turns, last change, whether in strides
+        "search": ("1", "share turns change strides"),
         # what bends its friction where it reverses: sliding velocity, force along the axis, moment about it and forces
         # at both ends as they press
         "bends": ("n_bearings", "sliding:3 along about one_end:2 other_end:2"),
@@ -59,7 +61,6 @@ JOINT_FRICTION = Effect(
         },
         "observe closures": {"friction": "<equations.take_off_closures>"},
     },
-    iterates=True,
     fill="model:fill",
     ledger="model:ledger",
     guards="model:guards",

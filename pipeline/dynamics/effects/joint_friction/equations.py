@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.choice import choose, nothing
+from flexclear.pipeline.dynamics.choice import choose, nothing, repeat
 from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.equations.closures import respond
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -53,10 +53,11 @@ from flexclear.pipeline.dynamics.vectors import (
 )
 
 #: Newton's iterations for the loads; the change of a load, as a fraction of the largest, at which they end, and below
-#: which
-#: they end when it shrinks no more, near a jam, where rounding grows; in how many strides friction is turned on where
-#: they do not
+#: which they end when it shrinks no more, near a jam, where rounding grows; in how many strides friction is turned on
+#: where they do not
 ITERATIONS, CONVERGED, ROUNDED, STRIDES = 30, 1e-13, 1e-9, 32
+#: what a turn of the search for the loads has come to
+GOES_ON, FOUND, FAILED = 0, 1, 2
 #: below this fraction of their diagonal pivots of the slopes count as zero
 SINGULAR_SLOPES = 1e-12
 
@@ -244,27 +245,36 @@ def balance(d, share):
 
 
 @kernel
+def pivot_up(A, b, k, i, size):
+    """Exchange rows k and i of A x = b where the pivot of row i is larger; the sign of what that does to det A."""
+    if not abs(A[size * i + k]) > abs(A[size * k + k]):
+        return 1.0
+    for j in range(k, size):
+        A[size * k + j], A[size * i + j] = A[size * i + j], A[size * k + j]
+    b[k], b[i] = b[i], b[k]
+    return -1.0
+
+
+@kernel
+def sign_of(pivot):
+    """Sign of a pivot, 0 where it counts as zero."""
+    if not abs(pivot) > SINGULAR_SLOPES:
+        return 0.0
+    return 1.0 if pivot > 0.0 else -1.0
+
+
+@kernel
 def eliminate(A, b, size):
-    """Solve A x = b in place (Gauss, partial pivoting); the sign of the determinant of A, 0 where it is singular."""
+    """Solve A x = b in place (Gauss, partial pivoting); the sign of det A, 0 (and no solution) where it is singular."""
     sign = 1.0
     for k in range(size):
-        p = k
         for i in range(k + 1, size):
-            if abs(A[size * i + k]) > abs(A[size * p + k]):
-                p = i
-        if not abs(A[size * p + k]) > SINGULAR_SLOPES:
-            return 0.0
-        if p != k:
-            sign = -sign
-            for j in range(size):
-                A[size * k + j], A[size * p + j] = A[size * p + j], A[size * k + j]
-            b[k], b[p] = b[p], b[k]
+            sign *= pivot_up(A, b, k, i, size)
         pivot = A[size * k + k]
-        if pivot < 0.0:
-            sign = -sign
+        sign *= sign_of(pivot)
         for i in range(k + 1, size):
             factor = A[size * i + k] / pivot
-            for j in range(k, size):
+            for j in range(k + 1, size):
                 A[size * i + j] -= factor * A[size * k + j]
             b[i] -= factor * b[k]
     for k in range(size - 1, -1, -1):
@@ -275,25 +285,56 @@ def eliminate(A, b, size):
 
 
 @kernel
-def iterate(d, share):
-    """Newton's method for the loads from those that are there; whether it finds the solution that friction grows to."""
-    size, before = d.n_bearings, np.inf
-    for _ in range(ITERATIONS):
-        balance(d, share)
-        sign = eliminate(d.bearing_slopes, d.bearing_residuals, size)
-        if sign == 0.0:
-            return False
-        change, largest = 0.0, 0.0
-        for e in range(size):
-            bearing, correction = d.bearing[e], d.bearing_residuals[e]
-            bearing.load -= correction
-            change, largest = max(change, abs(correction)), max(largest, abs(bearing.load))
-        if not largest < np.inf:
-            return False
-        if change <= CONVERGED * largest or (change <= ROUNDED * largest and change > 0.5 * before):
-            return sign > 0.0
-        before = change
-    return False
+def verdict(sign, change, largest, before, turns):
+    """What a turn of Newton's method has come to: `GOES_ON`, `FOUND`, or `FAILED`."""
+    if sign == 0.0 or not largest < np.inf:
+        return FAILED
+    if change <= CONVERGED * largest or (change <= ROUNDED * largest and change > 0.5 * before):
+        return FOUND if sign > 0.0 else FAILED
+    return GOES_ON if turns < ITERATIONS else FAILED
+
+
+@kernel
+def correct(d):
+    """A turn of Newton's method for the loads from those that are there, and what it has come to."""
+    size, search = d.n_bearings, d.search[0]
+    balance(d, search.share)
+    sign = eliminate(d.bearing_slopes, d.bearing_residuals, size)
+    change, largest = 0.0, 0.0
+    for e in range(size):
+        bearing, correction = d.bearing[e], d.bearing_residuals[e]
+        bearing.load -= correction
+        change, largest = max(change, abs(correction)), max(largest, abs(bearing.load))
+    search.turns += 1.0
+    made = verdict(sign, change, largest, search.change, search.turns)
+    search.change = change
+    return made
+
+
+@kernel
+def begin(d, share):
+    """Begin to search for the loads with part of the friction."""
+    search = d.search[0]
+    search.share, search.turns, search.change = share, 0.0, np.inf
+
+
+@kernel
+def pursue(d):
+    """A turn of the search for the loads; whether there is another: where friction is not all there at once, it is
+    turned on in strides."""
+    made, search = correct(d), d.search[0]
+    if made == GOES_ON:
+        return True
+    if made == FOUND:
+        begin(d, search.share + 1.0 / STRIDES)
+        return search.share <= 1.0
+    if search.strides > 0.0:
+        d.evaluation = m.JAMMED
+        return False
+    search.strides = 1.0
+    without_feedback(d)
+    begin(d, 1.0 / STRIDES)
+    return True
 
 
 @kernel
@@ -306,15 +347,11 @@ def without_feedback(d):
 
 @kernel
 def find_loads(d):
-    """Loads of all bearings; False where friction jams the joints."""
+    """Loads of all bearings; `JAMMED` where friction jams the joints."""
     without_feedback(d)
-    if iterate(d, 1.0):
-        return True
-    without_feedback(d)
-    found = True
-    for k in range(1, STRIDES + 1):
-        found = found and iterate(d, k / STRIDES)
-    return found
+    d.search[0].strides = 0.0
+    begin(d, 1.0)
+    repeat(pursue, d)
 
 
 def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Callable:
@@ -359,8 +396,8 @@ def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Calla
         for e in range(d.n_bearings):
             unit_wrench(d, e)
         influences(d)
-        if not find_loads(d):
-            d.evaluation = m.JAMMED
+        find_loads(d)
+        if d.evaluation != m.OK:
             return
         for k in range(d.nv):
             d.force[k] = 0.0

@@ -1,8 +1,7 @@
 """Straight code for the wiring of a mechanism alone: which there is, and where.
 
 It is made once for all scenes of a wiring, and takes less time to make and to run than kernels do. Kernels are for what
-is too long for it, and for friction in ideal joints, which is solved for by iteration from what the last evaluation
-found. The wiring decides, no clock and no cache, so that equal scenes give equal bytes.
+is too long for it. The wiring decides, no clock and no cache, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -50,17 +49,12 @@ class Straight:
     rows: list[bytes] = field(default_factory=list)
 
 
-def suited(model: Model) -> bool:
-    """Whether there can be straight code, unless it is too long."""
-    return not (INTERPRETED or any(effect.iterates for effect in model.parts.present))
-
-
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
     """Sources of what evaluates a model and describes it, by name, with all closure rows: no selection has longer code.
 
     Steps that solve for all of them have code of their own as well; where some are redundant, which is chosen later.
     """
-    if not suited(model):
+    if INTERPRETED:
         return sources.kernels(model.parts)
     wired = wiring(model.arrays, model.arrays.h)
     names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)

@@ -27,9 +27,9 @@ from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble
-from flexclear.pipeline.dynamics.run.evaluation.straight_code import suited
 from flexclear.pipeline.dynamics.run.pieces import Tape
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
@@ -97,8 +97,8 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
     Raises SolverError for a mechanism that is not differentiated.
     """
     model, count = engine.model, len(directions)
-    if not suited(model):
-        raise SolverError("friction of ideal joints is solved for by iteration, which is not differentiated")
+    if INTERPRETED:
+        raise SolverError("only compiled code carries derivatives: unset NUMBA_DISABLE_JIT")
     if any(isinstance(load, SampledPid) for load in model.scene.load.values()):
         raise SolverError("a controller that samples is not differentiated: use a continuous 'pid'")
     if engine.method.traits.implicit:

@@ -20,7 +20,9 @@ OFTEN = 0.05
 
 def text(engine: Engine, rows: np.ndarray) -> str:
     """When and why the stepper stopped, in words; rows: of the record so far."""
+    failed = int(engine.n[m.EVALUATION])
     engine.complete()
+    engine.n[m.EVALUATION] = failed  # of the trial that came to nothing
     control, n, contacts = engine.control, engine.n, engine.model.contacts
     why = engine.explained()
     if why is not None:
