@@ -225,7 +225,7 @@ def _project(parts: Parts) -> str:
     _close(file)
     if parts.flexible:
         stiffen = file.take(f"{DYNAMICS}.equations.projection", "make_stiffen")
-        file.given["stiffen"] = f"{stiffen}({file.given['closures']})"
+        file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {_flexible(file)})"
         file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
     maker = file.take(f"{DYNAMICS}.equations.projection", "make_projection")
     return _text(file, f"projection with {', '.join(parts.joints)}", "projection", maker, PROJECT)
@@ -266,7 +266,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "stepping": file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
     if integrators.INTEGRATORS[scheme.integrator].reads_all:
-        file.given["complete"] = "calls.evaluate"
+        file.given |= {"complete": "calls.evaluate", "tree": file.tree}
     events = _events(file, scheme)
     if events:
         file.given["events"] = events
@@ -312,7 +312,7 @@ def _forces(parts: Parts) -> Composition:
     """What acts in the mechanism: joints, flexible bodies, contacts, loads."""
     file = _joints(parts)
     if parts.flexible:
-        file.given["flexible"] = f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
+        file.given["flexible"] = _flexible(file)
     if parts.surfaces:
         surfaces = file.family(SURFACES, parts.surfaces)
         maker, frictions = (
@@ -325,6 +325,11 @@ def _forces(parts: Parts) -> Composition:
         file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
     file.add_effects("forces")
     return file
+
+
+def _flexible(file: Composition) -> str:
+    """What makes the kernels of the flexible bodies, unless an effect brings more."""
+    return f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
 
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:

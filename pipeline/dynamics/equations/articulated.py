@@ -9,6 +9,10 @@ and what is left joins the parent's inertia. This is the Cholesky factor of the 
 :math:`L_{jk} = s_j\cdot K_k` for k beyond j, without the matrix: it never adds up the inertia of all that a coordinate
 moves, which loses the digits of M's condition number. All vectors of a link refer to its own origin.
 
+The modes of a flexible link come before the coordinates of its joint: with the twist of its joint's frame they have the
+inertia :math:`(I, P; P^T, m)`, to which each link that it carries adds its own, seen through the columns of the port
+that carries it. The block m has a factor of its own, m = ll^T, and :math:`K = P l^{-T}`. No mode moves a rigid link.
+
 Source: Rodriguez, Jain & Kreutz-Delgado (1991), International Journal of Robotics Research 10, 371-381 (innovations
 factorisation); Featherstone (2008), *Rigid Body Dynamics Algorithms*, ch. 7.
 """
@@ -20,13 +24,15 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.bodies.ports import moving
+from flexclear.pipeline.dynamics.equations import envelope
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
     add,
     add6,
     add9,
+    add_wrench,
     at,
     at6,
     cross,
@@ -46,8 +52,26 @@ from flexclear.pipeline.dynamics.vectors import (
 MASSLESS_ARTICULATED = 1e-14
 
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-#: what gives `forces` the inertia of a rigid link: about its own origin
-rigid_inertia = rigid.inertia_about_itself
+
+
+@kernel
+def origin(d, i):
+    """What the inertia of link i refers to is its own origin, far from which it loses digits."""
+    return ZERO
+
+
+@kernel
+def demand_of(d, i, moment, force):
+    """Store the wrench that the accelerations of link i need; WRENCH then is that of all else that acts on it."""
+    wrench, body = d.wrench[i], d.articulated[i]
+    body.own_moment, body.own_force = moment, force
+    wrench.moment, wrench.force = ZERO, ZERO
+
+
+@kernel
+def column(d, k):
+    """Return angular and linear part of a column about the origin of its link."""
+    return d.local[k].angular, d.local[k].linear
 
 
 @kernel
@@ -93,14 +117,97 @@ def localise(d, k, angular, linear):
 
 
 @kernel
+def localise_shape(d, k, base, angular, linear):
+    """Store a shape's column about the origin of its link, with column `base` of the same shape unless that is -1."""
+    local = d.local[k]
+    local.angular, local.linear = angular, linear
+    if base >= 0:
+        local.angular, local.linear = add(d.local[base].angular, angular), add(d.local[base].linear, linear)
+
+
+@kernel
 def step(d, i, arm):
     """Store the way from the origin of link i's parent to its own; as a difference of positions it loses digits."""
     d.articulated[i].arm = arm
 
 
 @kernel
+def shift(d, i, arm):
+    """Take that way, and its joint's columns, from the joint's frame to link i's origin, from which arm leads there."""
+    link, body = d.links[i], d.articulated[i]
+    body.arm = sub(body.arm, arm)
+    for k in range(link.c0, link.c0 + link.n_speeds):
+        local = d.local[k]
+        local.linear = sub(local.linear, cross(local.angular, arm))
+
+
+@kernel
+def begin_modes(d):
+    """Forces on the modes, and momenta of their rates, to which what bodies carry is to be added."""
+    for f in range(d.n_flex):
+        body = d.flexes[f]
+        for k in range(body.c0, body.c0 + body.n_modes):
+            gain, momentum = d.gain[k], d.momenta[k]
+            d.force[k], gain.moment, gain.force = -d.modal_bias[k], momentum.angular, momentum.linear
+
+
+@kernel
+def load_modes(d, p, A, B, C):
+    """Add the inertia (A B; B^T C) that port p carries, about the link's origin, to that of the shapes that move it."""
+    port = d.ports[p]
+    n, c = moving(d.flexes[port.flex])
+    for j in range(n):
+        local, gain, row = d.local[port.column + j], d.gain[c + j], d.envelope[c + j].origin + c
+        moment = add(turn_symmetric(A, local.angular), turn(B, local.linear))
+        force = add(turn_back(B, local.angular), turn_symmetric(C, local.linear))
+        add_wrench(gain, moment, force)
+        for k in range(j + 1):
+            other = d.local[port.column + k]
+            d.mass[row + k] += dot(other.angular, moment) + dot(other.linear, force)
+
+
+@kernel
+def push_modes(d, p, b, moment, force):
+    """Take a wrench that port p passes on, about the link's origin, off the forces on its modes in w from index b."""
+    port = d.ports[p]
+    n, c = moving(d.flexes[port.flex])
+    for j in range(n):
+        local = d.local[port.column + j]
+        d.w[b + c + j] -= dot(local.angular, moment) + dot(local.linear, force)
+
+
+@kernel
+def forward_modes(d, f, b, moment, force):
+    """L^-1 of the forces on the modes of body f in w from index b; the wrench of what it carries, with theirs."""
+    body = d.flexes[f]
+    begin, end = body.c0, body.c0 + body.n_modes
+    envelope.forward(d.h, d.at_envelope, d.w, d.at_mass, begin, end, b)
+    for k in range(begin, end):
+        gain, value = d.gain[k], d.w[b + k]
+        moment, force = add(moment, scale(value, gain.moment)), add(force, scale(value, gain.force))
+    return moment, force
+
+
+@kernel
+def factor_modes(d, f):
+    """The factor of the modal block of body f, and K of its modes; whether all pivots are sound."""
+    body = d.flexes[f]
+    begin, end = body.c0, body.c0 + body.n_modes
+    sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, begin, end, MASSLESS_ARTICULATED)
+    for k in range(begin, end):
+        row, gain = d.envelope[k], d.gain[k]
+        moment, force = gain.moment, gain.force
+        for j in range(row.first, k):
+            before, value = d.gain[j], -d.mass[row.origin + j]
+            moment, force = add(moment, scale(value, before.moment)), add(force, scale(value, before.force))
+        inverse = d.mass[row.origin + k]
+        gain.moment, gain.force = scale(inverse, moment), scale(inverse, force)
+    return sound
+
+
+@kernel
 def reduce(d, i):
-    """Take the coordinates of link i's joint out of its inertia and pass the rest to its parent.
+    """Take the modes of link i and the coordinates of its joint out of its inertia and pass the rest to its parent.
 
     Stores the factor's part of each coordinate (MASS: 1/sqrt(D), GAIN: K) and L^-1 of minus the bias (FORCE).  Returns
     whether all pivots are sound.
@@ -118,6 +225,15 @@ def reduce(d, i):
     if link.leaf == 0:
         A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
         M, F = add(M, body.moment), add(F, body.force)
+    if link.flex >= 0:
+        sound = factor_modes(d, link.flex)
+        M, F = forward_modes(d, link.flex, d.at_force, M, F)
+        first = d.flexes[link.flex].c0
+        for k in range(first, first + d.flexes[link.flex].n_modes):
+            gain = d.gain[k]
+            A = less(A, outer_symmetric(1.0, gain.moment))
+            B = less9(B, outer(1.0, gain.moment, gain.force))
+            C = less(C, outer_symmetric(1.0, gain.force))
     if link.c0 < d.nv:
         for k in range(link.c0, link.c0 + link.n_speeds):
             gain, angular, linear = d.gain[k], d.local[k].angular, d.local[k].linear
@@ -144,6 +260,9 @@ def reduce(d, i):
         x, y, z = cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8]))
         A = add6(A, (x[0], y[1], z[2], y[0], z[0], z[1]))
         M = add(M, cross(a, F))
+        if link.carried_by >= 0:
+            load_modes(d, link.carried_by, A, B, C)
+            push_modes(d, link.carried_by, d.at_force, M, F)
         above = d.articulated[link.parent]
         if link.first == 0:
             A, B, C = add6(A, at6(above.turning, 0)), add9(B, above.mixed), add6(C, at6(above.moving, 0))
@@ -163,6 +282,8 @@ def forward(d, b):
         moment, force = ZERO, ZERO
         if link.leaf == 0:
             moment, force = body.moment, body.force
+        if link.flex >= 0:
+            moment, force = forward_modes(d, link.flex, b, moment, force)
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local, gain = d.local[k], d.gain[k]
@@ -171,34 +292,58 @@ def forward(d, b):
                 moment, force = add(moment, scale(value, gain.moment)), add(force, scale(value, gain.force))
         if link.parent > 0:
             above, moment = d.articulated[link.parent], add(moment, cross(body.arm, force))
+            if link.carried_by >= 0:
+                push_modes(d, link.carried_by, b, moment, force)
             if link.first == 0:
                 moment, force = add(moment, above.moment), add(force, above.force)
             above.moment, above.force = moment, force
 
 
 @kernel
-def carried(d, i):
-    """Return the acceleration of link i with its parent, about its own origin."""
-    angular, linear = ZERO, ZERO
-    if d.links[i].parent > 0:
-        above = d.articulated[d.links[i].parent]
-        angular, linear = above.angular, add(above.linear, cross(above.angular, d.articulated[i].arm))
+def carried(d, i, b):
+    """Return the acceleration of link i with its parent, about its own origin, at those in w from index b."""
+    link, angular, linear = d.links[i], ZERO, ZERO
+    if link.parent > 0:
+        above = d.articulated[link.parent]
+        angular, linear = above.angular, above.linear
+        if link.carried_by >= 0:
+            port = d.ports[link.carried_by]
+            n, c = moving(d.flexes[port.flex])
+            for j in range(n):
+                local, value = d.local[port.column + j], d.w[b + c + j]
+                angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
+        linear = add(linear, cross(angular, d.articulated[i].arm))
     return angular, linear
 
 
 @kernel
 def backward(d, b):
-    """L^-T applied to the vector in w from index b; leaves the accelerations of all links, about their origins."""
+    """L^-T applied to the vector in w from index b; leaves the accelerations of all links, about their origins.
+
+    Those of flexible links are as if they went rigidly with the frame of their joint.
+    """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
-        angular, linear = carried(d, i)
+        angular, linear = carried(d, i, b)
         if link.c0 < d.nv:
             for k in range(link.c0 + link.n_speeds - 1, link.c0 - 1, -1):
                 local, gain = d.local[k], d.gain[k]
                 value = d.mass[k] * (d.w[b + k] - dot(gain.moment, angular) - dot(gain.force, linear))
                 d.w[b + k] = value
                 angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
+        if link.flex >= 0:
+            first = d.flexes[link.flex].c0
+            end = first + d.flexes[link.flex].n_modes
+            for k in range(first, end):
+                d.w[b + k] -= dot(d.gain[k].moment, angular) + dot(d.gain[k].force, linear)
+            envelope.backward(d.h, d.at_envelope, d.w, d.at_mass, first, end, b)
         body.angular, body.linear = angular, linear
+
+
+@kernel
+def n_shapes(d, path):
+    """How many moving shapes the link of a row of PATHS has."""
+    return moving(d.flexes[d.links[path.link].flex])[0] if path.shapes >= 0 else 0
 
 
 @kernel
@@ -208,8 +353,11 @@ def spread(d, c):
     for t in range(closure.threes):
         start = closure.jacobian0 + 3 * t * closure.n_support
         for e in range(closure.path0, closure.path0 + closure.n_path):
-            none = d.transmitted[d.paths[e].link]
+            path = d.paths[e]
+            none = d.transmitted[path.link]
             none.moments, none.forces = NONE, NONE
+            for j in range(n_shapes(d, path)):
+                put(d.spread, start + 3 * (path.shapes + j), at(d.jacobian, start + 3 * (path.shapes + j)))
         for e in range(closure.path0, closure.path0 + closure.n_path):
             path = d.paths[e]
             link, moments, forces = (
@@ -217,6 +365,16 @@ def spread(d, c):
                 d.transmitted[path.link].moments,
                 d.transmitted[path.link].forces,
             )
+            for j in range(n_shapes(d, path)):
+                n, c = moving(d.flexes[link.flex])
+                first, gain, row = start + 3 * path.shapes, d.gain[c + j], d.envelope[c + j]
+                values = at(d.spread, first + 3 * j)
+                for k in range(max(row.first - c, 0), j):
+                    values = sub(values, scale(d.mass[row.origin + c + k], at(d.spread, first + 3 * k)))
+                values = scale(d.mass[row.origin + c + j], values)
+                put(d.spread, first + 3 * j, values)
+                moments = add9(moments, outer(1.0, gain.moment, values))
+                forces = add9(forces, outer(1.0, gain.force, values))
             if path.slot >= 0:
                 for k in range(link.n_speeds):
                     local, gain, place = d.local[link.c0 + k], d.gain[link.c0 + k], start + 3 * (path.slot + k)
@@ -227,8 +385,33 @@ def spread(d, c):
                     forces = add9(forces, outer(1.0, gain.force, values))
             if link.parent > 0:
                 above, lever = d.transmitted[link.parent], product(skewed(d.articulated[path.link].arm), forces)
-                above.moments = add9(above.moments, add9(moments, lever))
+                moments = add9(moments, lever)
+                above.moments = add9(above.moments, moments)
                 above.forces = add9(above.forces, forces)
+                if path.carrier >= 0:
+                    port = d.ports[link.carried_by]
+                    n, c = moving(d.flexes[port.flex])
+                    for j in range(n):
+                        local, place = d.local[port.column + j], start + 3 * (path.carrier + j)
+                        against = add(turn_back(moments, local.angular), turn_back(forces, local.linear))
+                        put(d.spread, place, sub(at(d.spread, place), against))
+
+
+@kernel
+def deforming(d, f, b, angular, linear):
+    """The acceleration of the frame of body f, whose modes have those in w from index b, from that of its joint's; and
+    the wrench that its deformation needs."""
+    body, moment, force = d.flexes[f], ZERO, ZERO
+    for k in range(body.c0, body.c0 + body.n_modes):
+        value, momentum = d.w[b + k], d.momenta[k]
+        turning, pushing = momentum.angular, momentum.linear
+        if body.inboard:
+            turning, pushing = d.deformation[k].angular, d.deformation[k].linear
+            if k >= body.c0 + body.n_held:
+                local = d.local[k]
+                angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
+        moment, force = add(moment, scale(value, turning)), add(force, scale(value, pushing))
+    return angular, linear, moment, force
 
 
 @kernel
@@ -239,7 +422,7 @@ def transmit(d, b, biased):
     """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
-        angular, linear = carried(d, i)
+        angular, linear = carried(d, i, b)
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local = d.local[k]
@@ -247,11 +430,14 @@ def transmit(d, b, biased):
                 linear = add(linear, scale(d.w[b + k], local.linear))
         body.angular, body.linear = angular, linear
         own, wrench, p = d.own[i], d.wrench[i], d.link_frames[i].origin
+        turning, pushing = ZERO, ZERO
+        if link.flex >= 0:
+            angular, linear, turning, pushing = deforming(d, link.flex, b, angular, linear)
         moment = add(turn_symmetric(at6(own.inertia, 0), angular), cross(own.moment, linear))
         force = add(scale(own.mass, linear), cross(angular, own.moment))
         needed = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
-        body.moment = add(moment, scale(biased, needed))
-        body.force = add(force, scale(biased, add(body.own_force, wrench.force)))
+        body.moment = add(add(moment, turning), scale(biased, needed))
+        body.force = add(add(force, pushing), scale(biased, add(body.own_force, wrench.force)))
     for i in range(d.n_links - 1, 0, -1):
         link, body = d.links[i], d.articulated[i]
         if link.parent > 0:
@@ -269,17 +455,54 @@ def demand(d, j, b, biased):
 
 
 @kernel
+def along(d, k, i):
+    """What coordinate k of link i's joint must supply of what that joint transmits."""
+    local, body = d.local[k], d.articulated[i]
+    return dot(local.angular, body.moment) + dot(local.linear, body.force)
+
+
+@kernel
 def drive_forces(d):
     """Forces that the prescribed coordinates need: what their joints transmit at the accelerations in DU."""
     if d.n_drives == 0:
         return
     transmit(d, d.at_du, 1.0)
     for i in range(1, d.n_links):
-        link, body = d.links[i], d.articulated[i]
+        link = d.links[i]
         if link.c0 >= d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
-                local = d.local[k]
-                d.drive_force[k - d.nv] = dot(local.angular, body.moment) + dot(local.linear, body.force)
+                d.drive_force[k - d.nv] = along(d, k, i)
+
+
+@kernel
+def drive_power(d, b, motion):
+    """Power of the drives at accelerations in w from index b; motion: where w has the rates of all coordinates."""
+    power = 0.0
+    if d.n_drives > 0:
+        transmit(d, b, 0.0)
+        for i in range(1, d.n_links):
+            link = d.links[i]
+            if link.c0 >= d.nv:
+                for k in range(link.c0, link.c0 + link.n_speeds):
+                    power += along(d, k, i) * d.w[motion + k]
+    return power
+
+
+def make_again(flexible: Any) -> tuple[Callable, Callable]:
+    """The kernels unfactor(d), which leaves the modes' own mass so that they can get more, and refactor(d)."""
+    modal_mass, eliminate = flexible.mass_matrix, make_eliminate(flexible)
+
+    @kernel
+    def unfactor(d):
+        for k in range(d.mass_size):
+            d.mass[k] = 0.0
+        modal_mass(d)
+
+    @kernel
+    def refactor(d):
+        eliminate(d)
+
+    return unfactor, refactor
 
 
 def make_eliminate(flexible: Any = None) -> Callable:
@@ -288,6 +511,7 @@ def make_eliminate(flexible: Any = None) -> Callable:
     @kernel
     def eliminate(d):
         sound = True
+        begin_modes(d)
         for i in range(d.n_links - 1, 0, -1):
             sound = reduce(d, i) & sound
         return sound

@@ -101,17 +101,19 @@ def make_advance(
     events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
     poses: Any = None,
     complete: Callable | None = None,
+    tree: Any = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
     The kernels that it is made of take `d`, the arrays with named fields (`fields`), instead of h, f, w and n.
 
-    complete: evaluates like `evaluate`, and leaves all of the evaluation; given to methods that read more than rates.
+    complete: evaluates like `evaluate`, and leaves all of the evaluation.  tree: the module that factors the mass
+    matrix.  Both are given to methods that read more than rates.
     stepping: the module `adaptive` or `fixed`.  poses: `singular_step`, of mechanisms with loops; trees compile none of
         it.
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
-    given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
+    given = (evaluate, retract, complete, tree) if method.traits.reads_all else (evaluate, retract)
     begin, step_itself, error, extend_itself, keep = method.make_kernels(*given)
     proceed = step_itself if method.staged else make_at_once(step_itself)
     attempt_itself = make_attempt(evaluate, proceed) if method.staged else step_itself

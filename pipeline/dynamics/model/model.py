@@ -214,7 +214,8 @@ def articulated(numbering: Numbering) -> bool:
         return False
     before, depths = [0] * len(mechanism.links), list[int]()
     for i, link in enumerate(mechanism.links[1:], start=1):
-        own = [c for c in numbering.coordinates[i] if c < numbering.nv]
+        moving = numbering.moving(i) if link.flexible else range(0)
+        own = [c for c in (*numbering.coordinates[i], *moving) if c < numbering.nv]
         depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
         before[i] = before[link.branch.parent] + len(own)
     return bool(np.sqrt(np.mean(np.square(depths))) > DEEP_TREE)
@@ -254,7 +255,8 @@ def _borne(mechanism: Mechanism) -> np.ndarray:
             mass, com, J = link.undeformed
             sums[i] += mass, mass * np.linalg.norm(com), mass * com @ com + 0.5 * np.trace(J)
         mass, first, second = sums[i]
-        a = float(np.linalg.norm(link.start.p - above.start.p))
+        joint = above.start.point(link.inboard.place.p) if link.inboard is not None else link.start.p
+        a = float(np.linalg.norm(link.start.p - joint) + np.linalg.norm(joint - above.start.p))
         if "t" in joint_type(link.kind).SPEEDS:
             a = max(a, mechanism.length)
         sums[link.branch.parent] += mass, first + mass * a, second + a * (2.0 * first + mass * a)
