@@ -178,8 +178,9 @@ def _symmetric(J: np.ndarray) -> list[float]:
     return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
 
-#: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
-#: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
+#: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted but none
+#: other of its own body's modes, up to which the mass matrix is factored as a matrix: beyond it, articulated inertias
+#: take less time (docs/engine.md)
 DEEP_TREE = 8.0
 
 
@@ -209,15 +210,14 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
 
 def articulated(numbering: Numbering) -> bool:
     """Return whether the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP_TREE`)."""
-    mechanism = numbering.mechanism
-    if not mechanism.all_rigid or not numbering.nv:
+    if not numbering.nv:
         return False
-    before, depths = [0] * len(mechanism.links), list[int]()
-    for i, link in enumerate(mechanism.links[1:], start=1):
-        moving = numbering.moving(i) if link.flexible else range(0)
-        own = [c for c in (*numbering.coordinates[i], *moving) if c < numbering.nv]
-        depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
-        before[i] = before[link.branch.parent] + len(own)
+    before, depths = [0] * len(numbering.coordinates), list[int]()
+    for i, link in enumerate(numbering.mechanism.links[1:], start=1):
+        own = sum(c < numbering.nv for c in numbering.coordinates[i])
+        above, modes = before[link.branch.parent], numbering.modal_coordinates.get(i, ())
+        depths += [above + k for k in range(1, own + 1)] + [above + own + 1] * len(modes)
+        before[i] = above + own + (len(numbering.moving(i)) if modes else 0)
     return bool(np.sqrt(np.mean(np.square(depths))) > DEEP_TREE)
 
 
