@@ -238,7 +238,7 @@ def test_rounding_does_not_grow_with_the_number_of_flexible_rods(monkeypatch: py
     """40 rods, against the same kernels in extended precision."""
     model = tabulated(monkeypatch, Scene.model_validate(bending((FREE,) * 40, angles=UP_AND_DOWN)), True)
     found, exact = (evaluated(model, number=number) for number in (float, np.longdouble))
-    assert apart(found.rates[model.speeds], exact.rates[model.speeds].astype(float)) < 1e-11
+    assert apart(found.rates[model.speeds], exact.rates[model.speeds].astype(float)) < 1e-12  # measured 9e-15
 
 
 def test_energy_of_a_swinging_chain_of_flexible_rods_stays() -> None:

@@ -9,9 +9,7 @@ and what is left joins the parent's inertia. This is the Cholesky factor of the 
 :math:`L_{jk} = s_j\cdot K_k` for k beyond j, without the matrix: it never adds up the inertia of all that a coordinate
 moves, which loses the digits of M's condition number. All vectors of a link refer to its own origin.
 
-The modes of a flexible link come before the coordinates of its joint: with the twist of its joint's frame they have the
-inertia :math:`(I, P; P^T, m)`, to which each link that it carries adds its own, seen through the columns of the port
-that carries it. The block m has a factor of its own, m = ll^T, and :math:`K = P l^{-T}`. No mode moves a rigid link.
+The modes of a flexible link come before the coordinates of its joint (`equations.articulated_modes`).
 
 Source: Rodriguez, Jain & Kreutz-Delgado (1991), International Journal of Robotics Research 10, 371-381 (innovations
 factorisation); Featherstone (2008), *Rigid Body Dynamics Algorithms*, ch. 7.
@@ -24,15 +22,26 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.bodies.ports import moving
-from flexclear.pipeline.dynamics.equations import envelope
+from flexclear.pipeline.dynamics.equations.articulated_modes import (
+    at_port,
+    backward_modes,
+    begin_modes,
+    begin_shapes,
+    deforming,
+    factor_modes,
+    forward_modes,
+    load_modes,
+    outer,
+    push_modes,
+    push_shapes,
+    spread_shapes,
+)
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
     add,
     add6,
     add9,
-    add_wrench,
     at,
     at6,
     cross,
@@ -78,13 +87,6 @@ def column(d, k):
 def skewed(v):
     """Return the matrix of v x."""
     return (0.0, -v[2], v[1], v[2], 0.0, -v[0], -v[1], v[0], 0.0)
-
-
-@kernel
-def outer(s, a, b):
-    """Return the matrix s a b^T."""
-    x, y, z = scale(s, a)
-    return (x * b[0], x * b[1], x * b[2], y * b[0], y * b[1], y * b[2], z * b[0], z * b[1], z * b[2])
 
 
 @kernel
@@ -142,70 +144,6 @@ def shift(d, i, arm):
 
 
 @kernel
-def begin_modes(d):
-    """Forces on the modes, and momenta of their rates, to which what bodies carry is to be added."""
-    for f in range(d.n_flex):
-        body = d.flexes[f]
-        for k in range(body.c0, body.c0 + body.n_modes):
-            gain, momentum = d.gain[k], d.momenta[k]
-            d.force[k], gain.moment, gain.force = -d.modal_bias[k], momentum.angular, momentum.linear
-
-
-@kernel
-def load_modes(d, p, A, B, C):
-    """Add the inertia (A B; B^T C) that port p carries, about the link's origin, to that of the shapes that move it."""
-    port = d.ports[p]
-    n, c = moving(d.flexes[port.flex])
-    for j in range(n):
-        local, gain, row = d.local[port.column + j], d.gain[c + j], d.envelope[c + j].origin + c
-        moment = add(turn_symmetric(A, local.angular), turn(B, local.linear))
-        force = add(turn_back(B, local.angular), turn_symmetric(C, local.linear))
-        add_wrench(gain, moment, force)
-        for k in range(j + 1):
-            other = d.local[port.column + k]
-            d.mass[row + k] += dot(other.angular, moment) + dot(other.linear, force)
-
-
-@kernel
-def push_modes(d, p, b, moment, force):
-    """Take a wrench that port p passes on, about the link's origin, off the forces on its modes in w from index b."""
-    port = d.ports[p]
-    n, c = moving(d.flexes[port.flex])
-    for j in range(n):
-        local = d.local[port.column + j]
-        d.w[b + c + j] -= dot(local.angular, moment) + dot(local.linear, force)
-
-
-@kernel
-def forward_modes(d, f, b, moment, force):
-    """L^-1 of the forces on the modes of body f in w from index b; the wrench of what it carries, with theirs."""
-    body = d.flexes[f]
-    begin, end = body.c0, body.c0 + body.n_modes
-    envelope.forward(d.h, d.at_envelope, d.w, d.at_mass, begin, end, b)
-    for k in range(begin, end):
-        gain, value = d.gain[k], d.w[b + k]
-        moment, force = add(moment, scale(value, gain.moment)), add(force, scale(value, gain.force))
-    return moment, force
-
-
-@kernel
-def factor_modes(d, f):
-    """The factor of the modal block of body f, and K of its modes; whether all pivots are sound."""
-    body = d.flexes[f]
-    begin, end = body.c0, body.c0 + body.n_modes
-    sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, begin, end, MASSLESS_ARTICULATED)
-    for k in range(begin, end):
-        row, gain = d.envelope[k], d.gain[k]
-        moment, force = gain.moment, gain.force
-        for j in range(row.first, k):
-            before, value = d.gain[j], -d.mass[row.origin + j]
-            moment, force = add(moment, scale(value, before.moment)), add(force, scale(value, before.force))
-        inverse = d.mass[row.origin + k]
-        gain.moment, gain.force = scale(inverse, moment), scale(inverse, force)
-    return sound
-
-
-@kernel
 def reduce(d, i):
     """Take the modes of link i and the coordinates of its joint out of its inertia and pass the rest to its parent.
 
@@ -226,7 +164,7 @@ def reduce(d, i):
         A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
         M, F = add(M, body.moment), add(F, body.force)
     if link.flex >= 0:
-        sound = factor_modes(d, link.flex)
+        sound = factor_modes(d, link.flex, MASSLESS_ARTICULATED)
         M, F = forward_modes(d, link.flex, d.at_force, M, F)
         first = d.flexes[link.flex].c0
         for k in range(first, first + d.flexes[link.flex].n_modes):
@@ -307,11 +245,7 @@ def carried(d, i, b):
         above = d.articulated[link.parent]
         angular, linear = above.angular, above.linear
         if link.carried_by >= 0:
-            port = d.ports[link.carried_by]
-            n, c = moving(d.flexes[port.flex])
-            for j in range(n):
-                local, value = d.local[port.column + j], d.w[b + c + j]
-                angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
+            angular, linear = at_port(d, link.carried_by, b, angular, linear)
         linear = add(linear, cross(angular, d.articulated[i].arm))
     return angular, linear
 
@@ -332,18 +266,8 @@ def backward(d, b):
                 d.w[b + k] = value
                 angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
         if link.flex >= 0:
-            first = d.flexes[link.flex].c0
-            end = first + d.flexes[link.flex].n_modes
-            for k in range(first, end):
-                d.w[b + k] -= dot(d.gain[k].moment, angular) + dot(d.gain[k].force, linear)
-            envelope.backward(d.h, d.at_envelope, d.w, d.at_mass, first, end, b)
+            backward_modes(d, link.flex, b, angular, linear)
         body.angular, body.linear = angular, linear
-
-
-@kernel
-def n_shapes(d, path):
-    """How many moving shapes the link of a row of PATHS has."""
-    return moving(d.flexes[d.links[path.link].flex])[0] if path.shapes >= 0 else 0
 
 
 @kernel
@@ -356,8 +280,8 @@ def spread(d, c):
             path = d.paths[e]
             none = d.transmitted[path.link]
             none.moments, none.forces = NONE, NONE
-            for j in range(n_shapes(d, path)):
-                put(d.spread, start + 3 * (path.shapes + j), at(d.jacobian, start + 3 * (path.shapes + j)))
+            if path.shapes >= 0:
+                begin_shapes(d, path, start)
         for e in range(closure.path0, closure.path0 + closure.n_path):
             path = d.paths[e]
             link, moments, forces = (
@@ -365,16 +289,8 @@ def spread(d, c):
                 d.transmitted[path.link].moments,
                 d.transmitted[path.link].forces,
             )
-            for j in range(n_shapes(d, path)):
-                n, c = moving(d.flexes[link.flex])
-                first, gain, row = start + 3 * path.shapes, d.gain[c + j], d.envelope[c + j]
-                values = at(d.spread, first + 3 * j)
-                for k in range(max(row.first - c, 0), j):
-                    values = sub(values, scale(d.mass[row.origin + c + k], at(d.spread, first + 3 * k)))
-                values = scale(d.mass[row.origin + c + j], values)
-                put(d.spread, first + 3 * j, values)
-                moments = add9(moments, outer(1.0, gain.moment, values))
-                forces = add9(forces, outer(1.0, gain.force, values))
+            if path.shapes >= 0:
+                moments, forces = spread_shapes(d, path, start, moments, forces)
             if path.slot >= 0:
                 for k in range(link.n_speeds):
                     local, gain, place = d.local[link.c0 + k], d.gain[link.c0 + k], start + 3 * (path.slot + k)
@@ -389,29 +305,7 @@ def spread(d, c):
                 above.moments = add9(above.moments, moments)
                 above.forces = add9(above.forces, forces)
                 if path.carrier >= 0:
-                    port = d.ports[link.carried_by]
-                    n, c = moving(d.flexes[port.flex])
-                    for j in range(n):
-                        local, place = d.local[port.column + j], start + 3 * (path.carrier + j)
-                        against = add(turn_back(moments, local.angular), turn_back(forces, local.linear))
-                        put(d.spread, place, sub(at(d.spread, place), against))
-
-
-@kernel
-def deforming(d, f, b, angular, linear):
-    """The acceleration of the frame of body f, whose modes have those in w from index b, from that of its joint's; and
-    the wrench that its deformation needs."""
-    body, moment, force = d.flexes[f], ZERO, ZERO
-    for k in range(body.c0, body.c0 + body.n_modes):
-        value, momentum = d.w[b + k], d.momenta[k]
-        turning, pushing = momentum.angular, momentum.linear
-        if body.inboard:
-            turning, pushing = d.deformation[k].angular, d.deformation[k].linear
-            if k >= body.c0 + body.n_held:
-                local = d.local[k]
-                angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
-        moment, force = add(moment, scale(value, turning)), add(force, scale(value, pushing))
-    return angular, linear, moment, force
+                    push_shapes(d, link.carried_by, start + 3 * path.carrier, moments, forces)
 
 
 @kernel
