@@ -83,7 +83,7 @@ def forward_modes(d, f, b, moment, force):
 
 @kernel
 def factor_modes(d, f, least):
-    """The factor of the modal block of body f, and K of its modes; whether no pivot is below that fraction of its diagonal."""
+    """The factor of the modal block of body f, and K of its modes; whether pivots exceed a fraction of the diagonal."""
     body = d.flexes[f]
     begin, end = body.c0, body.c0 + body.n_modes
     sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, begin, end, least)
