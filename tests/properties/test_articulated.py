@@ -388,3 +388,10 @@ def test_the_depth_of_the_tree_decides() -> None:
         for source in (sources.sources(parts, Scheme("dop853")) | sources.kernels(parts)).values():
             assert ("articulated" in source) <= deep
             assert ("composite" in source) <= (not deep)
+
+
+def test_shapes_on_the_way_to_the_ground_count_as_depth() -> None:
+    """Modes of one body do not count for each other: a single one is shallow, however many it has."""
+    for references, deep in (((MANY,), False), ((FREE,) * 3, False), ((FREE,) * 8, True), ((None,) * 8, False)):
+        scene = Scene.model_validate(bending(references))
+        assert tabulate(build(scene, reduced(scene))).parts.articulated == deep

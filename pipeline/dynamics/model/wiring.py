@@ -88,7 +88,7 @@ def closures(
     entries: list[tuple[int, ...]] = []
     known: list[tuple[int, ...]] = []
     supports: list[list[int]] = []
-    paths: list[tuple[int, int]] = []
+    paths: list[tuple[int, ...]] = []
     row0 = jacobian0 = 0
     for new, old in enumerate(order):
         (a, b), coupling = ends[old][0], old - len(site_pairs) if old >= len(site_pairs) else -1
@@ -120,7 +120,7 @@ def closures(
     return tables, np.array(order, dtype=np.int64)
 
 
-def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tuple[int, int]]:
+def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tuple[int, ...]]:
     """Rows of the table PATHS between the ground and some sites; slots: coordinates of the closure's support."""
     links: set[int] = set()
     for site in sites:
