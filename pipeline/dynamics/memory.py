@@ -182,7 +182,8 @@ MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: index i
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
-#: rows of the mass matrix. first: column; origin: index of column 0, which may lie before that of the first
+#: rows of the mass matrix, or of the modal blocks that articulated inertias factor; those have 1/sqrt(D) of a joint's
+#: coordinate as its row. first: column; origin: index of column 0, which may lie before that of the first
 ENVELOPE = wiring("first origin")
 #: threes: of rows that are solved for, which are adjacent in JACOBIAN and SPREAD and are worked on together; the
 #: last of them may end with zeros.  coupling: that this closure is, or -1; path0, n_path: of its links in PATHS
@@ -193,8 +194,9 @@ CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, 
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
 ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
 KNOWN_ENTRIES = wiring("closure drive column sign part")
-#: links between the ground and a closure's ends, leaves first; slot: of the first coordinate of the link's joint, or -1
-PATHS = wiring("link slot")
+#: links between the ground and a closure's ends, leaves first; slot, shapes, carrier: slots of the first coordinate of
+#: the link's joint, of its first moving shape, and of its parent's, or -1
+PATHS = wiring("link slot shapes carrier")
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
 CLOSURE_ENVELOPE = wiring("first origin")  # of the rows that are solved for
@@ -270,8 +272,8 @@ ARTICULATED = work(
 )
 #: of three closure rows at once: what a link transmits to its parent, a column each
 TRANSMITTED = work("moments:3x3 forces:3x3", "n_links")
-#: of each coordinate: its column about its link's origin, and the factor's K
-LOCAL, GAIN = work("angular:3 linear:3", "nv+n_drives"), work("moment:3 force:3", "nv")
+#: each column about its link's origin, and of each coordinate the factor's K
+LOCAL, GAIN = work("angular:3 linear:3", "columns"), work("moment:3 force:3", "nv")
 #: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _stretches(
     "bias:nv+n_drives modal_bias:nv modal:25*most_modes scratch:18 mass:mass_size force:nv residual:n_closure_rows "

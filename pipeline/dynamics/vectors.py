@@ -98,12 +98,6 @@ def dot_wrench(wrench, twist):
 
 
 @kernel
-def dot_momentum(momentum, twist):
-    """Product of two rows with an angular and a linear part."""
-    return dot(momentum.angular, twist.angular) + dot(momentum.linear, twist.linear)
-
-
-@kernel
 def add_wrench(row, moment, force):
     """Add to the moment and the force of a row."""
     row.moment = add(row.moment, moment)

@@ -10,6 +10,7 @@ from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics.compile import reach
 from flexclear.pipeline.dynamics.compile.sources import sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
+from flexclear.pipeline.dynamics.equations import composite
 from flexclear.pipeline.dynamics.integrate import NAMES
 from flexclear.pipeline.dynamics.integrate.method import keep_nothing
 from flexclear.stages import simulation
@@ -55,8 +56,8 @@ def test_events_at_step_ends_are_compiled_when_asked_for() -> None:
 def test_a_method_is_what_the_list_says(name: str) -> None:
     method, traits = lookup(PACKAGE, name, where="test"), INTEGRATORS[name]
     assert method.traits is traits
-    given = 3 if traits.reads_all else 2
-    _, _, error, _, keep = method.make_kernels(*[lambda *_: None] * given)
+    given = [lambda *_: None] * 2
+    _, _, error, _, keep = method.make_kernels(*given, *([(given[0], composite)] if traits.reads_all else []))
     assert (error is not None) is traits.estimates is (method.error_order > 0)
     # an implicit method remembers its polynomial or its slopes to predict by, a multistep one needs them
     assert (keep is not keep_nothing) is (traits.multistep or traits.implicit)

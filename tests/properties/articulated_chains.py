@@ -1,19 +1,24 @@
 """Chains and trees of rods, and their accelerations with either way of factoring the mass matrix, made in Python."""
 
+import json
+from functools import cache
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model import model as modelling
-from flexclear.pipeline.dynamics.model.arrays import WorkSpace
+from flexclear.pipeline.dynamics.model.arrays import WorkSpace, _work_lengths
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.specialise.trace import Trace
+from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import GRAVITY, Table, joint
 from tests.properties.test_specialised import keep_independent
 
@@ -24,13 +29,33 @@ ACROSS = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
 
 
 class Evaluated(NamedTuple):
-    """An evaluation. rates: of the state.  drives: forces of the drives.  report: n[EVALUATION]."""
+    """An evaluation, with what `tree_factor` reads of an engine.
+
+    rates: of the state.  drives: forces of the drives.  report: n[EVALUATION].  lengths: of what is in w.
+    """
 
     model: Model
     space: WorkSpace
     rates: np.ndarray
     drives: np.ndarray
     report: int
+    lengths: dict[int, int]
+
+    @property
+    def h(self) -> np.ndarray:
+        return self.space.h
+
+    @property
+    def w(self) -> np.ndarray:
+        return self.space.w
+
+    def stretch(self, index: int) -> np.ndarray:
+        return self.w[self.h[index] :][: self.lengths[index]]
+
+    view = stretch
+
+    def table(self, table: Any) -> np.ndarray:
+        return m.named(table, self.stretch(table.place))
 
 
 def rods(
@@ -78,11 +103,94 @@ def rods(
     }
 
 
+#: of a flexible rod of 0.3 m with frames at its ends and in its middle
+MESH, LENGTH = str(TREE / "meshes/checks/crank_rod.toml"), 0.3
+#: frames of a rod and where they are in it; those behind the first carry others, in turn
+PLACES = {"crank": 0.0, "slider": LENGTH, "middle": 0.5 * LENGTH}
+
+
+def bending(
+    references: tuple[Table | None, ...],
+    kinds: tuple[str, ...] = ("revolute",),
+    angles: tuple[float, ...] = (0.0,),
+    children: int = 1,
+    *,
+    closed: str = "",
+    driven: tuple[int, ...] = (),
+    friction: Table | None = None,
+    stiffening: bool = False,
+    **more: Any,
+) -> Table:
+    """A scene of rods at some angles in a plane, each of which carries so many others.
+
+    references: modes of each rod, None of a rigid one.  kinds: of joints, angles: of rods to x [rad], in turn.  closed:
+    the kind of joint by which the last rod is held at its end, too.  driven: rods whose joints have a drive.
+    """
+    body: Table = {"ground": {"type": "ground", "frames": {"base": {}}}}
+    joints: Table = {}
+    starts: list[np.ndarray] = []
+    turns = [angles[k % len(angles)] for k in range(len(references))]
+    for k, modes in enumerate(references):
+        above, (port, place) = (
+            (k - 1) // children if k else -1,
+            list(PLACES.items())[1 + (k - 1) % children if k else 0],
+        )
+        along = [np.array([np.cos(turns[i]), np.sin(turns[i]), 0.0]) for i in (above, k)]
+        starts.append(starts[above] + place * along[0] if k else np.zeros(3))
+        pose = {"position": starts[k].tolist(), "axes": {"z": [0.0, 0.0, 1.0], "x": along[1].tolist()}}
+        if modes is None:
+            frames = {name: {"position": [at, 0.0, 0.0]} for name, at in PLACES.items()}
+            body[f"rod{k}"] = {
+                "type": "rigid",
+                "mass": 0.15,
+                "com": [0.14, 0.01, -0.02],
+                "frames": frames,
+                "pose": pose,
+            }
+            body[f"rod{k}"]["inertia"] = [2e-4, 1.2e-3, 1.1e-3]
+        else:
+            body[f"rod{k}"] = {"type": "flexible", "mesh": MESH, "modes": modes, "pose": pose}
+            if stiffening:
+                body[f"rod{k}"]["stiffening"] = {}
+        extra = {"friction": friction} if friction else {}
+        carrier = f"rod{above}.{port}" if k else "ground.base"
+        joints[f"joint{k}"] = joint(kinds[k % len(kinds)], carrier, f"rod{k}.crank", **extra)
+    if closed:
+        body["ground"]["frames"]["far"] = {"position": (starts[-1] + LENGTH * along[1]).tolist()}
+        joints["closing"] = joint(closed, f"rod{len(references) - 1}.slider", "ground.far")
+    laws = [{"type": "polynomial", "coefficients": [b - a, 0.3, 0.2]} for a, b in pairwise([0.0, *turns])]
+    return {
+        "title": "bending rods",
+        "body": body,
+        "joint": joints,
+        "drive": {f"drive{k}": {"joint": f"joint{k}", "law": laws[k]} for k in driven},
+        "load": {"gravity": {"type": "gravity", "acceleration": [2.0, -9.81, 1.0]}},
+        "time": {"end": 0.05},
+        "output": {"interval": 0.01},
+        **more,
+    }
+
+
+@cache
+def _bundle(modes: str, stiffening: bool) -> xr.Dataset:
+    """The reduced flexible rod, made once for as many rods as have such modes."""
+    table = bending((json.loads(modes),), stiffening=stiffening)
+    return bundles(Scene.model_validate(table))["rod0"]
+
+
+def reduced(scene: Scene) -> dict[str, xr.Dataset]:
+    """The flexible bodies of a scene of `bending`."""
+    return {
+        name: _bundle(body.modes.model_dump_json(exclude_none=True), body.stiffening is not None)
+        for name, body in scene.flexible().items()
+    }
+
+
 def tabulated(monkeypatch: pytest.MonkeyPatch, scene: Scene, articulated: bool) -> Model:
     """The model with a given way of factoring the mass matrix."""
     with monkeypatch.context() as patch:
         patch.setattr(modelling, "articulated", lambda numbering: articulated)
-        return tabulate(build(scene, {}))
+        return tabulate(build(scene, reduced(scene)))
 
 
 def right_hand_side(model: Model) -> Any:
@@ -104,6 +212,8 @@ def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any
     start[model.speeds] += speeds * random.normal(size=model.nv)
     if turns:
         start[: model.nq] += turns * random.normal(size=model.nq)
+    for link, modes in model.numbering.modal_positions.items():  # a millimetre or so
+        start[modes] = 1e-3 * model.links[link].mass ** 0.5 * random.normal(size=len(modes))
     w = space.w.astype(number)
     w[y : y + model.ny], n[n[m.MODE] :] = start, 1
     w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
@@ -116,7 +226,8 @@ def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any
     keep_independent(model, h, y, dy, w.copy(), n.copy(), rates)
     rates(h.tolist(), f.astype(number), w, n, y, dy)
     drives = w[h[m.DRIVE_FORCE] :][: model.arrays.size(m.N_DRIVES)]
-    return Evaluated(model, space._replace(w=w), w[dy : dy + model.ny], drives, int(n[m.EVALUATION]))
+    lengths = _work_lengths(h, m.Room(2, 0, 0), model.arrays.columns)
+    return Evaluated(model, space._replace(w=w), w[dy : dy + model.ny], drives, int(n[m.EVALUATION]), lengths)
 
 
 class Long(Trace):

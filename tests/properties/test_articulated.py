@@ -1,14 +1,25 @@
 """Articulated inertias give what the mass matrix gives, in linear time and without its loss of digits."""
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.flexible import flexible_bodies
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.effects import Scheme
+from flexclear.pipeline.dynamics.equations import articulated, composite
+from flexclear.pipeline.dynamics.equations.closures import make_closing
+from flexclear.pipeline.dynamics.equations.projection import make_stiffen
+from flexclear.pipeline.dynamics.fields import data
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.model import selection
+from flexclear.pipeline.dynamics.model.interface_basis import modes_of
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
@@ -17,10 +28,15 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.dynamics.specialise import straight
+from flexclear.pipeline.dynamics.specialise.trace import Trace
+from flexclear.pipeline.dynamics.specialise.wiring import wiring
 from tests.analytic.mechanism_runs import TREE
-from tests.properties.articulated_chains import Evaluated, evaluated, rods, tabulated
+from tests.properties import tapes
+from tests.properties.articulated_chains import Evaluated, Long, bending, evaluated, reduced, rods, tabulated
 from tests.properties.mechanisms import Table
 from tests.properties.test_closure_rows import dense_factor
+from tests.properties.test_specialised import description_kernel, rates_kernel
 
 #: of the largest; the mass matrix of the chains here has a condition of 1e5 at most, of which 2e-12 was left
 ROUNDING = 1e-9
@@ -34,6 +50,39 @@ TREES: dict[str, Table] = {
     "free": rods(6, ("free", "revolute", "fixed")),
     "driven joints": rods(9, ("revolute", "prismatic"), driven=(0, 3, 4)),
     "driven hinges among balls": rods(7, ("spherical", "revolute"), driven=(1, 3)),
+}
+#: modes of flexible rods that move both ends, one of them, and none
+BOTH, ONE, NONE = (
+    {"reference": "craig-bampton", "count": 6},
+    {"reference": "cantilever", "count": 4, "interfaces": ["crank"]},
+    {"reference": "pinned-pinned", "count": 4},
+)
+FREE, FIXED, MANY = (
+    {"reference": "free-free", "count": 2},
+    {"reference": "fixed-fixed", "count": 2},
+    {"reference": "craig-bampton", "count": 15},
+)
+UP_AND_DOWN = (0.9, -0.6, 0.2)
+RUBBING = {
+    **{"law": "modified-coulomb", "static": 0.2, "dynamic": 0.15},
+    **{"v_static": 5e-3, "v_dynamic": 0.015, "radius": 0.01},
+}
+#: flexible rods of all kinds of modes, with rigid ones between
+BENT: dict[str, Table] = {
+    "chain of three kinds": bending((BOTH, ONE, NONE), angles=UP_AND_DOWN),
+    "free and fixed modes": bending((FREE, FIXED, FREE), ("spherical", "revolute"), UP_AND_DOWN),
+    "held shapes": bending((MANY, MANY), ("spherical",), UP_AND_DOWN),
+    "rigid rods between": bending((None, ONE, None, None, FREE, None), ("revolute", "spherical"), UP_AND_DOWN),
+    "branches": bending((FREE, None, ONE, BOTH, FREE, None, NONE), ("spherical",), UP_AND_DOWN, children=2),
+    "floating": bending((FREE, ONE), ("free", "fixed")),
+    "driven": bending((FREE, ONE, None, NONE), ("revolute",), UP_AND_DOWN, driven=(0, 2)),
+    "stiffened": bending((ONE, FREE, ONE), ("revolute",), UP_AND_DOWN, stiffening=True),
+    "loop": bending((FREE, None, ONE, BOTH), ("spherical", "revolute"), UP_AND_DOWN, closed="spherical"),
+    "held shapes in a loop": bending((MANY, None, MANY), ("revolute",), UP_AND_DOWN, closed="spherical"),
+    "driven loop": bending((FREE, None, ONE), ("revolute",), UP_AND_DOWN, closed="spherical", driven=(0,)),
+    "redundant rows": bending((None, NONE, None), ("revolute",), UP_AND_DOWN, closed="revolute"),
+    "friction": bending((FREE, None, ONE), ("revolute",), UP_AND_DOWN, friction=RUBBING, driven=(0,)),
+    "friction in a loop": bending((FREE, None, ONE), ("revolute",), UP_AND_DOWN, closed="spherical", friction=RUBBING),
 }
 #: loops, couplings, redundant rows, contacts that are closed, stops, friction in joints
 SCENES = (
@@ -73,6 +122,132 @@ def test_scenes_move_as_with_the_mass_matrix(name: str, monkeypatch: pytest.Monk
     assert apart(one.drives, other.drives) < ROUNDING
     spread = [way.space.w[way.space.h[m.SPREAD] :][: way.space.h[m.JACOBIAN_SIZE]] for way in (one, other)]
     assert apart(*spread) < ROUNDING
+
+
+@pytest.mark.parametrize("name", BENT)
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_flexible_bodies_move_as_with_the_mass_matrix(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half-solved closure rows, accelerations, powers and drives; mass matrix and bias in full."""
+    one, other = both(monkeypatch, Scene.model_validate(BENT[name]))
+    speeds = one.model.speeds
+    for part in (speeds, slice(speeds.stop, None)):
+        assert apart(one.rates[part], other.rates[part]) < ROUNDING
+    assert apart(one.drives, other.drives) < ROUNDING
+    assert one.model.arrays.size(m.N_CLOSURES) == int("closing" in BENT[name]["joint"])
+    assert apart(one.stretch(m.SPREAD), other.stretch(m.SPREAD)) < ROUNDING
+    L = mass_factor(cast("Engine", one))
+    known = dense_factor(other.model.arrays.table(m.ENVELOPE), other.stretch(m.MASS))
+    assert np.array_equal(L, np.tril(L))
+    assert apart(L, known) < ROUNDING
+    assert apart(bias(cast("Engine", one)), other.stretch(m.BIAS)[: one.model.nv]) < 1e-12  # a hundred sums
+
+
+def probed(found: Evaluated) -> list[np.ndarray]:
+    """What else reads the factors: L^-1 and L^-T of some forces, power of the drives, and the correction that closes
+    loops with the modes' stiffness next to their mass."""
+    tree, model = (articulated if found.model.parts.articulated else composite), found.model
+    forward, backward, drive_power, closing = tree.forward, tree.backward, tree.drive_power, make_closing(tree)
+    stiffen, correction = make_stiffen(closing, tree, flexible_bodies()), closing.correction
+
+    @kernel
+    def half(h, f, w, n):
+        d = data(h, f, w, n)
+        forward(d, d.at_correction)
+
+    @kernel
+    def other_half(h, f, w, n):
+        d = data(h, f, w, n)
+        backward(d, d.at_correction)
+
+    @kernel
+    def power(h, f, w, n):
+        d = data(h, f, w, n)
+        d.last_pivot = drive_power(d, d.at_correction, d.at_u)
+
+    @kernel
+    def close(h, f, w, n):
+        d = data(h, f, w, n)
+        stiffen(d)
+        correction(d, d.at_residual, d.at_correction)
+
+    w, made, at = found.w.copy(), list[np.ndarray](), int(found.h[m.CORRECTION])
+    pivot, step = slice(int(found.h[m.PIVOT]), int(found.h[m.PIVOT]) + 1), slice(at, at + model.nv)
+    w[step] = np.random.default_rng(3).normal(size=model.nv)
+    for made_of, place in ((half, step), (other_half, step), (power, pivot), (close, step)):
+        Trace(0).plain(made_of)(found.h.tolist(), model.arrays.f, w, found.space.n)
+        made.append(w[place].copy())
+    return made
+
+
+@pytest.mark.parametrize("name", ["branches", "driven", "held shapes", "loop", "held shapes in a loop", "driven loop"])
+def test_projection_and_exponential_steps_read_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for one, other in zip(*map(probed, both(monkeypatch, Scene.model_validate(BENT[name]))), strict=True):
+        assert apart(one, other) < ROUNDING
+    assert bool(np.any(other)) == ("loop" in name)  # in the end: what closes loops
+
+
+def mass_by_energy(found: Evaluated) -> np.ndarray:
+    """Mass matrix of the state's speeds by the kinetic energies of motions, which no factor has a part in."""
+    model, h, w = found.model, found.h, found.w.astype(np.longdouble)
+    plain, u = Long(0).plain(description_kernel(model)), slice(int(h[m.U]), int(h[m.U]) + len(found.stretch(m.U)))
+
+    def energy(speeds: np.ndarray) -> Any:
+        w[u] = speeds
+        plain(h.tolist(), model.arrays.f.astype(np.longdouble), w, found.space.n)
+        return sum(w[int(h[m.ENERGY.place]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
+
+    units = np.eye(len(found.stretch(m.U)))[: model.nv]
+    alone = [energy(unit) for unit in units]
+    M = np.diag([2.0 * one for one in alone])
+    for i in range(model.nv):
+        for j in range(i):
+            M[i, j] = M[j, i] = energy(units[i] + units[j]) - alone[i] - alone[j]
+    return M.astype(float)
+
+
+@pytest.mark.parametrize("name", ["chain of three kinds", "branches", "driven", "stiffened", "loop"])
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_flexible_bodies_have_the_mass_that_their_energy_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And accelerations of a dense solve by it, with the closures' rows."""
+    one, other = both(monkeypatch, Scene.model_validate(BENT[name]))
+    M, modes, speeds = mass_by_energy(one), modes_of(one.model.arrays), one.model.speeds
+    L = modes @ mass_factor(cast("Engine", one))
+    assert apart(L @ L.T, M) < 1e-12  # differences of energies in extended precision
+    J = selection.dense(one.model, one.h, one.stretch(m.JACOBIAN)) @ modes.T
+    gamma = one.stretch(m.GAMMA)[selection.kept_places(one.model, one.h)]
+    full = np.block([[M, J.T], [J, np.zeros((len(J),) * 2)]])
+    forces = np.concatenate([-modes @ other.stretch(m.BIAS)[: one.model.nv], gamma])
+    expected = np.linalg.solve(full, forces)[: one.model.nv]
+    assert apart(one.rates[speeds], expected) < ROUNDING
+
+
+@pytest.mark.parametrize("name", ["branches", "held shapes in a loop", "driven loop", "stiffened"])
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_straight_code_of_flexible_bodies_computes_what_kernels_do(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(straight, "LONGEST", 200_000)
+    found = evaluated(tabulated(monkeypatch, Scene.model_validate(BENT[name]), True))
+    model, h, w, n = found.model, found.h, found.w.copy(), found.space.n.copy()
+    y, dy = int(h[m.Y]), int(h[m.SLOPES])
+    w[dy : dy + model.ny] = 0.0
+    tape = straight.program(rates_kernel(model), wiring(model.arrays, h))
+    tapes.run(tape, h, {"f": model.arrays.f, "w": w, "n": n}, y, dy)
+    assert apart(w[dy : dy + model.ny], found.rates) < ROUNDING
+
+
+def test_rounding_does_not_grow_with_the_number_of_flexible_rods(monkeypatch: pytest.MonkeyPatch) -> None:
+    """40 rods, against the same kernels in extended precision."""
+    model = tabulated(monkeypatch, Scene.model_validate(bending((FREE,) * 40, angles=UP_AND_DOWN)), True)
+    found, exact = (evaluated(model, number=number) for number in (float, np.longdouble))
+    assert apart(found.rates[model.speeds], exact.rates[model.speeds].astype(float)) < 1e-12  # measured 9e-15
+
+
+def test_energy_of_a_swinging_chain_of_flexible_rods_stays() -> None:
+    """Eight rods let go at once, 0.05 s: by the depth of the tree, without being asked."""
+    scene = Scene.model_validate(bending((FREE,) * 8, angles=UP_AND_DOWN, solver={"rtol": 1e-10}))
+    assert tabulate(build(scene, reduced(scene))).parts.articulated
+    made = dynamics.simulate(scene, reduced(scene), silent)
+    moved = float(np.ptp(made.potential.values))
+    assert float(np.abs(made.energy_error).max()) < 1e-7 * moved
 
 
 def plane_accelerations(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
@@ -207,9 +382,16 @@ def test_factor_and_bias_in_full_are_those_of_the_mass_matrix(monkeypatch: pytes
 
 def test_the_depth_of_the_tree_decides() -> None:
     """Only the way that a mechanism takes is composed."""
-    for count, articulated in ((10, False), (20, True)):
+    for count, deep in ((10, False), (20, True)):
         parts = tabulate(build(Scene.model_validate(rods(count)), {})).parts
-        assert parts.articulated == articulated
+        assert parts.articulated == deep
         for source in (sources.sources(parts, Scheme("dop853")) | sources.kernels(parts)).values():
-            assert ("articulated" in source) <= articulated
-            assert ("composite" in source) <= (not articulated)
+            assert ("articulated" in source) <= deep
+            assert ("composite" in source) <= (not deep)
+
+
+def test_shapes_on_the_way_to_the_ground_count_as_depth() -> None:
+    """Modes of one body do not count for each other: a single one is shallow, however many it has."""
+    for references, deep in (((MANY,), False), ((FREE,) * 3, False), ((FREE,) * 8, True), ((None,) * 8, False)):
+        scene = Scene.model_validate(bending(references))
+        assert tabulate(build(scene, reduced(scene))).parts.articulated == deep

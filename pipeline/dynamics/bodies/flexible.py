@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from flexclear.pipeline.dynamics.bodies.interface import all_in_interface, deform, modal_rates
 from flexclear.pipeline.dynamics.bodies.modal_terms import (
     RATE,
-    body_mass_matrix,
-    carried,
+    make_carrying,
     modal_forces,
     of_mode,
     port_load,
@@ -85,11 +85,18 @@ class FlexibleBodies:
     energies: Callable
 
 
-def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
-    """The kernels of bodies with linear shapes, or with those that bending shortens (`effects.stiffening.bodies`)."""
+def flexible_bodies(shortening: Any = None) -> Callable[[Any], FlexibleBodies]:
+    """What makes the kernels of bodies with linear shapes, or with those that bending shortens
+    (`effects.stiffening.bodies`): of what factors the mass matrix, the module `articulated` or `composite`."""
+    return partial(_flexible_bodies, shortening)
+
+
+def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
     first_moment = straight if shortening is None else shortening.first_moment
     second_moment = straight if shortening is None else shortening.second_moment
-    site, inboard = make_ports(straight if shortening is None else shortening.at_port)
+    site, inboard = make_ports(straight if shortening is None else shortening.at_port, tree)
+    carried, body_mass_matrix = make_carrying(tree)
+    reference, demand_of = tree.origin, tree.demand_of
 
     @kernel
     def invariants(d, k):
@@ -160,8 +167,11 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
             d.modal[S + j], d.modal[S + n + j], d.modal[S + 2 * n + j] = angular
 
     @kernel
-    def shapes(d, k, R, p):
-        """Forces on the shapes of the interface basis, and the momentum that each one's rate carries."""
+    def shapes(d, k, R, p, moment, force):
+        """Forces on the shapes of the interface basis, and the momentum that each one's rate carries.
+
+        moment, force: that the body needs without modal accelerations, about what it is p from.
+        """
         body = d.flexes[k]
         n, c0, bias = body.n_modes, body.c0, 18 * body.n_modes
         T = bias + 4 * n
@@ -175,7 +185,7 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
             momentum.angular = add(angular, cross(p, linear))
             momentum.linear = linear
         if body.inboard:
-            carried(d, k)
+            carried(d, k, moment, force)
 
     @kernel
     def body_inertia(d, k):
@@ -185,10 +195,10 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         Source: Wang & Wang (2019), eqs. (9), (14), (15).
         """
         body, mass = d.flexes[k], d.flex_numbers[k].mass
-        frame, wrench = d.link_frames[body.link], d.wrench[body.link]
+        frame = d.link_frames[body.link]
         invariants(d, k)
         first, first_rate = sums(d, k)
-        R, p, J = frame.axes, frame.origin, tensor(d.scratch)
+        R, p, J = frame.axes, reference(d, body.link), tensor(d.scratch)
         omega, alpha, a = turn_back(R, frame.omega), turn_back(R, frame.alpha), turn_back(R, frame.acceleration)
         spatial(d.own[body.link], mass, p, turn(R, first), congruence(R, J))
         force = add(scale(mass, a), cross(alpha, first))
@@ -202,10 +212,11 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         D = at9(d.scratch, RATE)
         twice = add(scale(D[0] + D[4] + D[8], omega), scale(-1.0, turn_back(D, omega)))
         moment, force = add(moment, scale(2.0, twice)), turn(R, force)
-        wrench.moment, wrench.force = add(turn(R, moment), cross(p, force)), force
+        moment = add(turn(R, moment), cross(p, force))
+        demand_of(d, body.link, moment, force)
         modes(d, k, a, alpha, omega)
         stiffness(d, k)
-        shapes(d, k, R, p)
+        shapes(d, k, R, p, moment, force)
 
     @kernel
     def body_modal_inertia(d, k):

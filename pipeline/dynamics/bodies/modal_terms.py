@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from flexclear.pipeline.dynamics.bodies.rigid import carry
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
@@ -10,7 +13,6 @@ from flexclear.pipeline.dynamics.vectors import (
     at6,
     cross,
     dot,
-    dot_momentum,
     dot_wrench,
     scale,
     turn_symmetric,
@@ -54,23 +56,6 @@ def spatial(own, mass, p, c, J):
 
 
 @kernel
-def carried(d, k):
-    """Shapes that also move the body frame: their columns carry the body's own wrench and inertia."""
-    body = d.flexes[k]
-    own, wrench = d.own[body.link], d.wrench[body.link]
-    c, J, mass = own.moment, at6(own.inertia, 0), own.mass
-    for j in range(body.c0, body.c0 + body.n_modes):
-        column, momentum, deformation = d.columns[j], d.momenta[j], d.deformation[j]
-        # momentum of the deformation alone stays for the mass matrix
-        deformation.angular, deformation.linear = momentum.angular, momentum.linear
-        if j < body.c0 + body.n_held:
-            continue
-        d.modal_bias[j] += dot_wrench(wrench, column)
-        omega, v = column.angular, column.linear
-        add_twist(momentum, add(turn_symmetric(J, omega), cross(c, v)), add(scale(mass, v), cross(omega, c)))
-
-
-@kernel
 def stiffness(d, k):
     """Elastic and damping forces join those on the modes; the power lost to damping joins the ledger."""
     body = d.flexes[k]
@@ -84,21 +69,45 @@ def stiffness(d, k):
         d.ledger_rate[body.book] += damping * speed
 
 
-@kernel
-def body_mass_matrix(d, k):
-    """Own part of the modal block of the mass matrix, into the envelope; right after `inertia`."""
-    body = d.flexes[k]
-    n, c0, held = body.n_modes, body.c0, body.n_held
-    mass = body.interface0 + 3 * n
-    for i in range(n):
-        start = d.envelope[c0 + i].origin + c0
-        for j in range(0 if body.coupled and i >= held else i, i + 1):
-            value = d.interface_data[mass + i * n + j].value
-            if body.inboard and j >= held:
-                value += dot_momentum(d.momenta[c0 + i], d.columns[c0 + j])
-            if body.inboard and i >= held:
-                value += dot_momentum(d.columns[c0 + i], d.deformation[c0 + j])
-            d.mass[start + j] += value
+def make_carrying(tree: Any) -> tuple[Callable, Callable]:
+    """The kernels carried(d, k, moment, force) and body_mass_matrix(d, k), about what `tree` refers inertia to."""
+    column = tree.column
+
+    @kernel
+    def carried(d, k, moment, force):
+        """Shapes that also move the body frame: their columns carry the body's own wrench and inertia."""
+        body = d.flexes[k]
+        own = d.own[body.link]
+        c, J, mass = own.moment, at6(own.inertia, 0), own.mass
+        for j in range(body.c0, body.c0 + body.n_modes):
+            momentum, deformation = d.momenta[j], d.deformation[j]
+            # momentum of the deformation alone stays for the mass matrix
+            deformation.angular, deformation.linear = momentum.angular, momentum.linear
+            if j < body.c0 + body.n_held:
+                continue
+            omega, v = column(d, j)
+            d.modal_bias[j] += dot(moment, omega) + dot(force, v)
+            add_twist(momentum, add(turn_symmetric(J, omega), cross(c, v)), add(scale(mass, v), cross(omega, c)))
+
+    @kernel
+    def body_mass_matrix(d, k):
+        """Own part of the modal block of the mass matrix, into the envelope; right after `inertia`."""
+        body = d.flexes[k]
+        n, c0, held = body.n_modes, body.c0, body.n_held
+        mass = body.interface0 + 3 * n
+        for i in range(n):
+            start = d.envelope[c0 + i].origin + c0
+            for j in range(0 if body.coupled and i >= held else i, i + 1):
+                value = d.interface_data[mass + i * n + j].value
+                if body.inboard and j >= held:
+                    omega, v = column(d, c0 + j)
+                    value += dot(d.momenta[c0 + i].angular, omega) + dot(d.momenta[c0 + i].linear, v)
+                if body.inboard and i >= held:
+                    omega, v = column(d, c0 + i)
+                    value += dot(omega, d.deformation[c0 + j].angular) + dot(v, d.deformation[c0 + j].linear)
+                d.mass[start + j] += value
+
+    return carried, body_mass_matrix
 
 
 @kernel

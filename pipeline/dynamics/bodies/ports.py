@@ -7,6 +7,7 @@ in full, so that angular velocity and energy agree to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from flexclear.pipeline.dynamics.bodies.modal_terms import of_mode
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -33,8 +34,12 @@ def moving(body):
     return body.n_modes - body.n_held, body.c0 + body.n_held
 
 
-def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
-    """The kernels `site` and `inboard`; shortening(d, p, j, vector, first) is what bending adds along x, or zero."""
+def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
+    """The kernels `site` and `inboard`; shortening(d, p, j, vector, first) is what bending adds along x, or zero.
+
+    tree: what factors the mass matrix, and may need columns about the origin of their link.
+    """
+    localise_shape, shift = tree.localise_shape, tree.shift
 
     @kernel
     def relative_motion(d, p):
@@ -63,10 +68,11 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
         return local, turned, tangent(theta, theta_rate), s_rate, alpha, s_acc, theta
 
     @kernel
-    def modal_columns(d, p, R, origin, theta, sign, first):
+    def modal_columns(d, p, R, origin, arm, theta, sign, first, base):
         """Twist of port p's frame relative to the body, per rate of a moving shape, about the kernels' origin.
 
-        Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port.
+        Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port, which arm
+        leads to from the link's origin.  base: first of the columns to which they are added about that, or -1.
         """
         port = d.ports[p]
         n, c = moving(d.flexes[port.flex])
@@ -77,6 +83,7 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
             angular = scale(sign, turn(spin, of_mode(d.port_data, port.shapes + 3 * n, n, j)))
             linear = scale(sign, turn(R, bent))
             add_twist(d.columns[first + j], angular, add(linear, cross(origin, angular)))
+            localise_shape(d, first + j, base + j if base >= 0 else -1, angular, add(linear, cross(arm, angular)))
 
     @kernel
     def site(d, s):
@@ -99,7 +106,7 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
             column, of_body = d.columns[port.column + j], d.columns[c + j]
             column.angular = of_body.angular if body.inboard else ZERO
             column.linear = of_body.linear if body.inboard else ZERO
-        modal_columns(d, p, R, origin, theta, 1.0, port.column)
+        modal_columns(d, p, R, origin, arm, theta, 1.0, port.column, c if body.inboard else -1)
         return arm
 
     @kernel
@@ -113,6 +120,7 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
             arm = turn(R_WB, d.port_numbers[p].origin)
             swing = cross(omega, arm)
             a_B = sub(a, add(cross(alpha, arm), cross(omega, swing)))
+            shift(d, i, arm)
             return sub(origin, arm), R_WB, omega, sub(v, swing), alpha, a_B
         local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(d, p)
         R_WB = product(R, transpose(turned))
@@ -127,7 +135,8 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
         for j in range(n):
             column = d.columns[c + j]
             column.angular, column.linear = ZERO, ZERO
-        modal_columns(d, p, R_WB, origin, theta, -1.0, c)
+        shift(d, i, arm)
+        modal_columns(d, p, R_WB, origin, arm, theta, -1.0, c, -1)
         return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B
 
     return site, inboard

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
-    ZERO,
     add,
     add_wrench,
     at6,
@@ -45,26 +47,19 @@ def demand(d, i):
     return mass, arm, J, add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega))), scale(mass, a)
 
 
-@kernel
-def inertia(d, i):
-    """Spatial inertia of link i and the wrench on it, about the kernels' origin (OWN, WRENCH)."""
-    mass, arm, J, moment, force = demand(d, i)
-    c, wrench = add(d.link_frames[i].origin, arm), d.wrench[i]
-    spatial(d.own[i], mass, c, J)
-    wrench.moment, wrench.force = add(moment, cross(c, force)), force
+def make_inertia(tree: Any) -> Callable:
+    """The kernel inertia(d, i): spatial inertia of link i (OWN) and the wrench that it needs, about what `tree` refers
+    them to: the kernels' origin, or the link's own, far from which both lose digits."""
+    origin, demand_of = tree.origin, tree.demand_of
 
+    @kernel
+    def inertia(d, i):
+        mass, arm, J, moment, force = demand(d, i)
+        c = add(origin(d, i), arm)
+        spatial(d.own[i], mass, c, J)
+        demand_of(d, i, add(moment, cross(c, force)), force)
 
-@kernel
-def inertia_about_itself(d, i):
-    """The same about the link's origin (OWN, ARTICULATED): far from the kernels' origin both lose digits there.
-
-    The wrench about the kernels' origin is then that of all else that acts on the link.
-    """
-    mass, arm, J, moment, force = demand(d, i)
-    wrench, body = d.wrench[i], d.articulated[i]
-    spatial(d.own[i], mass, arm, J)
-    body.own_moment, body.own_force = add(moment, cross(arm, force)), force
-    wrench.moment, wrench.force = ZERO, ZERO
+    return inertia
 
 
 @kernel

@@ -194,7 +194,7 @@ def _project(parts: Parts) -> str:
     _close(file)
     if parts.flexible:
         stiffen = file.take(f"{DYNAMICS}.equations.projection", "make_stiffen")
-        file.given["stiffen"] = f"{stiffen}({file.given['closures']})"
+        file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {_flexible(file)})"
         file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
     maker = file.take(f"{DYNAMICS}.equations.projection", "make_projection")
     return _text(file, f"projection with {', '.join(parts.joints)}", "projection", maker, PROJECT)
@@ -251,7 +251,7 @@ def _steps(parts: Parts, scheme: Scheme) -> Composition:
         "method": file.take(module, method),
     }
     if integrators.INTEGRATORS[scheme.integrator].reads_all:
-        file.given["complete"] = "calls.evaluate"
+        file.given["complete"] = f"(calls.evaluate, {file.tree})"
     events = _events(file, scheme)
     if events:
         file.given["events"] = events
@@ -286,7 +286,7 @@ def _forces(parts: Parts) -> Composition:
     """What acts in the mechanism: joints, flexible bodies, contacts, loads."""
     file = _joints(parts)
     if parts.flexible:
-        file.given["flexible"] = f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
+        file.given["flexible"] = _flexible(file)
     if parts.surfaces:
         surfaces = file.family(SURFACES, parts.surfaces)
         maker, frictions = (
@@ -299,6 +299,11 @@ def _forces(parts: Parts) -> Composition:
         file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
     file.add_effects("forces")
     return file
+
+
+def _flexible(file: Composition) -> str:
+    """What makes the kernels of the flexible bodies, unless an effect brings more."""
+    return f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
 
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:

@@ -9,6 +9,8 @@ and what is left joins the parent's inertia. This is the Cholesky factor of the 
 :math:`L_{jk} = s_j\cdot K_k` for k beyond j, without the matrix: it never adds up the inertia of all that a coordinate
 moves, which loses the digits of M's condition number. All vectors of a link refer to its own origin.
 
+The modes of a flexible link come before the coordinates of its joint (`equations.articulated_modes`).
+
 Source: Rodriguez, Jain & Kreutz-Delgado (1991), International Journal of Robotics Research 10, 371-381 (innovations
 factorisation); Featherstone (2008), *Rigid Body Dynamics Algorithms*, ch. 7.
 """
@@ -20,7 +22,20 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.equations.articulated_modes import (
+    at_port,
+    backward_modes,
+    begin_modes,
+    begin_shapes,
+    deforming,
+    factor_modes,
+    forward_modes,
+    load_modes,
+    outer,
+    push_modes,
+    push_shapes,
+    spread_shapes,
+)
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
@@ -46,21 +61,32 @@ from flexclear.pipeline.dynamics.vectors import (
 MASSLESS_ARTICULATED = 1e-14
 
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-#: what gives `forces` the inertia of a rigid link: about its own origin
-rigid_inertia = rigid.inertia_about_itself
+
+
+@kernel
+def origin(d, i):
+    """What the inertia of link i refers to is its own origin, far from which it loses digits."""
+    return ZERO
+
+
+@kernel
+def demand_of(d, i, moment, force):
+    """Store the wrench that the accelerations of link i need; WRENCH then is that of all else that acts on it."""
+    wrench, body = d.wrench[i], d.articulated[i]
+    body.own_moment, body.own_force = moment, force
+    wrench.moment, wrench.force = ZERO, ZERO
+
+
+@kernel
+def column(d, k):
+    """Return angular and linear part of a column about the origin of its link."""
+    return d.local[k].angular, d.local[k].linear
 
 
 @kernel
 def skewed(v):
     """Return the matrix of v x."""
     return (0.0, -v[2], v[1], v[2], 0.0, -v[0], -v[1], v[0], 0.0)
-
-
-@kernel
-def outer(s, a, b):
-    """Return the matrix s a b^T."""
-    x, y, z = scale(s, a)
-    return (x * b[0], x * b[1], x * b[2], y * b[0], y * b[1], y * b[2], z * b[0], z * b[1], z * b[2])
 
 
 @kernel
@@ -93,14 +119,33 @@ def localise(d, k, angular, linear):
 
 
 @kernel
+def localise_shape(d, k, base, angular, linear):
+    """Store a shape's column about the origin of its link, with column `base` of the same shape unless that is -1."""
+    local = d.local[k]
+    local.angular, local.linear = angular, linear
+    if base >= 0:
+        local.angular, local.linear = add(d.local[base].angular, angular), add(d.local[base].linear, linear)
+
+
+@kernel
 def step(d, i, arm):
     """Store the way from the origin of link i's parent to its own; as a difference of positions it loses digits."""
     d.articulated[i].arm = arm
 
 
 @kernel
+def shift(d, i, arm):
+    """Take that way, and its joint's columns, from the joint's frame to link i's origin, from which arm leads there."""
+    link, body = d.links[i], d.articulated[i]
+    body.arm = sub(body.arm, arm)
+    for k in range(link.c0, link.c0 + link.n_speeds):
+        local = d.local[k]
+        local.linear = sub(local.linear, cross(local.angular, arm))
+
+
+@kernel
 def reduce(d, i):
-    """Take the coordinates of link i's joint out of its inertia and pass the rest to its parent.
+    """Take the modes of link i and the coordinates of its joint out of its inertia and pass the rest to its parent.
 
     Stores the factor's part of each coordinate (MASS: 1/sqrt(D), GAIN: K) and L^-1 of minus the bias (FORCE).  Returns
     whether all pivots are sound.
@@ -118,6 +163,15 @@ def reduce(d, i):
     if link.leaf == 0:
         A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
         M, F = add(M, body.moment), add(F, body.force)
+    if link.flex >= 0:
+        sound = factor_modes(d, link.flex, MASSLESS_ARTICULATED)
+        M, F = forward_modes(d, link.flex, d.at_force, M, F)
+        first = d.flexes[link.flex].c0
+        for k in range(first, first + d.flexes[link.flex].n_modes):
+            gain = d.gain[k]
+            A = less(A, outer_symmetric(1.0, gain.moment))
+            B = less9(B, outer(1.0, gain.moment, gain.force))
+            C = less(C, outer_symmetric(1.0, gain.force))
     if link.c0 < d.nv:
         for k in range(link.c0, link.c0 + link.n_speeds):
             gain, angular, linear = d.gain[k], d.local[k].angular, d.local[k].linear
@@ -144,6 +198,9 @@ def reduce(d, i):
         x, y, z = cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8]))
         A = add6(A, (x[0], y[1], z[2], y[0], z[0], z[1]))
         M = add(M, cross(a, F))
+        if link.carried_by >= 0:
+            load_modes(d, link.carried_by, A, B, C)
+            push_modes(d, link.carried_by, d.at_force, M, F)
         above = d.articulated[link.parent]
         if link.first == 0:
             A, B, C = add6(A, at6(above.turning, 0)), add9(B, above.mixed), add6(C, at6(above.moving, 0))
@@ -163,6 +220,8 @@ def forward(d, b):
         moment, force = ZERO, ZERO
         if link.leaf == 0:
             moment, force = body.moment, body.force
+        if link.flex >= 0:
+            moment, force = forward_modes(d, link.flex, b, moment, force)
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local, gain = d.local[k], d.gain[k]
@@ -171,33 +230,43 @@ def forward(d, b):
                 moment, force = add(moment, scale(value, gain.moment)), add(force, scale(value, gain.force))
         if link.parent > 0:
             above, moment = d.articulated[link.parent], add(moment, cross(body.arm, force))
+            if link.carried_by >= 0:
+                push_modes(d, link.carried_by, b, moment, force)
             if link.first == 0:
                 moment, force = add(moment, above.moment), add(force, above.force)
             above.moment, above.force = moment, force
 
 
 @kernel
-def carried(d, i):
-    """Return the acceleration of link i with its parent, about its own origin."""
-    angular, linear = ZERO, ZERO
-    if d.links[i].parent > 0:
-        above = d.articulated[d.links[i].parent]
-        angular, linear = above.angular, add(above.linear, cross(above.angular, d.articulated[i].arm))
+def carried(d, i, b):
+    """Return the acceleration of link i with its parent, about its own origin, at those in w from index b."""
+    link, angular, linear = d.links[i], ZERO, ZERO
+    if link.parent > 0:
+        above = d.articulated[link.parent]
+        angular, linear = above.angular, above.linear
+        if link.carried_by >= 0:
+            angular, linear = at_port(d, link.carried_by, b, angular, linear)
+        linear = add(linear, cross(angular, d.articulated[i].arm))
     return angular, linear
 
 
 @kernel
 def backward(d, b):
-    """L^-T applied to the vector in w from index b; leaves the accelerations of all links, about their origins."""
+    """L^-T applied to the vector in w from index b; leaves the accelerations of all links, about their origins.
+
+    Those of flexible links are as if they went rigidly with the frame of their joint.
+    """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
-        angular, linear = carried(d, i)
+        angular, linear = carried(d, i, b)
         if link.c0 < d.nv:
             for k in range(link.c0 + link.n_speeds - 1, link.c0 - 1, -1):
                 local, gain = d.local[k], d.gain[k]
                 value = d.mass[k] * (d.w[b + k] - dot(gain.moment, angular) - dot(gain.force, linear))
                 d.w[b + k] = value
                 angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
+        if link.flex >= 0:
+            backward_modes(d, link.flex, b, angular, linear)
         body.angular, body.linear = angular, linear
 
 
@@ -208,8 +277,11 @@ def spread(d, c):
     for t in range(closure.threes):
         start = closure.jacobian0 + 3 * t * closure.n_support
         for e in range(closure.path0, closure.path0 + closure.n_path):
-            none = d.transmitted[d.paths[e].link]
+            path = d.paths[e]
+            none = d.transmitted[path.link]
             none.moments, none.forces = NONE, NONE
+            if path.shapes >= 0:
+                begin_shapes(d, path, start)
         for e in range(closure.path0, closure.path0 + closure.n_path):
             path = d.paths[e]
             link, moments, forces = (
@@ -217,6 +289,8 @@ def spread(d, c):
                 d.transmitted[path.link].moments,
                 d.transmitted[path.link].forces,
             )
+            if path.shapes >= 0:
+                moments, forces = spread_shapes(d, path, start, moments, forces)
             if path.slot >= 0:
                 for k in range(link.n_speeds):
                     local, gain, place = d.local[link.c0 + k], d.gain[link.c0 + k], start + 3 * (path.slot + k)
@@ -227,8 +301,11 @@ def spread(d, c):
                     forces = add9(forces, outer(1.0, gain.force, values))
             if link.parent > 0:
                 above, lever = d.transmitted[link.parent], product(skewed(d.articulated[path.link].arm), forces)
-                above.moments = add9(above.moments, add9(moments, lever))
+                moments = add9(moments, lever)
+                above.moments = add9(above.moments, moments)
                 above.forces = add9(above.forces, forces)
+                if path.carrier >= 0:
+                    push_shapes(d, link.carried_by, start + 3 * path.carrier, moments, forces)
 
 
 @kernel
@@ -239,7 +316,7 @@ def transmit(d, b, biased):
     """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
-        angular, linear = carried(d, i)
+        angular, linear = carried(d, i, b)
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local = d.local[k]
@@ -247,11 +324,14 @@ def transmit(d, b, biased):
                 linear = add(linear, scale(d.w[b + k], local.linear))
         body.angular, body.linear = angular, linear
         own, wrench, p = d.own[i], d.wrench[i], d.link_frames[i].origin
+        turning, pushing = ZERO, ZERO
+        if link.flex >= 0:
+            angular, linear, turning, pushing = deforming(d, link.flex, b, angular, linear)
         moment = add(turn_symmetric(at6(own.inertia, 0), angular), cross(own.moment, linear))
         force = add(scale(own.mass, linear), cross(angular, own.moment))
         needed = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
-        body.moment = add(moment, scale(biased, needed))
-        body.force = add(force, scale(biased, add(body.own_force, wrench.force)))
+        body.moment = add(add(moment, turning), scale(biased, needed))
+        body.force = add(add(force, pushing), scale(biased, add(body.own_force, wrench.force)))
     for i in range(d.n_links - 1, 0, -1):
         link, body = d.links[i], d.articulated[i]
         if link.parent > 0:
@@ -269,17 +349,54 @@ def demand(d, j, b, biased):
 
 
 @kernel
+def along(d, k, i):
+    """What coordinate k of link i's joint must supply of what that joint transmits."""
+    local, body = d.local[k], d.articulated[i]
+    return dot(local.angular, body.moment) + dot(local.linear, body.force)
+
+
+@kernel
 def drive_forces(d):
     """Forces that the prescribed coordinates need: what their joints transmit at the accelerations in DU."""
     if d.n_drives == 0:
         return
     transmit(d, d.at_du, 1.0)
     for i in range(1, d.n_links):
-        link, body = d.links[i], d.articulated[i]
+        link = d.links[i]
         if link.c0 >= d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
-                local = d.local[k]
-                d.drive_force[k - d.nv] = dot(local.angular, body.moment) + dot(local.linear, body.force)
+                d.drive_force[k - d.nv] = along(d, k, i)
+
+
+@kernel
+def drive_power(d, b, motion):
+    """Power of the drives at accelerations in w from index b; motion: where w has the rates of all coordinates."""
+    power = 0.0
+    if d.n_drives > 0:
+        transmit(d, b, 0.0)
+        for i in range(1, d.n_links):
+            link = d.links[i]
+            if link.c0 >= d.nv:
+                for k in range(link.c0, link.c0 + link.n_speeds):
+                    power += along(d, k, i) * d.w[motion + k]
+    return power
+
+
+def make_again(flexible: Any) -> tuple[Callable, Callable]:
+    """The kernels unfactor(d), which leaves the modes' own mass so that they can get more, and refactor(d)."""
+    modal_mass, eliminate = flexible.mass_matrix, make_eliminate(flexible)
+
+    @kernel
+    def unfactor(d):
+        for k in range(d.mass_size):
+            d.mass[k] = 0.0
+        modal_mass(d)
+
+    @kernel
+    def refactor(d):
+        eliminate(d)
+
+    return unfactor, refactor
 
 
 def make_eliminate(flexible: Any = None) -> Callable:
@@ -288,6 +405,7 @@ def make_eliminate(flexible: Any = None) -> Callable:
     @kernel
     def eliminate(d):
         sound = True
+        begin_modes(d)
         for i in range(d.n_links - 1, 0, -1):
             sound = reduce(d, i) & sound
         return sound

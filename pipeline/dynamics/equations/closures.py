@@ -138,7 +138,7 @@ def couple_all(d):
         couple(d, p)
     for r in range(d.n_kept_rows):
         d.row_scale[d.n_closure_rows + r] = d.schur[d.closure_envelope[r].origin + r]
-    sound = factor(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, SINGULAR_PIVOT)
+    sound = factor(d.h, d.at_closure_envelope, d.w, d.at_schur, 0, d.n_kept_rows, SINGULAR_PIVOT)
     pivot = independence(d) if sound else 0.0
     d.last_pivot = pivot
     d.evaluation = m.OK if pivot > SINGULAR_PIVOT else m.SINGULAR
@@ -193,8 +193,8 @@ def gather_rows(d, values):
 @kernel
 def solve(d):
     """Multipliers from their right-hand side, in place."""
-    forward(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, d.at_multiplier)
-    backward(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, d.at_multiplier)
+    forward(d.h, d.at_closure_envelope, d.w, d.at_schur, 0, d.n_kept_rows, d.at_multiplier)
+    backward(d.h, d.at_closure_envelope, d.w, d.at_schur, 0, d.n_kept_rows, d.at_multiplier)
 
 
 @kernel

@@ -9,19 +9,50 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.bodies.rigid import carry
 from flexclear.pipeline.dynamics.equations import envelope
-from flexclear.pipeline.dynamics.equations.kinematics import no_arm, no_column
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn_symmetric
 
 #: pivots of M below this fraction of their diagonal mean a coordinate that moves no mass
 MASSLESS_COMPOSITE = 1e-15
 
-localise, step = no_column, no_arm
-#: what gives `forces` the inertia of a rigid link: about the kernels' origin
-rigid_inertia = rigid.inertia
+
+@kernel
+def origin(d, i):
+    """What the inertia of link i refers to is the kernels' origin: where the link's own is from there."""
+    return d.link_frames[i].origin
+
+
+@kernel
+def demand_of(d, i, moment, force):
+    """Store the wrench that the accelerations of link i need, about the kernels' origin."""
+    wrench = d.wrench[i]
+    wrench.moment, wrench.force = moment, force
+
+
+@kernel
+def column(d, k):
+    """Return angular and linear part of a column about the kernels' origin."""
+    return d.columns[k].angular, d.columns[k].linear
+
+
+@kernel
+def localise(d, k, angular, linear):
+    """Columns about the kernels' origin are enough."""
+
+
+@kernel
+def localise_shape(d, k, base, angular, linear):
+    """Those of shapes, too."""
+
+
+@kernel
+def step(d, i, arm):
+    """So are positions."""
+
+
+shift = step  # nor where a link's origin is
 
 
 @kernel
@@ -74,13 +105,13 @@ def assemble_mass(d):
 @kernel
 def forward(d, b):
     """L^-1 applied to the generalised forces in w from index b."""
-    envelope.forward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
+    envelope.forward(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, b)
 
 
 @kernel
 def backward(d, b):
     """L^-T applied to the vector in w from index b."""
-    envelope.backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
+    envelope.backward(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, b)
 
 
 @kernel
@@ -137,6 +168,32 @@ def drive_forces(d):
         d.drive_force[pair.drive] += inertia * d.du[pair.coordinate]
 
 
+@kernel
+def drive_power(d, b, motion):
+    """Power of the drives at accelerations in w from index b; motion: where w has the rates of all coordinates."""
+    power = 0.0
+    for p in range(d.n_known_pairs):
+        pair = d.known_pairs[p]
+        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
+        inertia = dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
+        power += inertia * d.w[b + pair.coordinate] * d.w[motion + d.nv + pair.drive]
+    return power
+
+
+def make_again(flexible: Any) -> tuple[Callable, Callable]:
+    """The kernels unfactor(d), which leaves the mass matrix so that modes can get more, and refactor(d)."""
+
+    @kernel
+    def unfactor(d):
+        envelope.multiply(d.h, d.at_envelope, d.w, d.at_mass, d.nv)
+
+    @kernel
+    def refactor(d):
+        envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, 0.0)
+
+    return unfactor, refactor
+
+
 def make_eliminate(flexible: Any = None) -> Callable:
     """The kernel eliminate(d): factor of the mass matrix and L^-1 of minus the bias (FORCE); whether it is sound."""
     port_load = no_link_load if flexible is None else flexible.port_load
@@ -150,7 +207,7 @@ def make_eliminate(flexible: Any = None) -> Callable:
             gather(d, i)
         modal(d)
         assemble_mass(d)
-        sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, d.nv, MASSLESS_COMPOSITE)
+        sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, MASSLESS_COMPOSITE)
         for k in range(d.nv):
             d.force[k] = -d.bias[k]
         forward(d, d.at_force)

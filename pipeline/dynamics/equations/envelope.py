@@ -3,8 +3,8 @@
 In the order "descendants before ancestors" the mass matrix of a tree has no fill outside this
 envelope (Featherstone, *Rigid Body Dynamics Algorithms*, sec. 6.5), so that the cost follows the
 branches of the mechanism. A matrix lies in w from place `a`; its row table (first column, origin)
-in h from place `e`, for `n` rows. On its diagonal a factor L holds the reciprocals 1/L_ii, by which
-all that it is applied to multiplies.
+in h from place `e`. Rows from `begin` to before `end` are worked on, with no column before `begin`: all, or a block on
+the diagonal. On its diagonal a factor L holds the reciprocals 1/L_ii, by which all that it is applied to multiplies.
 
 The inmost loops count for themselves: `range` counts its turns besides, a sixth of their instructions.
 """
@@ -23,14 +23,14 @@ def base(h, e, a, i):
 
 
 @kernel
-def factor(h, e, w, a, n, threshold):
+def factor(h, e, w, a, begin, end, threshold):
     """Overwrite a symmetric matrix with its factor L, reciprocals on the diagonal; whether it is one.
 
     It is not, and unusable, where a pivot is at most this fraction of its diagonal entry before elimination: the matrix
     is not positive definite to working precision.
     """
     sound = True
-    for i in range(n):
+    for i in range(begin, end):
         first, row = h[e + 2 * i], base(h, e, a, i)
         pivot = w[row + i]
         least = threshold * pivot
@@ -63,9 +63,9 @@ def multiply(h, e, w, a, n):
 
 
 @kernel
-def forward(h, e, w, a, n, b):
+def forward(h, e, w, a, begin, end, b):
     """L^-1 applied to the vector in w from place b."""
-    for i in range(n):
+    for i in range(begin, end):
         row = base(h, e, a, i)
         total = w[b + i]
         k = h[e + 2 * i]
@@ -76,9 +76,9 @@ def forward(h, e, w, a, n, b):
 
 
 @kernel
-def backward(h, e, w, a, n, b):
+def backward(h, e, w, a, begin, end, b):
     """L^-T applied to the vector in w from place b."""
-    for i in range(n - 1, -1, -1):
+    for i in range(end - 1, begin - 1, -1):
         row = base(h, e, a, i)
         value = w[b + i] * w[row + i]
         w[b + i] = value

@@ -42,37 +42,23 @@ def undeformed(d):
 
 
 @kernel
-def no_column(d, k, angular, linear):
-    """Columns about the kernels' origin are enough."""
-
-
-@kernel
-def no_arm(d, i, arm):
-    """So are positions."""
-
-
-@kernel
 def rigid_inboard(d, i, p, R, omega, v, alpha, a):
     """A rigid link's frame is its inboard joint frame."""
     return p, R, omega, v, alpha, a
 
 
-def make_kinematics(
-    joints: tuple[Any, ...],
-    flexible: Any = None,
-    localise: Callable = no_column,
-    step: Callable = no_arm,
-) -> Callable:
+def make_kinematics(joints: tuple[Any, ...], tree: Any, flexible: Any = None) -> Callable:
     """The kernel kinematics(d) that moves everything.
 
-    joints: modules of the joint types present.  flexible: kernels of the flexible bodies (`bodies.flexible`); their
-    `deform` is called first, their
-    `site` adds the deformation of a link to a site, their `inboard` steps from the inboard joint frame to the link's.
-    localise(d, k, angular, linear): called with each column about its joint's frame.  step(d, i, arm): called for each
-    link with the way from its parent's origin to its joint's frame.
+    joints: modules of the joint types present.  tree: what factors the mass matrix; its localise(d, k, angular, linear)
+    is called with each column about its joint's frame, its step(d, i, arm) for each link with the way from its parent's
+    origin to its joint's frame.  flexible: kernels of the flexible bodies (`bodies.flexible`); their `deform` is called
+    first, their `site` adds the deformation of a link to a site, their `inboard` steps from the inboard joint frame to
+    the link's.
     """
     joint_motion = choose(tuple(joint.motion for joint in joints))
     position_rate = choose(tuple(joint.position_rate for joint in joints))
+    localise, step = tree.localise, tree.step
     deform = undeformed if flexible is None else flexible.deform
     inboard = rigid_inboard if flexible is None else flexible.inboard
     port_site = no_port if flexible is None else flexible.site

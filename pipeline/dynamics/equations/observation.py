@@ -11,6 +11,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.choice import nothing
+from flexclear.pipeline.dynamics.equations import composite
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
 from flexclear.pipeline.dynamics.equations.prescribed_motion import prescribe
@@ -228,12 +229,13 @@ def make_description(
     couplings: takes them off their links (`effects.gears`); friction: of ideal joints, in closures
     (`effects.joint_friction`); the other arguments are those of `make_rates`.
     """
-    kinematics = make_kinematics(joints, flexible)
-    forces = make_forces(flexible, contacts, loads, stops)
-    modal_inertia = nothing if flexible is None else flexible.modal_inertia
+    bodies = None if flexible is None else flexible(composite)  # wrenches about the kernels' origin
+    kinematics = make_kinematics(joints, composite, bodies)
+    forces = make_forces(composite, bodies, contacts, loads, stops)
+    modal_inertia = nothing if bodies is None else bodies.modal_inertia
     couple = nothing if couplings is None else couplings
     rub = nothing if friction is None else friction
-    flexible_energy = no_energy if flexible is None else flexible.energies
+    flexible_energy = no_energy if bodies is None else bodies.energies
 
     @kernel
     def closure_wrenches(d):

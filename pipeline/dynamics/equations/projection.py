@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.envelope import factor, multiply
 from flexclear.pipeline.dynamics.equations.retraction import make_position_rates
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -83,16 +82,16 @@ def no_modes(d, b):
     """No mode."""
 
 
-def make_stiffen(closures: Any) -> Callable:
+def make_stiffen(closures: Any, tree: Any, flexible: Any) -> Callable:
     """The kernel stiffen(d): the factors of an evaluation, with the modal stiffness next to the mass.
 
-    closures: kernels of all closures.
+    closures: kernels of all closures.  tree, flexible: as of `make_rates`.
     """
-    complete = closures.complete
+    complete, (unfactor, refactor) = closures.complete, tree.make_again(flexible(tree))
 
     @kernel
     def stiffen(d):
-        multiply(d.h, d.at_envelope, d.w, d.at_mass, d.nv)
+        unfactor(d)
         for k in range(d.n_flex):
             body = d.flexes[k]
             n, c0 = body.n_modes, body.c0
@@ -102,7 +101,7 @@ def make_stiffen(closures: Any) -> Callable:
                 # without held shapes, shapes are eigenmodes
                 for j in range(0 if i >= body.n_held > 0 else i, i + 1):
                     d.mass[row + j] += CLOSING_TIME**2 * d.interface_data[stiffness + n * i + j].value
-        factor(d.h, d.at_envelope, d.w, d.at_mass, d.nv, 0.0)
+        refactor(d)
         complete(d)
 
     return stiffen

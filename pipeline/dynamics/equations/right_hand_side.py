@@ -37,13 +37,14 @@ def spread_state(d, y):
 
 
 def make_forces(
+    tree: Any,
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
     stops: Callable | None = None,
-    rigid_inertia: Callable = rigid.inertia,
 ) -> Callable:
     """The kernel forces(d): inertia and applied forces of all links, before the tree gathers them."""
+    rigid_inertia = rigid.make_inertia(tree)
     flexible_inertia = nothing if flexible is None else flexible.inertia
     contact_forces = nothing if contacts is None else contacts
     applied = nothing if loads is None else loads
@@ -93,15 +94,16 @@ def make_rates(
     """The kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
     joints: modules of the joint types.  tree: how the mass matrix is factored, the module `equations.articulated` or
-    `equations.composite`.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels that apply
-    them.  closures: kernels of all closures.  friction: of ideal joints, on accelerations and on drives
-    (`effects.joint_friction`).
+    `equations.composite`.  flexible: makes the kernels of the flexible bodies, of that.  contacts, loads, stops: the
+    kernels that apply them.  closures: kernels of all closures.  friction: of ideal joints, on accelerations and on
+    drives (`effects.joint_friction`).
     """
-    kinematics = make_kinematics(joints, flexible, tree.localise, tree.step)
-    forces = make_forces(flexible, contacts, loads, stops, tree.rigid_inertia)
-    eliminate, backward, drive_forces = tree.make_eliminate(flexible), tree.backward, tree.drive_forces
-    modal_mass = nothing if flexible is None else flexible.mass_matrix
-    modal_rates = no_modal_rates if flexible is None else flexible.modal_rates
+    bodies = None if flexible is None else flexible(tree)
+    kinematics = make_kinematics(joints, tree, bodies)
+    forces = make_forces(tree, bodies, contacts, loads, stops)
+    eliminate, backward, drive_forces = tree.make_eliminate(bodies), tree.backward, tree.drive_forces
+    modal_mass = nothing if bodies is None else bodies.mass_matrix
+    modal_rates = no_modal_rates if bodies is None else bodies.modal_rates
     close = nothing if closures is None else closures.close
     known_forces = nothing if closures is None else closures.known_forces
     rub, rub_drives = (nothing, nothing) if friction is None else friction

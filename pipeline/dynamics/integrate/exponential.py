@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import factorial
+from typing import Any
 
 import numpy as np
 
@@ -262,9 +263,11 @@ def error(d, step):
     return fourth**2 / np.sqrt(fourth**2 + 0.01 * third**2)
 
 
-def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> tuple:
-    """The method's kernels; complete: evaluates, and leaves what the oscillators are made of."""
-    find_oscillators = modal_basis.make_find_oscillators(retract)
+def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, Any]) -> tuple:
+    """The method's kernels; whole: what evaluates and leaves what the oscillators are made of, and the module that
+    factors the mass matrix."""
+    complete, tree = whole
+    find_oscillators = modal_basis.make_find_oscillators(retract, tree)
 
     @kernel
     def renew(d):

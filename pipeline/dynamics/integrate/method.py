@@ -76,8 +76,9 @@ class Method:
     slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the search for events.
     last: row of the slope at the step's end.  dense: rows of DENSE.
     make_kernels: (evaluate, retract) -> kernels, with a third argument of methods that read more than rates
-        (`Traits.reads_all`): an evaluation of which everything is left. evaluate(d, t, y, dy), retract(d, y,
-        displacement, out, scratch) take indices in w. They count their evaluations themselves:
+        (`Traits.reads_all`): an evaluation of which everything is left, with the module that factors the mass matrix.
+        evaluate(d, t, y, dy), retract(d, y, displacement, out, scratch) take indices in w. They count their evaluations
+        themselves:
         begin(d) after every restart, with the slope and the length of the first step known;
         attempt(d, step) fills Y_NEW, False when it could not; of a `staged` method proceed(d, step) does so from one
         evaluation to the next: AWAITS (`await_rates`), MADE or LOST, by d.stage, 0 at first;

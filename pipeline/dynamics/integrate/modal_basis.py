@@ -16,13 +16,13 @@ Source: Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), sec. 8.5 (Jacob
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.interface import to_interface, to_modes
 from flexclear.pipeline.dynamics.equations.closures import add_spread, solve, take_spread
-from flexclear.pipeline.dynamics.equations.envelope import backward, forward
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot
 
@@ -161,74 +161,6 @@ def turn(d, o, pair):
 
 # Oscillators ----------------------------------------------------------------------------------------------------------
 @kernel
-def constrained(d, b):
-    """P applied to the forces in w from place b; needs the factors of an evaluation. Leaves the multipliers.
-
-    Modes are in the interface basis.
-    """
-    forward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
-    for k in range(d.at_multiplier, d.at_multiplier + d.n_kept_rows):
-        d.w[k] = 0.0
-    take_spread(d, b)
-    solve(d)
-    add_spread(d, b, 1.0)
-    backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
-
-
-@kernel
-def drive_power(d, b, motion):
-    """Power that the drives bring in at accelerations from place b and the multipliers that belong to them.
-
-    motion: U for the power, DU for the rate at which it grows with the drives' speeds.
-    """
-    power = 0.0
-    for p in range(d.n_known_pairs):
-        pair = d.known_pairs[p]
-        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
-        inertia = dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
-        power += inertia * d.w[b + pair.coordinate] * d.w[motion + d.nv + pair.drive]
-    for e in range(d.n_known_entries):
-        entry, closure = d.known_entries[e], d.closures[d.known_entries[e].closure]
-        column, speed = d.columns[entry.column], d.w[motion + d.nv + entry.drive]
-        for k in range(closure.n_kept):
-            wrench = d.rows[closure.row0 + k]
-            along = dot(wrench.moment, column.angular) + dot(wrench.force, column.linear)
-            power -= entry.sign * along * d.multiplier[closure.kept0 + k] * speed
-    return power
-
-
-@kernel
-def respond(d, b):
-    """What the forces in w from place b do, in place; and the drives' power then, and its rate, added after it."""
-    nv = d.nv
-    constrained(d, b)
-    d.w[b + nv] += drive_power(d, b, d.at_u)
-    d.w[b + nv + 1] += drive_power(d, b, d.at_du)
-    to_modes(d, b)
-
-
-@kernel
-def responses(d, o):
-    """Responses to the root of each mode's stiffness, and the symmetric matrix."""
-    nq, nv, e = d.nq, d.nv, 0
-    for i in range(count(d)):
-        for k in range(nq, nq + nv + 2):
-            d.w[response(d, o, i) + k] = 0.0
-    for k in range(d.n_flex):
-        size, c0 = d.flexes[k].n_modes, d.flexes[k].c0
-        stiffness = d.at_flex_data + d.flexes[k].data0 + 12 * size + size * size
-        for j in range(size):
-            d.w[root(d, o, e)] = np.sqrt(max(d.f[stiffness + j], 0.0))
-            b = response(d, o, e) + nq
-            d.w[b + c0 + j] = d.w[root(d, o, e)]
-            to_interface(d, b)
-            respond(d, b)
-            e += 1
-    for i in range(e):
-        couple(d, o, i)
-
-
-@kernel
 def couple(d, o, i):
     """Row i of the symmetric matrix: what the response of mode i's spring does along all modes."""
     j, b = 0, response(d, o, i) + d.nq
@@ -305,8 +237,75 @@ def damp(d, o, i):
     return d.w[square(d, o, i)] * total
 
 
-def make_find_oscillators(retract: Callable) -> Callable:
+def make_responses(tree: Any) -> Callable:
+    """The kernel responses(d, o); tree: what factors the mass matrix, the module `articulated` or `composite`."""
+    forward, backward, inertial_power = tree.forward, tree.backward, tree.drive_power
+
+    @kernel
+    def constrained(d, b):
+        """P applied to the forces in w from place b; needs the factors of an evaluation. Leaves the multipliers.
+
+        Modes are in the interface basis.
+        """
+        forward(d, b)
+        for k in range(d.at_multiplier, d.at_multiplier + d.n_kept_rows):
+            d.w[k] = 0.0
+        take_spread(d, b)
+        solve(d)
+        add_spread(d, b, 1.0)
+        backward(d, b)
+
+    @kernel
+    def drive_power(d, b, motion):
+        """Power that the drives bring in at accelerations from place b and the multipliers that belong to them.
+
+        motion: U for the power, DU for the rate at which it grows with the drives' speeds.
+        """
+        power = inertial_power(d, b, motion)
+        for e in range(d.n_known_entries):
+            entry, closure = d.known_entries[e], d.closures[d.known_entries[e].closure]
+            column, speed = d.columns[entry.column], d.w[motion + d.nv + entry.drive]
+            for k in range(closure.n_kept):
+                wrench = d.rows[closure.row0 + k]
+                along = dot(wrench.moment, column.angular) + dot(wrench.force, column.linear)
+                power -= entry.sign * along * d.multiplier[closure.kept0 + k] * speed
+        return power
+
+    @kernel
+    def respond(d, b):
+        """What the forces in w from place b do, in place; and the drives' power then, and its rate, added after it."""
+        nv = d.nv
+        constrained(d, b)
+        d.w[b + nv] += drive_power(d, b, d.at_u)
+        d.w[b + nv + 1] += drive_power(d, b, d.at_du)
+        to_modes(d, b)
+
+    @kernel
+    def responses(d, o):
+        """Responses to the root of each mode's stiffness, and the symmetric matrix."""
+        nq, nv, e = d.nq, d.nv, 0
+        for i in range(count(d)):
+            for k in range(nq, nq + nv + 2):
+                d.w[response(d, o, i) + k] = 0.0
+        for k in range(d.n_flex):
+            size, c0 = d.flexes[k].n_modes, d.flexes[k].c0
+            stiffness = d.at_flex_data + d.flexes[k].data0 + 12 * size + size * size
+            for j in range(size):
+                d.w[root(d, o, e)] = np.sqrt(max(d.f[stiffness + j], 0.0))
+                b = response(d, o, e) + nq
+                d.w[b + c0 + j] = d.w[root(d, o, e)]
+                to_interface(d, b)
+                respond(d, b)
+                e += 1
+        for i in range(e):
+            couple(d, o, i)
+
+    return responses
+
+
+def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
     """The kernel find_oscillators(d, o, known), at the state in Y or Y_NEW that has just been evaluated."""
+    responses = make_responses(tree)
 
     @kernel
     def shapes(d, o, state, n):

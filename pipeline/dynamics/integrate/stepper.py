@@ -105,7 +105,7 @@ class Stepping(NamedTuple):
 
 
 def make_stepping(
-    evaluate: Callable, retract: Callable, method: Any, poses: Any = None, complete: Callable | None = None
+    evaluate: Callable, retract: Callable, method: Any, poses: Any = None, complete: tuple[Callable, Any] | None = None
 ) -> Stepping:
     """The kernels that steps, and the events in them, are made with; arguments as of `make_advance`."""
     given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
@@ -125,7 +125,7 @@ def make_resolution(
     method: Any,
     events: tuple[Callable, Callable, Callable],
     poses: Any = None,
-    complete: Callable | None = None,
+    complete: tuple[Callable, Any] | None = None,
 ) -> Callable:
     """The kernel resolution(d, step, t_new, rows, events) -> event?, which notes the rest of what `resolve` returns.
 
@@ -152,13 +152,14 @@ def make_advance(
     events: tuple[Callable, Callable | None, Callable] = NO_CONTACTS,
     resolve: Callable = resolve_nothing,
     poses: Any = None,
-    complete: Callable | None = None,
+    complete: tuple[Callable, Any] | None = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
     The kernels that it is made of take `d`, the arrays with named fields (`fields`), instead of h, f, w and n.
 
-    complete: evaluates like `evaluate`, and leaves all of the evaluation; given to methods that read more than rates.
+    complete: what evaluates like `evaluate` and leaves all of the evaluation, and the module that factors the mass
+    matrix; given to methods that read more than rates.
     stepping: the module `adaptive` or `fixed`.  poses: `singular_step`, of mechanisms with loops; trees compile none of
         it.
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.

@@ -128,8 +128,7 @@ def envelope_size(envelope: np.ndarray) -> int:
     """Entries of a matrix whose rows begin as an envelope with named fields says."""
     if not len(envelope):
         return 0
-    last = len(envelope) - 1
-    return int(envelope["origin"][last] + last + 1)
+    return int(np.max(envelope["origin"] + np.arange(1, len(envelope) + 1)))
 
 
 def _work_lengths(h: np.ndarray, room: m.Room, columns: int) -> dict[int, int]:

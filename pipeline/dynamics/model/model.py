@@ -178,8 +178,9 @@ def _symmetric(J: np.ndarray) -> list[float]:
     return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
 
-#: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
-#: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
+#: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted but none
+#: other of its own body's modes, up to which the mass matrix is factored as a matrix: beyond it, articulated inertias
+#: take less time (docs/engine.md)
 DEEP_TREE = 8.0
 
 
@@ -209,14 +210,14 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
 
 def articulated(numbering: Numbering) -> bool:
     """Return whether the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP_TREE`)."""
-    mechanism = numbering.mechanism
-    if not mechanism.all_rigid or not numbering.nv:
+    if not numbering.nv:
         return False
-    before, depths = [0] * len(mechanism.links), list[int]()
-    for i, link in enumerate(mechanism.links[1:], start=1):
-        own = [c for c in numbering.coordinates[i] if c < numbering.nv]
-        depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
-        before[i] = before[link.branch.parent] + len(own)
+    before, depths = [0] * len(numbering.coordinates), list[int]()
+    for i, link in enumerate(numbering.mechanism.links[1:], start=1):
+        own = sum(c < numbering.nv for c in numbering.coordinates[i])
+        above, modes = before[link.branch.parent], numbering.modal_coordinates.get(i, ())
+        depths += [above + k for k in range(1, own + 1)] + [above + own + 1] * len(modes)
+        before[i] = above + own + (len(numbering.moving(i)) if modes else 0)
     return bool(np.sqrt(np.mean(np.square(depths))) > DEEP_TREE)
 
 
@@ -254,7 +255,8 @@ def _borne(mechanism: Mechanism) -> np.ndarray:
             mass, com, J = link.undeformed
             sums[i] += mass, mass * np.linalg.norm(com), mass * com @ com + 0.5 * np.trace(J)
         mass, first, second = sums[i]
-        a = float(np.linalg.norm(link.start.p - above.start.p))
+        joint = above.start.point(link.inboard.place.p) if link.inboard is not None else link.start.p
+        a = float(np.linalg.norm(link.start.p - joint) + np.linalg.norm(joint - above.start.p))
         if "t" in joint_type(link.kind).SPEEDS:
             a = max(a, mechanism.length)
         sums[link.branch.parent] += mass, first + mass * a, second + a * (2.0 * first + mass * a)

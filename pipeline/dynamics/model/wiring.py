@@ -15,22 +15,23 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
 def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
-    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE; articulated inertias store a number per coordinate instead.
+    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE.
 
     A coordinate's momentum (that of all it moves) times the column of a coordinate nearer to the
-    ground is their entry of the mass matrix.
+    ground is their entry of the mass matrix.  Articulated inertias store a number per coordinate of a joint instead,
+    and behind these the entries between the modes of each body.
     """
-    if articulated:
-        return {m.PAIRS: [], m.KNOWN_PAIRS: [], m.ENVELOPE: [(k, 0) for k in range(numbering.nv)]}
     products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
     for i in range(1, len(numbering.mechanism.links)):
+        products += _port_products(numbering, i)
+        if articulated:
+            continue
         own, above = numbering.coordinates[i], numbering.route(i - 1)
         for n, c in enumerate(own):
             products += [(c, d, c, d) for d in own[: n + 1]]
             products += [(c, col, c, d) for d, col in above]
         modal = numbering.modal_coordinates.get(i, ())
         products += [(c, col, c, d) for c in modal for d, col in numbering.joint_route(i)]
-        products += _port_products(numbering, i)
     first = list(range(numbering.nv))
     for _, _, c, d in products:
         if c < numbering.nv and d < numbering.nv:
@@ -40,10 +41,16 @@ def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
         if numbering.bases[link].held or flexible_bodies.coupled(numbering.mechanism, link):
             for c in numbering.moving(link):
                 first[c] = min(first[c], modes.start)
-    start, rows = 0, []
+    modal_rows = {c for modes in numbering.modal_coordinates.values() for c in modes}
+    start, rows = numbering.nv if articulated else 0, []
     for i, f in enumerate(first):
+        if articulated and i not in modal_rows:
+            rows.append((i, 0))
+            continue
         rows.append((f, start - f))
         start += i - f + 1
+    if articulated:
+        return {m.PAIRS: [], m.KNOWN_PAIRS: [], m.ENVELOPE: rows}
     pairs, known = [], []
     for momentum, col, c, d in products:
         if c < numbering.nv and d < numbering.nv:
@@ -81,7 +88,7 @@ def closures(
     entries: list[tuple[int, ...]] = []
     known: list[tuple[int, ...]] = []
     supports: list[list[int]] = []
-    paths: list[tuple[int, int]] = []
+    paths: list[tuple[int, ...]] = []
     row0 = jacobian0 = 0
     for new, old in enumerate(order):
         (a, b), coupling = ends[old][0], old - len(site_pairs) if old >= len(site_pairs) else -1
@@ -113,7 +120,7 @@ def closures(
     return tables, np.array(order, dtype=np.int64)
 
 
-def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tuple[int, int]]:
+def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tuple[int, ...]]:
     """Rows of the table PATHS between the ground and some sites; slots: coordinates of the closure's support."""
     links: set[int] = set()
     for site in sites:
@@ -121,10 +128,14 @@ def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tupl
         while link:
             links.add(link)
             link = numbering.mechanism.links[link].branch.parent
-    first = {i: numbering.coordinates[i].start for i in links if len(numbering.coordinates[i])}
-    return [
-        (i, slots.index(first[i]) if first.get(i, numbering.nv) < numbering.nv else -1) for i in sorted(links)[::-1]
-    ]
+
+    def slot(coordinates: range) -> int:
+        """Slot of the first of some coordinates, or -1 where there are none that are free."""
+        return slots.index(coordinates.start) if coordinates and coordinates.start < numbering.nv else -1
+
+    shapes = {i: slot(numbering.moving(i)) for i in links & numbering.bases.keys()}
+    carrier = {i: shapes.get(numbering.mechanism.links[i].branch.parent, -1) for i in links}
+    return [(i, slot(numbering.coordinates[i]), shapes.get(i, -1), carrier[i]) for i in sorted(links)[::-1]]
 
 
 def _rows(kind: str) -> list[tuple[int, int, int]]:

@@ -12,10 +12,12 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 def mass_factor(engine: Engine) -> np.ndarray:
     """Return L of the mass matrix M = L L^T of the last evaluation, shape (nv, nv)."""
-    return _from_gains(engine) if engine.model.parts.articulated else _from_envelope(engine)
+    L = _from_envelope(engine)
+    return L + _from_gains(engine) if engine.model.parts.articulated else L
 
 
 def _from_envelope(engine: Engine) -> np.ndarray:
+    """Of articulated inertias the blocks on the diagonal: of each body's modes, of each coordinate of a joint."""
     L, entries = np.zeros((engine.model.nv,) * 2), engine.view(m.MASS)
     for i, (first, origin) in enumerate(engine.model.arrays.table(m.ENVELOPE)):
         L[i, first : i + 1] = entries[origin + first : origin + i + 1]
@@ -26,10 +28,11 @@ def _from_envelope(engine: Engine) -> np.ndarray:
 def _from_gains(engine: Engine) -> np.ndarray:
     """Columns of coordinates times the gains of those beyond them."""
     numbering, columns, gains = engine.model.numbering, engine.table(m.COLUMNS), engine.table(m.GAIN)
-    L, origins = np.diag(1.0 / engine.view(m.MASS)), engine.table(m.LINK_FRAMES)["origin"]
+    L, origins = np.zeros((engine.model.nv,) * 2), engine.table(m.LINK_FRAMES)["origin"]
     for i in range(1, len(numbering.coordinates)):
-        route = np.array([pair for pair in numbering.joint_route(i) if pair[0] < numbering.nv], dtype=np.int64)
-        for k in (c for c in numbering.coordinates[i] if c < numbering.nv):
+        pairs = [pair for pair in numbering.joint_route(i) if pair[0] < numbering.nv]
+        route, modal = np.array(pairs, dtype=np.int64).reshape(-1, 2), numbering.modal_coordinates.get(i, ())
+        for k in (c for c in (*modal, *numbering.coordinates[i]) if c < numbering.nv):
             force = gains["force"][k]
             moment = gains["moment"][k] + np.cross(origins[i], force)
             nearer, their = route[route[:, 0] > k].T
@@ -56,11 +59,15 @@ def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
     moments = vectors(m.WRENCH, m.WRENCH.moment) + vectors(m.ARTICULATED, m.ARTICULATED.own_moment)
     moments, pushes = moments + np.cross(origins, carried), vectors(m.WRENCH, m.WRENCH.force) + carried
     turns, shifts = vectors(m.COLUMNS, m.COLUMNS.angular), vectors(m.COLUMNS, m.COLUMNS.linear)
-    forces = np.zeros(model.nv, dtype=w.dtype)
+    numbering, forces = model.numbering, stretch(m.MODAL_BIAS)[: model.nv].copy()
+    modal = [k for modes in numbering.modal_coordinates.values() for k in modes]
+    forces[np.setdiff1d(np.arange(model.nv), modal)] = 0.0
     for i in range(len(moments) - 1, 0, -1):
-        for k in (c for c in model.numbering.coordinates[i] if c < model.nv):
-            forces[k] = np.sum(turns[k] * moments[i] + shifts[k] * pushes[i])
         above = model.links[i].branch.parent
+        shapes = numbering.moving(above) if model.links[above].flexible else ()
+        mine = {*shapes, *(c for c in numbering.coordinates[i] if c < model.nv)}
+        for k, column in (pair for pair in numbering.joint_route(i) if pair[0] in mine):
+            forces[k] = forces[k] + np.sum(turns[column] * moments[i] + shifts[column] * pushes[i])
         moments[above] += moments[i]
         pushes[above] += pushes[i]
     return forces
