@@ -184,18 +184,21 @@ def test_a_mast_buckles_under_eulers_load(tmp_path: Path) -> None:
     assert above.decay_rate.min() < 0.0
 
 
+USUAL = {"reference": "craig-bampton", "count": 12}
+
+
 @pytest.mark.parametrize(
     "modes",
     [
-        {"reference": "craig-bampton", "count": 24, "interfaces": ["tip", "root"]},
-        {"reference": "free-free", "count": 24},
-        {"reference": "craig-bampton", "count": 24, "interfaces": ["root"]},
+        {"reference": "craig-bampton", "count": 12, "interfaces": ["tip", "root"]},
+        {"reference": "free-free", "count": 12},
+        {"reference": "craig-bampton", "count": 12, "interfaces": ["root"]},
     ],
     ids=["held at its top", "free-free", "cantilever"],
 )
 def test_where_the_body_frame_is_held_does_not_matter(tmp_path: Path, modes: dict[str, object]) -> None:
     """Another origin of the shortening is another frame for the same motion."""
     mass = 0.5 * CRITICAL / 9.81
-    usual, other = (mast(tmp_path, mass, kept, elements=4) for kept in (None, modes))
-    # four elements have 24 elastic coordinates, so all sets are complete; the fastest is 1e6 times the first
+    usual, other = (mast(tmp_path, mass, kept, elements=2) for kept in (USUAL, modes))
+    # two elements have 12 elastic coordinates, so all sets are complete; the fastest is 1e6 times the first
     assert other.frequency.values[:2] == pytest.approx(usual.frequency.values[:2], rel=1e-5)
