@@ -54,7 +54,10 @@ HIDDEN = (
 
 
 def test_with_another_numba_kernels_are_compiled_as_it_does() -> None:
-    assert printed(RUN, *HIDDEN, "").splitlines() == [*("(0.0, 0.0, 1.0) False" for _ in HIDDEN), "(0.0, 0.0, 1.0) True"]
+    assert printed(RUN, *HIDDEN, "").splitlines() == [
+        *("(0.0, 0.0, 1.0) False" for _ in HIDDEN),
+        "(0.0, 0.0, 1.0) True",
+    ]
 
 
 def test_with_a_release_is_tested_they_are_compiled_in_parts() -> None:
