@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.commands import scenes
+from flexclear.commands import scenes, show
 from flexclear.commands.check import examined
 from flexclear.commands.export import as_json
 from flexclear.commands.new import KINDS, TEMPLATES, write
@@ -92,7 +92,7 @@ def test_nothing_that_the_project_ships_is_doubted(path: Path, validators):
 def test_a_value_of_the_command_line_is_doubted_where_it_is_given(
     verb: str, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(show, "shown", lambda scene, quiet: ([], None))  # nothing is drawn
     scene, _ = write("slider-crank", tmp_path)
     said = command(verb, scene, "--set", "joint.pin.clearance=0.2").err
     assert "warning: --set joint.pin.clearance: 200 mm is more than the pin's radius, 10 mm" in said
