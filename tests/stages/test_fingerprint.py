@@ -13,7 +13,7 @@ from flexclear.pipeline.core.workflow.task import STORE, in_order
 from flexclear.stages.graph import Graph
 from tests.processes import printed
 
-#: runs the tasks up to a post in a fresh process, and prints the own modules that each has loaded
+#: runs the tasks up to a post, and an equilibrium, in a fresh process, and prints the own modules that each has loaded
 LOADED = """
 import json, sys
 from pathlib import Path
@@ -25,7 +25,8 @@ from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages.graph import Graph
 store, sources, records = Store(Path(root)), Sources(Path.cwd()), {}
-for task in in_order(Graph(load_scene(scene, shortened), shown=False).up_to("post")):
+graph = Graph(load_scene(scene, shortened), shown=False)
+for task in [*in_order(graph.up_to("post")), graph.linear()]:
     for name in list(sys.modules):
         if name.startswith(tuple(f"flexclear.pipeline.{t}" for t in ("structure", "dynamics", "post"))):
             del sys.modules[name]
@@ -48,8 +49,9 @@ def test_every_module_that_runs_is_in_the_key(root: Path, tmp_path: Path, scene:
     path = root / "scenes" / f"{scene}.toml"
     lines = printed(LOADED, tmp_path / "results", path, '{"time.end": 0.001}').splitlines()
     loaded = {label: set(names) for line in lines for label, names in json.loads(line).items()}
-    tasks = {task.label: task for task in in_order(Graph(load_scene(path)).up_to("post"))}
-    assert loaded.keys() >= {"simulate", "post"}
+    graph = Graph(load_scene(path))
+    tasks = {task.label: task for task in [*in_order(graph.up_to("post")), graph.linear()]}
+    assert loaded.keys() >= {"simulate", "post", "linear"}
     for label, names in loaded.items():
         task = tasks[label]
         assert len(names) > 2, label
