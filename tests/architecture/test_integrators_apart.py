@@ -7,7 +7,7 @@ import pytest
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile import reach
 from flexclear.pipeline.dynamics.compile.sources import sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from flexclear.pipeline.dynamics.integrate import NAMES
@@ -30,7 +30,7 @@ STEPPING = {"adaptive", "fixed"}
 
 def reached(scheme: Scheme) -> set[str]:
     """Modules of the family that the machine code of a scheme depends on."""
-    modules = {name for text in sources(PARTS, scheme).values() for name in functions.reached(text)}
+    modules = {name for text in sources(PARTS, scheme).values() for name in reach.reached(text)}
     return {name.removeprefix(f"{PACKAGE}.") for name in modules if name.startswith(f"{PACKAGE}.")}
 
 
