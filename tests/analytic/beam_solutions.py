@@ -9,14 +9,13 @@ from scipy.optimize import brentq
 
 @dataclass(frozen=True)
 class Rod:
-    """A uniform round rod, SI; `rotary` scales the rotary inertia (0 for Euler-Bernoulli)."""
+    """A uniform round rod, SI."""
 
     length: float
     radius: float
     youngs_modulus: float
     density: float
     poisson: float
-    rotary: float = 1.0
 
     @property
     def area(self) -> float:
@@ -38,21 +37,6 @@ class Rod:
 PAPER_ROD = Rod(length=0.24, radius=0.01, youngs_modulus=7.17e10, density=2740.0, poisson=0.33)
 
 
-def rayleigh_frequencies(rod: Rod, ends: str, count: int) -> np.ndarray:
-    """The lowest bending frequencies [Hz] from the full 4x4 boundary determinant.
-
-    ends: two letters, one per end: C clamped, F free, P pinned.  Solution: v = a cos + b sin + c cosh + d sinh
-    with E I v'''' + rho I w^2 v'' - rho A w^2 v = 0, shear force E I v''' + rho I w^2 v'.
-    """
-    return scan(lambda omega: _determinant(rod, ends, omega), _start(rod), count) / (2.0 * np.pi)
-
-
-def _start(rod: Rod) -> float:
-    speed = np.sqrt(rod.youngs_modulus * rod.second_moment / (rod.density * rod.area))
-    # below the first root of every pair of ends here: beta L = 1.875 for clamped-free
-    return float((1.2 / rod.length) ** 2 * speed)
-
-
 def scan(function: Callable[[float], float], start: float, count: int) -> np.ndarray:
     """Roots by sign changes, 1 % apart, from `start` on; shape (count,)."""
     roots: list[float] = []
@@ -63,29 +47,6 @@ def scan(function: Callable[[float], float], start: float, count: int) -> np.nda
             roots.append(float(brentq(function, low, high, rtol=1e-14)))
         low = high
     return np.array(roots)
-
-
-def _determinant(rod: Rod, ends: str, omega: float) -> float:
-    ei, mass = rod.youngs_modulus * rod.second_moment, rod.density * rod.area
-    spin = rod.rotary * rod.density * rod.second_moment * omega**2
-    root = np.sqrt((spin / (2.0 * ei)) ** 2 + mass * omega**2 / ei)
-    beta, alpha = np.sqrt(root + spin / (2.0 * ei)), np.sqrt(root - spin / (2.0 * ei))
-    rows = []
-    for end, x in zip(ends, (0.0, rod.length), strict=True):
-        v = _derivatives(alpha, beta, x)
-        conditions = {"C": (v[0], v[1]), "P": (v[0], v[2]), "F": (v[2], ei * v[3] + spin * v[1])}
-        rows += [row / np.abs(row).max() for row in conditions[end]]
-    return float(np.linalg.det(np.array(rows)))
-
-
-def _derivatives(alpha: float, beta: float, x: float) -> list[np.ndarray]:
-    c, s, ch, sh = np.cos(beta * x), np.sin(beta * x), np.cosh(alpha * x), np.sinh(alpha * x)
-    return [
-        np.array([c, s, ch, sh]),
-        np.array([-beta * s, beta * c, alpha * sh, alpha * ch]),
-        np.array([-(beta**2) * c, -(beta**2) * s, alpha**2 * ch, alpha**2 * sh]),
-        np.array([beta**3 * s, -(beta**3) * c, alpha**3 * sh, alpha**3 * ch]),
-    ]
 
 
 def cantilever_compliance(rod: Rod) -> np.ndarray:

@@ -26,7 +26,7 @@ def reference():
     return dynamics.simulate(load_scene(CSJ, {"solver.rtol": 1e-14}), {}, quiet)
 
 
-@pytest.mark.parametrize("requested", [10.0**-k for k in range(2, 10)])
+@pytest.mark.parametrize("requested", [10.0**-k for k in (2, 3, 5, 7, 9)])
 def test_the_delivered_error_is_the_wanted_one(reference, requested):
     scene = load_scene(CSJ, {"accuracy": {"platform": {"velocity": {"relative": requested}}}})
     run = dynamics.simulate(scene, {}, quiet)

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from flexclear.pipeline.structure.closed_form import frequencies as closed_form
 from flexclear.pipeline.structure.fe import beam
-from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, build, frequencies
-from tests.analytic.beam_solutions import PAPER_ROD, Rod, element_stiffness, rayleigh_frequencies
+from tests.analytic.beam_solutions import PAPER_ROD, element_stiffness
 
 # Finite-element frequencies [Hz] of the paper's rod from a program of other authorship that shares no code with
 # this one: consistent Rayleigh mass, cubic deflections; keys are the ends (C clamped, F free, P pinned) and elements.
@@ -44,46 +42,6 @@ def test_elements_agree_with_an_independent_program(
 ) -> None:
     hertz = frequencies(build(elements=elements, theory=theory), BENDING, ends, len(expected))
     np.testing.assert_allclose(hertz, expected, rtol=SOLVERS)
-
-
-@pytest.mark.parametrize("ends", ["free-free", "fixed-fixed"])
-@pytest.mark.parametrize("radius", [0.003, 0.01, 0.03])
-def test_closed_form_equals_the_boundary_determinant(ends: str, radius: float) -> None:
-    """Half-span equations against the plain 4x4 determinant of the whole span."""
-    rod = Rod(length=0.24, radius=radius, youngs_modulus=7.17e10, density=2740.0, poisson=0.33)
-    span = closed_form.Span(
-        rod.length,
-        rod.youngs_modulus * rod.second_moment,
-        rod.density * rod.area,
-        rotary=rod.density * rod.second_moment,
-    )
-    expected = rayleigh_frequencies(rod, {"free-free": "FF", "fixed-fixed": "CC"}[ends], 5)
-    # the determinant loses digits like exp(beta L), 1e7 at the fifth root
-    np.testing.assert_allclose(closed_form.bending(span, ends, 5), expected, rtol=1e-8)
-
-
-@pytest.mark.parametrize("ends", ["free-free", "fixed-fixed"])
-def test_a_shear_stiff_timoshenko_rod_is_a_rayleigh_rod(ends: str) -> None:
-    """The difference is first order in 1/(kappa G A), so it falls a thousandfold with it."""
-    rayleigh = closed_form.Span(0.24, 563.0, 0.86, rotary=2.1e-5)
-    exact = closed_form.bending(rayleigh, ends, 6)
-    gaps = [
-        1.0 - closed_form.bending(closed_form.Span(0.24, 563.0, 0.86, 2.1e-5, shear), ends, 6) / exact
-        for shear in (1e10, 1e13)
-    ]
-    assert gaps[0].min() > 0.0
-    np.testing.assert_allclose(gaps[0] / gaps[1], 1e3, rtol=0.02)
-
-
-def test_exact_torsion_and_extension_are_the_waves_travel_time() -> None:
-    modes = solve(build(elements=12), "free-free", 9)
-    kinds = modes["kind"].values
-    for theory in ("exact_euler_bernoulli", "exact_rayleigh", "exact_timoshenko"):
-        exact = modes[theory].values
-        speed = np.sqrt(PAPER_ROD.shear_modulus / PAPER_ROD.density)
-        np.testing.assert_allclose(exact[kinds == "torsion"], np.array([1, 2]) * speed / 0.48, rtol=1e-14)
-        speed = np.sqrt(PAPER_ROD.youngs_modulus / PAPER_ROD.density)
-        np.testing.assert_allclose(exact[kinds == "axial"], speed / 0.48, rtol=1e-14)
 
 
 @pytest.mark.parametrize("elements", [12, 256])

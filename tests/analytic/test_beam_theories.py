@@ -55,8 +55,6 @@ KAPPA_09 = {
     "CC": (1529.6005076471188, 4049.8981065578914, 7562.094331180602),
     "CF": (247.5021056692413, 1515.739289901413, 4100.261575308612),
 }
-# its torsional and axial frequencies of twelve linear elements, free or fixed at both ends
-TWELVE_LINEAR = ((6553.024067023286, 13218.447482364336), (10687.658815902936, 21558.63542122052))
 # docs/structure.md, "How many elements"
 DOCUMENTED = {
     ("rayleigh", 4): (1.3e-3, 9.2e-3, 2.2e-2),
@@ -121,24 +119,21 @@ def test_pinned_timoshenko_rods_have_both_spectra(length: float) -> None:
     np.testing.assert_allclose(closed_form.bending(span, "pinned-pinned", 12), expected, rtol=1e-10)
 
 
-@pytest.mark.parametrize("theory", SPANS)
-@pytest.mark.parametrize("ends", ENDS)
-def test_eighteen_elements_give_three_modes_within_a_hundredth_of_a_percent(ends: str, theory: str) -> None:
-    exact = closed_form.bending(SPANS[theory], words(ends), 3)
-    error = frequencies(build(elements=18, theory=theory), BENDING, ends, 3) / exact - 1.0
-    assert error.max() < WANTED
-    # admissible shapes and exact integration: from above
-    assert error.min() > 0.0
-
-
 @pytest.mark.parametrize("theory, elements", DOCUMENTED)
 def test_documented_errors_are_the_measured_ones(theory: str, elements: int) -> None:
-    """The table in docs/structure.md: the worst of all ends, mode by mode."""
+    """The table in docs/structure.md: the worst of all ends, mode by mode.
+
+    Eighteen elements give three modes within a hundredth of a percent.
+    """
     rod = build(elements=elements, theory=theory)
     exact = np.array([closed_form.bending(SPANS[theory], words(ends), 3) for ends in ENDS])
     found = np.array([frequencies(rod, BENDING, ends, 3) for ends in ENDS])
+    error = found / exact - 1.0
     # two digits are printed
-    np.testing.assert_allclose((found / exact - 1.0).max(axis=0), DOCUMENTED[theory, elements], rtol=0.05)
+    np.testing.assert_allclose(error.max(axis=0), DOCUMENTED[theory, elements], rtol=0.05)
+    # admissible shapes and exact integration: from above
+    assert error.min() > 0.0
+    assert elements < 18 or error.max() < WANTED
 
 
 @pytest.mark.parametrize("theory", SPANS)
@@ -195,15 +190,6 @@ def test_twist_and_extension_converge_at_twice_their_degree(
     )
     assert error.min() > 0.0
     np.testing.assert_allclose(order(elements, error), expected, atol=0.1)
-
-
-@pytest.mark.parametrize("ends", ["FF", "CC"])
-def test_twelve_linear_elements_agree_with_an_independent_program(ends: str) -> None:
-    rod = build(elements=12)
-    twist, stretch = (frequencies(rod, motion, ends, 2) for motion in (TORSION, EXTENSION))
-    # dense solvers of two programs on twelve unknowns
-    np.testing.assert_allclose(twist, TWELVE_LINEAR[0], rtol=1e-10)
-    np.testing.assert_allclose(stretch, TWELVE_LINEAR[1], rtol=1e-10)
 
 
 @pytest.mark.parametrize("motion, name", [(TORSION, "torsion"), (EXTENSION, "extension")])

@@ -68,13 +68,15 @@ def agreeing(seeds: Sequence[int]) -> tuple[int, int]:
     return int(np.sum(np.abs(np.log2(alone / members)) <= 1.0)), int(np.sum(members < END))
 
 
-# one perturbed run is one draw, an ensemble's spread the largest of eight: they differ in a few mechanisms
+#: two open chains, a four-bar and a six-bar; three of them diverge
+FEW = (9, 16, 18, 19)
+
+
 def test_the_perturbed_run_diverges_when_the_ensemble_does() -> None:
-    agree, diverged = agreeing(range(9, 21))
-    assert diverged >= 3
-    assert agree >= 10  # of 12
+    assert agreeing(FEW) == (4, 3)
 
 
+# one perturbed run is one draw, an ensemble's spread the largest of eight: they differ in a few mechanisms
 @pytest.mark.slow
 def test_so_it_is_in_sixty_mechanisms() -> None:
     agree, diverged = agreeing(range(60))
@@ -121,8 +123,7 @@ def tangents_agreeing(seeds: Sequence[int]) -> tuple[int, int]:
 
 
 def test_horizons_agree_with_ensembles() -> None:
-    """In mechanisms of which three diverge."""
-    assert tangents_agreeing((9, 16, 18, 19)) == (4, 4)
+    assert tangents_agreeing(FEW) == (4, 4)
 
 
 @pytest.mark.slow

@@ -104,24 +104,11 @@ def _angular_momentum(dataset: object, body: str) -> np.ndarray:
     return spin + data.mass * np.cross(motion.position.values - sps4.FIRST.B[0], motion.velocity.values)
 
 
-def test_friction_never_drives() -> None:
-    for overrides in ((), CLOSE_UP):
-        assert run(SCENE, overrides).contact_friction_power.max() <= 0.0
-
-
-def test_normal_force_never_pulls() -> None:
+def test_a_contact_that_is_looked_at_closely_neither_pulls_nor_drives() -> None:
     dataset = run(SCENE, CLOSE_UP)
+    assert dataset.contact_friction_power.max() <= 0.0
     assert dataset.contact_normal_force.min() >= 0.0
     assert dataset.contact_normal_force.where(dataset.contact_gap > 0.0, drop=True).max() == 0.0
-
-
-def test_energy_ledger_closes() -> None:
-    dataset = run(SCENE)
-    assert np.abs(dataset.energy_error).max() <= 1e-7 * dataset.kinetic.max()
-
-
-def test_loops_stay_closed() -> None:
-    assert run(SCENE).constraint_error.max() <= 1e-10
 
 
 def test_deviation_from_ideal_has_the_known_magnitude() -> None:
@@ -200,12 +187,13 @@ def test_a_vanishing_clearance_with_stiffness_from_materials_is_warned_of() -> N
     assert "its stiffness from radii and materials (Hertz) holds below 0.3" in tight.attrs["warnings"]
 
 
-@pytest.mark.parametrize("scene, count", [(BOTH, 2), (ALL, 5)])
-def test_several_clearance_joints_keep_the_ledger_and_the_laws(scene: str, count: int) -> None:
+@pytest.mark.parametrize("scene, count, near", [(SCENE, 1, 1e-7), (BOTH, 2, 1e-6), (ALL, 5, 1e-6)])
+def test_clearance_joints_keep_the_ledger_the_loops_and_the_laws(scene: str, count: int, near: float) -> None:
     dataset = run(scene)
     assert dataset.sizes["contact"] == count
     # a hundred contacts at 1e-10; a thousandth of the tolerance that a run must keep
-    assert np.abs(dataset.energy_error).max() <= 1e-6 * dataset.kinetic.max()
+    assert np.abs(dataset.energy_error).max() <= near * dataset.kinetic.max()
+    assert dataset.constraint_error.max() <= 1e-10
     assert dataset.contact_normal_force.min() >= 0.0
     assert (dataset.contact_damping_loss[-1] > 0.0).all()
     require_coulomb(dataset)

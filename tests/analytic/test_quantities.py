@@ -23,6 +23,8 @@ from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.post.overview import comparison
 from flexclear.pipeline.post.overview.curves import curves
 from tests.analytic import stress_runs
+from tests.properties import mechanisms
+from tests.properties.mechanisms import frame, joint, rigid
 
 SCENES = Path(__file__).parents[2] / "scenes"
 #: scenes whose parts own all kinds of quantities between them, and how much of each is run
@@ -37,52 +39,6 @@ RUNS: Mapping[str, Mapping[str, object]] = {
 }
 FLEXIBLE = "sps4/far_cb"
 
-SLIDER_CRANK = """
-title = "driven slider-crank in the plane"
-time = { end = "60 ms" }
-output = { interval = "0.5 ms" }
-solver = { rtol = 1e-11 }
-[body.ground]
-type = "ground"
-frames.main = {}
-frames.guide = { axis = [1.0, 0.0, 0.0] }
-[body.crank]
-type = "rigid"
-mass = "1 kg"
-inertia = [0.01, 0.01, 0.01]
-frames.main = {}
-frames.pin = { position = ["50 mm", 0.0, 0.0] }
-[body.rod]
-type = "rigid"
-mass = "0.5 kg"
-inertia = [0.001, 0.001, 0.001]
-pose = { position = ["50 mm", 0.0, 0.0] }
-frames.big = {}
-frames.small = { position = ["150 mm", 0.0, 0.0] }
-[body.slider]
-type = "rigid"
-mass = "0.3 kg"
-inertia = [0.001, 0.001, 0.001]
-pose = { position = ["200 mm", 0.0, 0.0] }
-frames.pin = {}
-frames.guide = { axis = [1.0, 0.0, 0.0] }
-[joint.main]
-type = "revolute"
-between = ["ground.main", "crank.main"]
-[joint.pin]
-type = "revolute"
-between = ["crank.pin", "rod.big"]
-[joint.wrist]
-type = "spherical"
-between = ["slider.pin", "rod.small"]
-[joint.guide]
-type = "prismatic"
-between = ["ground.guide", "slider.guide"]
-[drive.motor]
-joint = "main"
-law = { type = "polynomial", coefficients = [0.0, "100 rad/s"] }
-"""
-
 
 def scene(name: str) -> Scene:
     if name == "driven":
@@ -92,12 +48,23 @@ def scene(name: str) -> Scene:
 
 @cache
 def driven() -> Scene:
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "driven.toml"
-        path.write_text(SLIDER_CRANK, encoding="utf-8")
-        return load_scene(path)
+    """A slider-crank in the plane whose crank of 50 mm turns with 100 rad/s; its rod has 150 mm."""
+    along = {"axis": [1.0, 0.0, 0.0]}
+    bodies = {
+        "ground": {"type": "ground", "frames": {"main": {}, "guide": along}},
+        "crank": rigid(1.0, 0.01, {"main": {}, "pin": frame((0.05, 0.0, 0.0))}),
+        "rod": rigid(0.5, 1e-3, {"big": {}, "small": frame((0.15, 0.0, 0.0))}, pose=frame((0.05, 0.0, 0.0))),
+        "slider": rigid(0.3, 1e-3, {"pin": {}, "guide": along}, pose=frame((0.2, 0.0, 0.0))),
+    }
+    joints = {
+        "main": joint("revolute", "ground.main", "crank.main"),
+        "pin": joint("revolute", "crank.pin", "rod.big"),
+        "wrist": joint("spherical", "slider.pin", "rod.small"),
+        "guide": joint("prismatic", "ground.guide", "slider.guide"),
+    }
+    drive = {"motor": {"joint": "main", "law": {"type": "polynomial", "coefficients": [0.0, 100.0]}}}
+    written = mechanisms.scene(bodies, joints, end=0.06, rtol=1e-11, drive=drive, output={"interval": 5e-4})
+    return Scene.model_validate(written)
 
 
 @cache

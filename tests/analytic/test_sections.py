@@ -99,7 +99,7 @@ def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[s
 
 def test_the_repeated_stroke_with_clearance_and_rigid_rods_settles_on_one_period() -> None:
     scene = fc.load_scene("scenes/sps4/variants/first_csj.toml")
-    short = edited(scene, {"sections.transient": 2, "sections.periods": 40, "sections.exponent_periods": 20})
+    short = edited(scene, {"sections.transient": 2, "sections.periods": 20, "sections.exponent_periods": 20})
     found = dynamics.sections(short, {}, silent)
     verdict = derive(found)
     assert int(verdict.returns_after) == 1

@@ -13,7 +13,6 @@ from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from flexclear.pipeline.dynamics.equations import composite
 from flexclear.pipeline.dynamics.integrate import NAMES
 from flexclear.pipeline.dynamics.integrate.method import keep_nothing
-from flexclear.stages import simulation
 
 PACKAGE = "flexclear.pipeline.dynamics.integrate"
 PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
@@ -98,10 +97,3 @@ def test_no_number_of_the_solver_is_compiled_in(root: Path, one: dict, other: di
     path = root / "scenes" / "sps4" / "csj.toml"
     schemes = {scheme_of(load_scene(path, {"solver": solver}).solver) for solver in (one, other)}
     assert len(schemes) == 1
-
-
-@pytest.mark.parametrize("solver", [{}, {"step": 1e-5}, {"integrator": "rk4", "step": 1e-5, "events": "at step ends"}])
-def test_the_key_of_a_run_holds_what_its_code_reaches(root: Path, solver: dict) -> None:
-    scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": solver})
-    known = reach.SOURCES.closure(["flexclear.stages.simulation", *simulation.modules(scene)]).keys()
-    assert {f"{PACKAGE}.{name}" for name in reached(scheme_of(scene.solver))} <= set(known)

@@ -26,14 +26,10 @@ def families() -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("package, name", families())
-def test_a_part_that_is_named_gives_its_module(package: str, name: str) -> None:
-    assert effects.Named(package, name, "here").module == module_of(package, name)
-
-
-@pytest.mark.parametrize("package, name", families())
-def test_what_a_family_lists_is_there(package: str, name: str) -> None:
+def test_what_a_family_lists_is_there_and_gives_its_module(package: str, name: str) -> None:
     """Lists that follow from what scenes declare name modules and objects that exist."""
     assert lookup(package, name, where="here") is not None
+    assert effects.Named(package, name, "here").module == module_of(package, name)
 
 
 #: where a part of a family stands among the parts of the code
@@ -77,7 +73,11 @@ JOINTS = [name for name in import_module(effects.JOINTS).NAMES if name not in ("
 
 
 @pytest.mark.parametrize("name", JOINTS)
-@pytest.mark.parametrize("solver", [{}, {"integrator": "generalized-alpha"}, {"integrator": "rk4", "step": 1e-3}])
+@pytest.mark.parametrize(
+    "solver",
+    [{}, {"integrator": "generalized-alpha"}, {"integrator": "rk4", "step": 1e-3, "events": "at step ends"}],
+    ids=["default", "implicit", "fixed"],
+)
 def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, name: str, solver: dict) -> None:
     """For each type of joint, driven in part where it has several freedoms: a chain of others may take its place."""
     scene = scene_with({"type": name}, solver=solver)

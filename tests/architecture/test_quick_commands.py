@@ -90,7 +90,7 @@ def test_a_run_imports_neither_xarray_nor_what_scipy_computes(
 ) -> None:
     """Of rigid bodies and of flexible ones whose bundles are fresh: xarray takes as long as all else of a short run."""
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    short = (scene, "--set", "time.end='0.1 ms'", "--jobs", "1")
+    short = (scene, "--set", "time.end='1 us'", "--jobs", "1")
     if scene == "checks/clamped_rod":
         assert "xarray" in imported("run", *short, "--to", "bundle", results=tmp_path)
     found = imported("run", *short, results=tmp_path)

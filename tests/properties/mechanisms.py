@@ -67,3 +67,35 @@ def turned(R: np.ndarray, vector: Any) -> list[float]:
 
 def matrix(vector: Any) -> np.ndarray:
     return rotation_vector_to_matrix(np.asarray(vector, dtype=float))
+
+
+#: turns of frames
+TILT, LEAN = (0.3, -0.2, 0.1), (-0.1, 0.4, 0.2)
+
+
+def two_loops() -> Table:
+    """Ground-universal-a-cylindrical-b-spherical-ground, and ground-planar-c-revolute-d-spherical-ground."""
+    bodies = {
+        "base": {
+            "type": "ground",
+            "frames": {
+                "U": frame((0.0, 0.0, 0.0), TILT),
+                "S": frame((0.5, 0.3, 0.2)),
+                "P": frame((1.0, 0.0, 0.0), LEAN),
+                "T": frame((1.4, 0.3, -0.2)),
+            },
+        },
+        "a": body((0.0, 0.0, 0.0), frames={"U": frame((0.0, 0.0, 0.0), TILT), "Y": frame((0.3, 0.0, 0.1), LEAN)}),
+        "b": body((0.3, 0.0, 0.1), frames={"Y": frame((0.0, 0.0, 0.0), LEAN), "S": frame((0.2, 0.3, 0.1))}),
+        "c": body((1.0, 0.0, 0.0), frames={"P": frame((0.0, 0.0, 0.0), LEAN), "R": frame((0.2, 0.0, 0.0), TILT)}),
+        "d": body((1.2, 0.0, 0.0), frames={"R": frame((0.0, 0.0, 0.0), TILT), "T": frame((0.2, 0.3, -0.2))}),
+    }
+    joints = {
+        "U": joint("universal", "base.U", "a.U"),
+        "Y": joint("cylindrical", "a.Y", "b.Y"),
+        "S": joint("spherical", "b.S", "base.S"),
+        "P": joint("planar", "base.P", "c.P"),
+        "R": joint("revolute", "c.R", "d.R"),
+        "T": joint("spherical", "d.T", "base.T"),
+    }
+    return scene(bodies, joints, end=0.2, load=GRAVITY)

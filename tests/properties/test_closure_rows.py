@@ -13,8 +13,7 @@ from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.specialise.trace import Trace
 from tests.analytic.mechanism_runs import TREE
-from tests.properties.mechanisms import frame, joint
-from tests.properties.test_dynamics_cuts import LEAN, two_loops
+from tests.properties.mechanisms import LEAN, frame, joint, two_loops
 from tests.properties.test_specialised import keep_independent, rates_kernel
 
 #: rows of closures that are solved for, per scene
@@ -74,7 +73,7 @@ def test_rows_of_two_loops_that_share_a_joint(
     monkeypatch: pytest.MonkeyPatch, cut: tuple[str, str], rows: list[int]
 ) -> None:
     """The second loop of `two_loops` begins on a body of the first one: threes meet of which the last are not full."""
-    table: dict[str, Any] = two_loops(swapped=False)
+    table: dict[str, Any] = two_loops()
     table["body"]["a"]["frames"]["P"] = frame((1.0, 0.0, 0.0), LEAN)
     table["joint"]["P"] = joint("planar", "a.P", "c.P")
     monkeypatch.setattr(tree, "_freedom", lambda edge: int(edge.name in cut))

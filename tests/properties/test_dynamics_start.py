@@ -16,15 +16,14 @@ from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate
-from tests.properties.test_dynamics_cuts import two_loops
+from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate, two_loops
 
 
 @pytest.mark.slow
 def test_one_body_sets_its_whole_loop_in_motion() -> None:
     """From rest all accelerations are admissible velocities: given one body's as velocity, the others' must follow."""
-    at_rest = simulate(two_loops(False)).isel(time=0)
-    moving = two_loops(False)
+    at_rest = simulate(two_loops()).isel(time=0)
+    moving = two_loops()
     given = {name: at_rest.sel(body=name) for name in ("a", "d")}
     for name, start in given.items():
         moving["body"][name]["angular_velocity"] = start.angular_acceleration.values.tolist()
@@ -39,7 +38,7 @@ def test_one_body_sets_its_whole_loop_in_motion() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["a", "d"])
 def test_velocities_that_would_open_a_loop_are_refused(name: str) -> None:
-    table = two_loops(False)
+    table = two_loops()
     table["body"][name]["angular_velocity"] = [1.0, 2.0, 3.0]
     with pytest.raises(InputError, match=f"velocities given for {name}") as error:
         simulate(table)

@@ -1,7 +1,7 @@
-"""A copy of the project with small engines in place of the real ones, to watch the workflow at work.
+"""The workflow at work with small engines in place of the real ones: in a copy of the project, or in this process.
 
-The copy's `simulated` and `derived` make little datasets, and log each call to a file. `simulated` does not end while
-there is a file of the name HELD_BY.
+Their `simulated` and `derived` make little datasets, and log each call to a file. `simulated` does not end while there
+is a file of the name HELD_BY.
 """
 
 import os
@@ -15,7 +15,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from flexclear.commands import scenes
 from flexclear.commands.__main__ import main
+from flexclear.pipeline import dynamics, post
 from flexclear.stages.sweeps import sweep_engine
 from tests.processes import copied
 
@@ -57,8 +59,6 @@ def ensemble(scene, bundles, progress):
 """
 
 POST = """
-from flexclear.pipeline.dynamics import log
-
 def derived(run, ensemble):
     log(f"post {run.attrs['scene']}")
     return run.to_xarray().mean("time")
@@ -106,9 +106,13 @@ def interruptible() -> None:
 
 @dataclass(frozen=True)
 class Project:
-    """The copy: its folder, its results, and the calls that its engines logged."""
+    """Its folder, its results, and the calls that its engines logged.
+
+    capsys: of a project in this process, else it is a copy.
+    """
 
     folder: Path
+    capsys: pytest.CaptureFixture[str] | None = None
     started: list[subprocess.Popen[str]] = field(default_factory=list)
 
     @property
@@ -140,6 +144,9 @@ class Project:
 
     def run(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
         """The command, done."""
+        if self.capsys is not None:
+            code = main(list(arguments))
+            return subprocess.CompletedProcess(arguments, code, *self.capsys.readouterr())
         return self.python("-m", "flexclear", *arguments, **environment)
 
     def python(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -162,6 +169,12 @@ class Project:
         path.unlink(missing_ok=True)
         return lines
 
+    def add(self, name: str, text: str) -> None:
+        """Write one more scene of the family tiny."""
+        path = self.folder / "scenes" / "tiny" / f"{name}.toml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
     def edit(self, file: str, old: str, new: str) -> None:
         path = self.folder / file
         text, changed = path.read_text(), path.stat().st_mtime
@@ -180,25 +193,30 @@ def project(tmp_path: Path) -> Iterator[Project]:
     """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
     folder = copied(tmp_path / "project")
     (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)
-    (folder / "pipeline" / "post" / "__init__.py").write_text(POST)
-    scenes = folder / "scenes" / "tiny"
-    scenes.mkdir(parents=True)
-    (scenes / "ideal.toml").write_text(SCENE + JOINT)
-    (scenes / "contact.toml").write_text(CONTACT)
+    (folder / "pipeline" / "post" / "__init__.py").write_text("from flexclear.pipeline.dynamics import log\n" + POST)
     made = Project(folder)
+    made.add("ideal", SCENE + JOINT)
+    made.add("contact", CONTACT)
     yield made
     for process in made.started:
         process.kill()  # where a test fails, what it holds would run on
 
 
 @pytest.fixture
-def add_scene(project: Project) -> Callable[[str, str], None]:
-    """Write one more scene of the family tiny."""
-
-    def add(name: str, text: str) -> None:
-        (project.folder / "scenes" / "tiny" / f"{name}.toml").write_text(text)
-
-    return add
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Project:
+    """The same two scenes and engines in this process, for what is no matter of processes or of sources."""
+    engines: dict[str, Any] = {}
+    exec(ENGINE + POST, engines)
+    for module, name in ((dynamics, "simulated"), (dynamics, "ensemble"), (post, "derived")):
+        monkeypatch.setattr(module, name, engines[name])
+    monkeypatch.setattr(scenes, "DATA", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CALLS", str(tmp_path / "calls"))
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", "results")
+    made = Project(tmp_path, capsys)
+    made.add("ideal", SCENE + JOINT)
+    made.add("contact", CONTACT)
+    return made
 
 
 @pytest.fixture

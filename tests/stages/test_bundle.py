@@ -88,10 +88,7 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
             reproduction.repeat(tmp_path / "a.zip", [])
 
 
-def test_a_run_that_is_repeated_is_compared_to_the_last_bit(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
-) -> None:
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+def test_a_run_that_is_repeated_is_compared_to_the_last_bit(root: Path, tmp_path: Path, command: Command) -> None:
     scene = Path(shutil.copy(root / "scenes" / "checks" / "pendulum.toml", tmp_path))
     path = reproduction.make(str(scene), ["time.end='20 ms'"], ["numpy"], tmp_path / "bundle.zip")
     assert "the run is the same to the last bit" in command("doctor", "--repeat", path).out

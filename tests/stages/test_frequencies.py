@@ -10,24 +10,8 @@ import flexclear as fc
 from flexclear.commands.frequencies import text
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.stages.graph import Graph
-from tests.processes import printed
 from tests.stages.conftest import Command
-
-#: makes one equilibrium in a fresh process and prints the own modules that it loaded
-LOADED = """
-import sys
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.stages import simulation
-before = set(sys.modules)
-scene = load_scene(sys.argv[1])
-pose = {"time": None, "drives": {}, "moving": False, "vibrations": True}
-params = {**simulation.params(scene), "pose": pose}
-simulation.linear(params, {}, lambda share, text: None)
-print(*sorted(n for n in sys.modules.keys() - before if n.split(".")[0] in ("flexclear",)))
-"""
 
 
 def path_of(root: Path, name: str) -> Path:
@@ -82,13 +66,6 @@ def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean(root
     both = fc.frequencies(path_of(root, "pendulum"))
     assert both.frequency.attrs["units"] == "Hz"
     assert both.position.values == pytest.approx(first.position.values, abs=1e-14)
-
-
-def test_every_module_that_an_equilibrium_takes_is_in_its_key(root: Path) -> None:
-    path = path_of(root, "pendulum")
-    task = Graph(load_scene(path)).linear()
-    closure = Sources(root).closure((task.run.partition(":")[0], STORE, *task.modules))
-    assert set(printed(LOADED, path).split()) <= closure.keys()
 
 
 def test_only_what_matters_is_in_the_key(root: Path) -> None:

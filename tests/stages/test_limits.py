@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from flexclear.commands import cost, sections
+from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.scene.limits import check_cells
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.system import machine
@@ -185,7 +186,7 @@ def test_figures_need_no_home_folder(root: Path, tmp_path: Path) -> None:
     removed = ("MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
     environment = {name: value for name, value in os.environ.items() if name not in removed}
     environment |= {"HOME": str(tmp_path / "file" / "home"), "FLEXCLEAR_RESULTS": str(tmp_path / "results")}
-    environment |= {"FLEXCLEAR_KERNELS": str(tmp_path / "kernels")}
+    environment |= {"FLEXCLEAR_KERNELS": str(kernel_root())}
     command = [sys.executable, "-c", DRAWN]
     done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=False)
     assert done.stdout == "[]\n", done.stderr

@@ -157,7 +157,7 @@ def recorded(case: Case, **outcome: Any) -> Record:
 
 
 def test_the_page_counts_refusals_apart_and_quotes_them():
-    made = atlas.cases(7, 6)
+    made = [case for case in atlas.cases(7, 6) if atlas.sweep(case.name) in ("clearance", "speed", "random")]
     records = [recorded(case) for case in made]
     records[0] |= {"verdict": REFUSED, "reason": "at t = 0.1 s: the step shrank"}
     written = FAMILY.show(records)

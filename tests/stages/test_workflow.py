@@ -10,20 +10,19 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+import flexclear as fc
 from flexclear.pipeline.core.artifacts.disk import _host
 from tests.stages.conftest import CONTACT, JOINT, PATIENCE, SCENE, Project
 
-AddScene = Callable[[str, str], None]
 
-
-def test_what_is_fresh_is_not_run_again(project: Project):
-    assert project.run("run", "tiny/contact").returncode == 0
-    assert project.calls() == ["simulate tiny/contact", "post tiny/contact"]
-    shown = project.results / "runs" / "tiny" / "contact"
+def test_what_is_fresh_is_not_run_again(here: Project):
+    assert here.run("run", "tiny/contact").returncode == 0
+    assert here.calls() == ["simulate tiny/contact", "post tiny/contact"]
+    shown = here.results / "runs" / "tiny" / "contact"
     assert xr.load_dataset(shown / "run.nc", decode_times=False).attrs["scene"] == "tiny/contact"
     assert (shown / "post.nc").is_file()
-    again = project.run("run", "tiny/contact")
-    assert (again.returncode, again.stderr, project.calls()) == (0, "", [])
+    again = here.run("run", "tiny/contact")
+    assert (again.returncode, again.stderr, here.calls()) == (0, "", [])
 
 
 def test_why_says_what_changed_and_run_does_just_that(project: Project):
@@ -67,16 +66,16 @@ def test_equal_results_stop_the_chain(project: Project):
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
 
 
-def test_a_corrupt_artifact_is_told_in_one_line_and_rebuilt(project: Project):
-    project.run("run", "tiny/ideal")
-    path = project.artifact("simulate")
+def test_a_corrupt_artifact_is_told_in_one_line_and_rebuilt(here: Project):
+    here.run("run", "tiny/ideal")
+    path = here.artifact("simulate")
     whole = path.read_bytes()
     for broken in (whole[:-1] + bytes([whole[-1] ^ 1]), whole[:100]):
-        project.calls()
+        here.calls()
         path.write_bytes(broken)
-        assert "is corrupt" in project.run("why", "tiny/ideal").stdout
-        done = project.run("run", "tiny/ideal")
-        assert (done.returncode, project.calls()) == (0, ["simulate tiny/ideal"])
+        assert "is corrupt" in here.run("why", "tiny/ideal").stdout
+        done = here.run("run", "tiny/ideal")
+        assert (done.returncode, here.calls()) == (0, ["simulate tiny/ideal"])
         assert sum("is corrupt" in line for line in done.stderr.splitlines()) == 1
         assert path.read_bytes() == whole
 
@@ -117,13 +116,13 @@ def test_an_interrupt_ends_everything_with_130(project: Project, scenes: list[st
     assert not list(project.results.rglob("*.nc"))
 
 
-def test_a_solver_that_gives_up_stops_only_what_depends_on_it(project: Project, add_scene: Callable[[str, str], None]):
-    add_scene("fails", SCENE + JOINT)
-    done = project.run("run", "tiny/fails", "tiny/ideal")
+def test_a_solver_that_gives_up_stops_only_what_depends_on_it(here: Project):
+    here.add("fails", SCENE + JOINT)
+    done = here.run("run", "tiny/fails", "tiny/ideal", "--jobs", "1")
     assert done.returncode == 3
     assert "flexclear: tiny/fails simulate: at t = 0.1 s joint A1: no step is small enough" in done.stderr
     assert "Traceback" not in done.stderr
-    assert sorted(project.calls()) == ["post tiny/ideal", "simulate tiny/fails", "simulate tiny/ideal"]
+    assert sorted(here.calls()) == ["post tiny/ideal", "simulate tiny/fails", "simulate tiny/ideal"]
 
 
 def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
@@ -138,74 +137,65 @@ def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
     assert [path.name for path in project.results.rglob("*") if path.is_file() and path.stat().st_size] == []
 
 
-def test_a_scene_that_says_the_same_under_another_name_is_not_run_again(
-    project: Project, add_scene: Callable[[str, str], None]
-):
+def test_a_scene_that_says_the_same_under_another_name_is_not_run_again(here: Project):
     """The name of its file is no fact; both show the result, and only `run` from Python and `--out` name it."""
-    add_scene("twin", SCENE + JOINT)
+    here.add("twin", SCENE + JOINT)
     for name in ("ideal", "twin"):
-        project.run("run", f"tiny/{name}", "--to", "simulate", "--out", str(project.folder / f"{name}.nc"))
-        named = xr.load_dataset(project.folder / f"{name}.nc", decode_times=False)
+        here.run("run", f"tiny/{name}", "--to", "simulate", "--out", str(here.folder / f"{name}.nc"))
+        named = xr.load_dataset(here.folder / f"{name}.nc", decode_times=False)
         assert named.attrs["scene"] == f"tiny/{name}"
-    assert project.calls() == ["simulate tiny/ideal"]
-    shown = [project.results / "runs" / "tiny" / name / "run.nc" for name in ("ideal", "twin")]
+    assert here.calls() == ["simulate tiny/ideal"]
+    shown = [here.results / "runs" / "tiny" / name / "run.nc" for name in ("ideal", "twin")]
     assert shown[0].read_bytes() == shown[1].read_bytes()
 
 
-def test_the_ensemble_is_a_stage_of_its_own(project: Project, add_scene: Callable[[str, str], None]):
-    add_scene("many", CONTACT + "\n[ensemble]\nmembers = 3\n")
-    project.run("run", "tiny/many")
-    assert sorted(project.calls()) == ["ensemble tiny/many", "post tiny/many", "simulate tiny/many"]
-    project.edit("scenes/tiny/many.toml", "members = 3", "members = 4")
-    project.run("run", "tiny/many")
-    assert project.calls() == ["ensemble tiny/many", "post tiny/many"]
-    stored = xr.load_dataset(project.results / "runs" / "tiny" / "many" / "ensemble.nc")
+def test_the_ensemble_is_a_stage_of_its_own(here: Project):
+    here.add("many", CONTACT + "\n[ensemble]\nmembers = 3\n")
+    here.run("run", "tiny/many")
+    assert sorted(here.calls()) == ["ensemble tiny/many", "post tiny/many", "simulate tiny/many"]
+    here.edit("scenes/tiny/many.toml", "members = 3", "members = 4")
+    here.run("run", "tiny/many")
+    assert here.calls() == ["ensemble tiny/many", "post tiny/many"]
+    stored = xr.load_dataset(here.results / "runs" / "tiny" / "many" / "ensemble.nc")
     assert stored.sizes["member"] == 4
 
 
-def test_an_edited_scene_does_not_take_the_place_of_its_file(project: Project):
-
-    project.run("run", "tiny/contact", "--to", "simulate")
-    shown = project.results / "runs" / "tiny" / "contact" / "run.nc"
+def test_an_edited_scene_does_not_take_the_place_of_its_file(here: Project):
+    here.run("run", "tiny/contact", "--to", "simulate")
+    shown = here.results / "runs" / "tiny" / "contact" / "run.nc"
     before = shown.read_bytes()
-    code = (
-        "import flexclear as fc\n"
-        "scene = fc.load_scene('scenes/tiny/contact.toml', override={'output.interval': '1 ms'})\n"
-        "run = fc.run(scene)\n"
-        "print(float(run.time[1]), run.attrs['title'])"
-    )
-    done = project.python("-c", code)
-    assert done.stdout == "0.001 Ball in a socket, with clearance\n"
+    run = fc.run(fc.load_scene("scenes/tiny/contact.toml", override={"output.interval": "1 ms"}))
+    assert (float(run.time[1]), run.attrs["title"]) == (0.001, "Ball in a socket, with clearance")
     assert shown.read_bytes() == before
-    assert "fresh" in project.run("why", "tiny/contact", "--to", "simulate").stdout
+    assert "fresh" in here.run("why", "tiny/contact", "--to", "simulate").stdout
 
 
-def test_out_copies_the_run(project: Project):
-    target = project.folder / "mine.nc"
-    assert project.run("run", "tiny/ideal", "--out", "mine.nc").returncode == 0
+def test_out_copies_the_run(here: Project):
+    target = here.folder / "mine.nc"
+    assert here.run("run", "tiny/ideal", "--out", "mine.nc").returncode == 0
     copied = xr.load_dataset(target, decode_times=False)
     assert copied.attrs["title"] == "Ball in a socket"
     assert copied.sizes["time"] == 5
-    assert project.run("run", "tiny/ideal", "--out", "mine.csv").returncode == 0
-    columns = (project.folder / "mine.csv").read_text().splitlines()
+    assert here.run("run", "tiny/ideal", "--out", "mine.csv").returncode == 0
+    columns = (here.folder / "mine.csv").read_text().splitlines()
     assert columns[0].startswith("time,")
     assert len(columns) > 2
-    unknown = project.run("run", "tiny/ideal", "--out", "mine.hdf")
+    unknown = here.run("run", "tiny/ideal", "--out", "mine.hdf")
     assert unknown.returncode == 2
     assert "'.hdf' is no known format" in unknown.stderr
-    refused = project.run("run", "tiny/ideal", "--out", "nowhere/mine.nc")
+    refused = here.run("run", "tiny/ideal", "--out", "nowhere/mine.nc")
     assert refused.returncode == 2
     assert "its folder does not exist" in refused.stderr
-    assert project.run("run", "tiny/ideal", "--out", ".").returncode == 2
-    assert project.run("run", "tiny/ideal", "tiny/contact", "--out", "mine.nc").returncode == 2
+    assert here.run("run", "tiny/ideal", "--out", ".").returncode == 2
+    assert here.run("run", "tiny/ideal", "tiny/contact", "--out", "mine.nc").returncode == 2
 
 
-def test_progress_goes_to_stderr_and_what_was_written_to_stdout(project: Project):
-    done = project.run("run", "tiny/ideal")
+def test_progress_goes_to_stderr_and_what_was_written_to_stdout(here: Project):
+    done = here.run("run", "tiny/ideal")
     told = "run.nc (the run), post.nc (derived from it)"
-    assert done.stdout == f"{project.results.relative_to(project.folder)}/runs/tiny/ideal: {told}\n"
+    assert done.stdout == f"{here.results.relative_to(here.folder)}/runs/tiny/ideal: {told}\n"
     assert "flexclear: [0/2] tiny/ideal: simulate" in done.stderr.splitlines()
-    json.loads(project.run("schema").stdout)
+    json.loads(here.run("schema").stdout)
 
 
 def _wait_for(condition: Callable[[], bool]) -> None:
@@ -216,32 +206,30 @@ def _wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def test_two_files_of_one_name_are_told_apart_or_refused(project: Project):
+def test_two_files_of_one_name_are_told_apart_or_refused(here: Project):
     """Below the current folder they are called by their paths; elsewhere one must not take the other's place."""
     for name in ("a", "b"):
-        (project.folder / name).mkdir()
-        (project.folder / name / "x.toml").write_text(SCENE + JOINT + f"\n# {name}\n")
-    assert project.run("run", "a/x.toml", "b/x.toml", "--to", "simulate").returncode == 0
-    assert all((project.results / "runs" / name / "x" / "run.nc").is_file() for name in ("a", "b"))
-    away = project.folder.parent / "away"
+        (here.folder / name).mkdir()
+        (here.folder / name / "x.toml").write_text(SCENE + JOINT + f"\n# {name}\n")
+    assert here.run("run", "a/x.toml", "b/x.toml", "--to", "simulate", "--jobs", "1").returncode == 0
+    assert all((here.results / "runs" / name / "x" / "run.nc").is_file() for name in ("a", "b"))
+    away = here.folder.parent / "away"
     away.mkdir()
-    paths = [str((project.folder / name / "x.toml").rename(away / f"{name}.toml")) for name in ("a", "b")]
+    paths = [str((here.folder / name / "x.toml").rename(away / f"{name}.toml")) for name in ("a", "b")]
     (away / "c").mkdir()
     twin = away / "c" / "a.toml"
     twin.write_text(SCENE + JOINT)
-    done = project.run("run", paths[0], str(twin))
+    done = here.run("run", paths[0], str(twin))
     assert done.returncode == 2
     assert "is called 'a', as" in done.stderr
     assert "replace each other" in done.stderr
-    project.run("run", paths[0], "--to", "simulate")
-    done = project.run("run", str(twin), "--to", "simulate")
+    here.run("run", paths[0], "--to", "simulate")
+    done = here.run("run", str(twin), "--to", "simulate")
     assert done.returncode == 0
     assert f"runs/a showed {paths[0]}, and from now on shows {twin}" in done.stderr
 
 
-def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_current(
-    project: Project, add_scene: Callable[[str, str], None]
-):
+def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_current(project: Project):
     folder = project.results / "runs" / "tiny" / "ideal"
     project.run("run", "tiny/ideal")
     assert not (folder / "OUTDATED.txt").exists()
@@ -306,31 +294,31 @@ def _alive(pid: int) -> bool:
         return False
 
 
-def test_what_a_run_is_to_be_doubted_for_ends_the_command_each_time(project: Project, add_scene: AddScene):
-    add_scene("doubtful", SCENE + JOINT)
+def test_what_a_run_is_to_be_doubted_for_ends_the_command_each_time(here: Project):
+    here.add("doubtful", SCENE + JOINT)
     told = ["tiny/doubtful: warning: the rod bends too far", "tiny/doubtful: warning: the contact is too deep"]
     for _ in range(2):  # the second time nothing runs
-        done = project.run("run", "tiny/doubtful")
+        done = here.run("run", "tiny/doubtful")
         assert done.returncode == 0
         assert done.stderr.splitlines()[-2:] == [f"flexclear: {sentence}" for sentence in told]
 
 
-def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(project: Project, add_scene: AddScene):
+def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(here: Project):
     requested = SCENE + JOINT + '[accuracy]\nball.position = "1 um"\n'
-    add_scene("wanted", requested)
+    here.add("wanted", requested)
     for _ in range(2):
-        done = project.run("run", "tiny/wanted")
+        done = here.run("run", "tiny/wanted")
         assert done.returncode == 3
         assert (
             "tiny/wanted [accuracy]: missed: ball.position is good to 2e-06, 2 times what is requested" in done.stderr
         )
         assert "allow_missed = true" in done.stderr
         assert "Traceback" not in done.stderr
-    kept = xr.load_dataset(project.results / "runs" / "tiny" / "wanted" / "run.nc", decode_times=False)
+    kept = xr.load_dataset(here.results / "runs" / "tiny" / "wanted" / "run.nc", decode_times=False)
     assert "2 times what is requested" in kept.attrs["accuracy_verdict"]
-    project.calls()
-    add_scene("wanted", requested + "allow_missed = true\n")
-    done = project.run("run", "tiny/wanted")
+    here.calls()
+    here.add("wanted", requested + "allow_missed = true\n")
+    done = here.run("run", "tiny/wanted")
     assert done.returncode == 0
     assert "missed: ball.position" in done.stderr
-    assert project.calls() == []  # whether it may be missed changes nothing of the run
+    assert here.calls() == []  # whether it may be missed changes nothing of the run
