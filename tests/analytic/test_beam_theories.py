@@ -55,6 +55,8 @@ KAPPA_09 = {
     "CC": (1529.6005076471188, 4049.8981065578914, 7562.094331180602),
     "CF": (247.5021056692413, 1515.739289901413, 4100.261575308612),
 }
+# its torsional and axial frequencies of twelve linear elements, free or fixed at both ends
+TWELVE_LINEAR = ((6553.024067023286, 13218.447482364336), (10687.658815902936, 21558.63542122052))
 # docs/structure.md, "How many elements"
 DOCUMENTED = {
     ("rayleigh", 4): (1.3e-3, 9.2e-3, 2.2e-2),
@@ -190,6 +192,15 @@ def test_twist_and_extension_converge_at_twice_their_degree(
     )
     assert error.min() > 0.0
     np.testing.assert_allclose(order(elements, error), expected, atol=0.1)
+
+
+@pytest.mark.parametrize("ends", ["FF", "CC"])
+def test_twelve_linear_elements_agree_with_an_independent_program(ends: str) -> None:
+    rod = build(elements=12)
+    twist, stretch = (frequencies(rod, motion, ends, 2) for motion in (TORSION, EXTENSION))
+    # dense solvers of two programs on twelve unknowns
+    np.testing.assert_allclose(twist, TWELVE_LINEAR[0], rtol=1e-10)
+    np.testing.assert_allclose(stretch, TWELVE_LINEAR[1], rtol=1e-10)
 
 
 @pytest.mark.parametrize("motion, name", [(TORSION, "torsion"), (EXTENSION, "extension")])
