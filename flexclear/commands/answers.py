@@ -110,8 +110,10 @@ class Answers:
     seconds: float | None = None
     questions: int = 2
 
-    def kernels(self) -> list[Task]:
-        """Those of variants that the effects need, to be compiled while the scene's own run leaves a processor idle."""
+    @cached_property
+    def kernels(self) -> dict[tuple[str, ...], Task]:
+        """Those of variants that the effects need, to be compiled while the scene's own run leaves a processor idle; by
+        what runs on them (`kernels.shared`)."""
         effects, tasks = variants.effects(self.scene), dict[tuple[str, ...], Task]()
         ideal = [effect for effect in effects if effect.kind in (CLEARANCE, FLEXIBILITY)]
         for effect in ideal if len(ideal) > 1 else ():  # without the only one it is the ideal scene, which is run
@@ -119,7 +121,7 @@ class Answers:
             variant = watched_quantities.plain(variants.without(self.scene, gone))
             variant = edited(variant, {"solver.integrator": DEFAULT}) if self.scene.by_need() else variant
             tasks[kernels.shared(variant)] = kernels.task(variant, Graph(variant, shown=False).bodies())
-        return list(tasks.values())[:AHEAD]
+        return dict(list(tasks.items())[:AHEAD])
 
     @cached_property
     def _begun(self) -> cost.Study:
@@ -170,7 +172,8 @@ class Answers:
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
             return None
-        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task())[0]
+        compared = _Comparison(self.scene, self.workplace, effects, chosen, self._begun, self.kernels)
+        return self.workplace.made(compared.task())[0]
 
 
 @dataclass
@@ -182,6 +185,8 @@ class _Comparison:
     effects: Sequence[Effect]
     chosen: Sequence[Quantity]
     study: cost.Study
+    #: kernels that are compiled ahead, by what runs on them
+    ahead: Mapping[tuple[str, ...], Task]
     #: by effect that is missing, and number of members
     tasks: dict[tuple[str, int], Task] = field(default_factory=dict)
     points: dict[tuple[str, int], Point] = field(default_factory=dict)
@@ -195,6 +200,7 @@ class _Comparison:
         """The task of the answer, its points made."""
         from flexclear.pipeline.post.answers.matters import Pair, undecided
 
+        self.workplace.bring(list(self.ahead.values()))
         names, undone = self._affordable()
         pairs = dict.fromkeys(names, 0)
         waiting, levels = names, MEMBERS if self._touching("") else (0,)
@@ -233,10 +239,10 @@ class _Comparison:
 
     @property
     def _compiled(self) -> set[tuple[str, ...]]:
-        """Kinds of kernels that are there: those of the costs of accuracy, and of the run of the ideal scene."""
+        """Kinds of kernels that are there: those made ahead, of the costs of accuracy, and of the ideal scene's run."""
         scenes = [design.scene for design in self.study.points]
         scenes += [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
-        return {kernels.shared(scene) for scene in scenes}
+        return {kernels.shared(scene) for scene in scenes} | set(self.ahead)
 
     @cached_property
     def _gone(self) -> Mapping[str, frozenset[str]]:

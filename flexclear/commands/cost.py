@@ -42,7 +42,7 @@ LARGEST_PEERS = 16 << 20
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
-BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
+BUDGET, POINT, COMPILING = 80.0, 0.6, 8.0
 #: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
 MOST_EVALUATIONS = 10.0
 #: of runs that were left undone, so many are named

@@ -173,15 +173,20 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
         distance, of_means = _along(a, b, name, n, turning=turning)
         if np.isinf(distance).any():
             return Influence(np.inf)
-        pairs = zip(a.members, b.members, strict=True)
-        spread = np.std([_rows(one[name]) - _rows(two[name]) for one, two in pairs], axis=0, ddof=1)
-        of_pairs = _pooled(np.linalg.norm(spread, axis=1) * (2.0 if turning else 1.0)) / np.sqrt(n)
+        of_pairs = _of_pairs(a, b, name, turning=turning)
         allowed = _allowed(b, name, requested, turning=turning)
         alike = allowed <= requested
         doubt = np.where(alike, stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * of_pairs, chance(n, LIKELY) * of_means)
         error = max(error, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
         most = max(most, error, float(distance[alike].max(initial=0.0)))
     return Influence(error, most - error)
+
+
+def _of_pairs(a: Point, b: Point, name: str, *, turning: bool) -> np.ndarray:
+    """Standard error at each output of the mean difference of two ways to run a scene, from the same starts."""
+    pairs = zip(a.members, b.members, strict=True)
+    spread = np.std([_rows(one[name]) - _rows(two[name]) for one, two in pairs], axis=0, ddof=1)
+    return _pooled(np.linalg.norm(spread, axis=1) * (2.0 if turning else 1.0)) / np.sqrt(len(b.members))
 
 
 def _allowed(full: Point, name: str, requested: float, *, turning: bool) -> np.ndarray:
@@ -199,7 +204,8 @@ def _deviations(point: Point, name: str, *, turning: bool) -> np.ndarray:
 def agreement(planned: Point, full: Point, quantity: Quantity, members: int, requested: float) -> Agreement:
     """How well a planned run agrees with the full one in a quantity, at the output where that is decided.
 
-    members: starts of each.  requested: accuracy [SI].
+    members: starts of each; where both points hold them, their differences start by start say what may be chance, where
+    that is less than what two independent means say.  requested: accuracy [SI].
     """
     if quantity.kind == "impact_times":
         return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
@@ -210,6 +216,9 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
         if np.isinf(distance).any():
             return Agreement(np.inf, 0.0, requested)
         doubt = chance(members) * doubt
+        if min(len(planned.members), len(full.members)) > 1:
+            of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, name, turning=turning)
+            doubt = np.minimum(doubt, of_pairs)
         error = _beyond(distance, doubt)
         allowed = _allowed(full, name, requested, turning=turning)
         floor = np.maximum(allowed, np.finfo(float).tiny)  # nothing is allowed of what never changes

@@ -36,7 +36,10 @@ OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
 ALLOWED, LEAST_PART, SHORTER = 5e6, 0.0625, 0.25
 #: the beginning that is run to know how long the rest takes
 BEGINNING = 0.03125
-#: a pilot is given up at so many times that, and is then as one that was refused
+#: where clearance stays, decisions rest on runs over so many times that part: in most scenes over all of the time
+WHOLE_TIME = 8
+#: a pilot is given up at so many times the evaluations that it is expected to take at most, and is then as one that was
+#: refused
 GIVEN_UP = 4.0
 #: runs at tight tolerances may take so many times more
 OF_TIGHT = 2
@@ -61,7 +64,7 @@ class Extent:
     @property
     def most(self) -> int:
         """Evaluations of one run at which it is given up."""
-        return int(GIVEN_UP * ALLOWED / (MEMBERS * self.variables))
+        return int(GIVEN_UP * WHOLE_TIME * ALLOWED / (MEMBERS * self.variables))
 
 
 @dataclass
@@ -130,6 +133,10 @@ class Pilots:
         while TAKES_LONG in self.must_run(gone, fraction).refused and fraction > LEAST_PART:
             fraction = shorter(fraction)
         return fraction
+
+    def whole(self, gone: Collection[Effect]) -> float:
+        """The part of the time over which a variant that stays loose is examined: all of it where that can be had."""
+        return min(1.0, WHOLE_TIME * self.part(gone))
 
     def point(
         self,
