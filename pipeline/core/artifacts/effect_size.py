@@ -95,12 +95,9 @@ class Agreement:
         return members * (self.chance / room) ** 2 if room > 0.0 else np.inf
 
 
-def chance(members: int, rare: float = RARE) -> float:
-    """Standard errors of a difference of two means over so many members each that chance reaches (Student's t).
-
-    rare: how often it exceeds them.
-    """
-    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * rare))
+def chance(members: int) -> float:
+    """Standard errors of a difference of two means over so many members each that chance reaches (Student's t)."""
+    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
 
 
 def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
@@ -164,19 +161,20 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
 
     While runs of b agree within what is requested, what the starts have in common is the error: the mean of their
     differences, less LIKELY chance by Student's paired t. The rest of that mean is uncertain. Beyond, what exceeds
-    LIKELY chance of a difference of means counts, as a fraction of what may be off there (`Agreement.allowed`).
+    LIKELY chance of a difference of means that scatter as b does counts, as a fraction of what may be off there
+    (`Agreement.allowed`): runs of a that scatter more are no excuse.
     """
     if quantity.kind == "impact_times":
         return _impact_times(a, b, quantity.name)
     turning, n, error, most = quantity.kind == "orientation", len(b.members), 0.0, 0.0
     for name in (f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)):
-        distance, of_means = _along(a, b, name, n, turning=turning)
+        distance, _ = _along(a, b, name, n, turning=turning)
         if np.isinf(distance).any():
             return Influence(np.inf)
         of_pairs = _of_pairs(a, b, name, turning=turning)
         allowed = _allowed(b, name, requested, turning=turning)
         alike = allowed <= requested
-        doubt = np.where(alike, stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * of_pairs, chance(n, LIKELY) * of_means)
+        doubt = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
         error = max(error, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
         most = max(most, error, float(distance[alike].max(initial=0.0)))
     return Influence(error, most - error)
