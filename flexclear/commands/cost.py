@@ -102,7 +102,7 @@ class Study:
     """A cost study while its points are made, each from the cache where it is there.
 
     seconds: of processor that the points may take; a point counts what it took when it was made.  models: whether
-    other meshes, mode sets and beam theories are among them.
+    other meshes, mode sets and beam theories are among them.  compiled: kernels, by what runs on them.
     """
 
     scene: Scene
@@ -111,6 +111,7 @@ class Study:
     integrators: Collection[str] = ()
     models: bool = False
     peers: Sequence[Track] = ()
+    compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
     runs: dict[str, Task] = field(default_factory=dict)
     points: list[cost_design.Design] = field(default_factory=list)
     undone: list[cost_design.Design] = field(default_factory=list)
@@ -120,7 +121,6 @@ class Study:
     pace: float = 0.0
     _complete: bool = False
     _ensembles: dict[str, Task] = field(default_factory=dict)
-    _compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
 
     def begin(self) -> None:
         """Make the scene's own run, which predicts what others will take.
@@ -217,7 +217,7 @@ class Study:
         """Make points in this order; those that the budget no longer holds are left undone."""
         for design in designs:
             seconds = design.evaluations(self.evaluations, self.own) * self.pace + POINT
-            compiling = COMPILING if kernels.shared(design.scene) not in self._compiled else 0.0
+            compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
             if self.spent + seconds + compiling > self.seconds:
                 self.undone.append(design)
             else:
@@ -228,7 +228,7 @@ class Study:
         if self.own:
             limit = min(self.scene.solver.evaluations, self._most())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self._compiled
+        names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self.compiled
         compiled = self._kernels(design)
         task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
         record, *kernel = self.workplace.datasets(*([task, compiled] if first else [task]))
@@ -252,9 +252,9 @@ class Study:
 
     def _kernels(self, design: cost_design.Design) -> Task:
         shared = kernels.shared(design.scene)
-        if shared not in self._compiled:
-            self._compiled[shared] = kernels.task(design.scene, _bundles(design))
-        return self._compiled[shared]
+        if shared not in self.compiled:
+            self.compiled[shared] = kernels.task(design.scene, _bundles(design))
+        return self.compiled[shared]
 
 
 def bring(

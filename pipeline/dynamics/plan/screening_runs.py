@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -86,7 +87,6 @@ class Pilots:
     evaluations: int = 0
     work: float = 0.0
     refused_loose: bool = False
-    _extent: Extent | None = None
     _variants: dict[tuple[frozenset[str], bool], Scene] = field(default_factory=dict)
     _engines: dict[tuple[frozenset[str], int | None, str], Engine | None] = field(default_factory=dict)
 
@@ -114,13 +114,11 @@ class Pilots:
             return LOOSEST
         return float(np.clip(OF_CLEARANCE * min(clearances) / self.extent.size, TIGHTEST, LOOSEST))
 
-    @property
+    @cached_property
     def extent(self) -> Extent:
         """Of the full scene."""
-        if self._extent is None:
-            model = tabulate(build(placed(self.scene), self.bundles))
-            self._extent = Extent(model.mechanism.length, model.nq + model.nv)
-        return self._extent
+        model = tabulate(build(placed(self.scene), self.bundles))
+        return Extent(model.mechanism.length, model.nq + model.nv)
 
     def part(self, gone: Collection[Effect]) -> float:
         """The part of the time over which a variant is compared with others, so that it does not take too long.
