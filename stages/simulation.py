@@ -66,9 +66,9 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     Raises InputError when a name is not listed in its family.
     """
-    from flexclear.pipeline.dynamics.compile import sources
+    from flexclear.pipeline.dynamics.compile import reach
 
-    return sources.modules(scene)
+    return reach.modules(scene)
 
 
 @given_arrays

@@ -161,7 +161,7 @@ class Room:
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: of what the steps evaluate with, EVALUATE's or what leaves only what they read (`specialise`)
-EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RATES = ADDRESSES = _places(6)
+EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES = ADDRESSES = _places(7)
 
 # Wiring in h ---------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
@@ -351,32 +351,35 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # row has left of the most that it had, steps in a row that ended blindly close to a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # what the last first step with a contact closed could have been, whether the next accepted step is a segment's first;
-# then of an attempt that waits for rates (`method.await_rates`): its length, its error norm, the state's time
+# then of an attempt that waits for rates (`method.await_rates`): its length, its error norm, the state's time; end and
+# length of a step whose events have been resolved (`stepper.make_resolution`)
 # fmt: off
 (
     TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST,
     SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS,
-    REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, TRIED, NORM, AWAITED_TIME,
+    REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, TRIED, NORM, AWAITED_TIME, RESOLVED_END, RESOLVED_STEP,
 ) = _floats(
     CONTROL,
     "time step end rtol span length drift last_norm most_growth fixed parameter rate_drift steepest "
     "sigma past_time pass_time reach most_reach collocated fraction left blind_steps "
-    "rejected_step rejected_norm touched_step first tried norm awaited_time",
+    "rejected_step rejected_norm touched_step first tried norm awaited_time resolved_end resolved_step",
 )
 # fmt: on
 
 # Integers in n -------------------------------------------------------------------------------------------------------
-# report of the last evaluation; where active pieces and modes start in n, and its state in w; whether it left only what
-# steps read; whether others make awaited rates; the stepper's own, last a step's stage, where its state and rates are
+# report of the last evaluation; where active pieces and modes start in n, and its state in w; whether it left only
+# what steps read; whether others make awaited rates; the stepper's own, last a step's stage, where its state and rates
+# are, and whether the dense output of a step whose events have been resolved is there
 _INTEGERS = _numbered(
     "evaluation active mode state abridged together status evaluations steps rejected next_output n_recorded n_events "
-    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited rates_in"
+    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited "
+    "rates_in extended"
 )
 # fmt: off
 (
     EVALUATION, ACTIVE, MODE, STATE, ABRIDGED, TOGETHER,
     STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
-    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, STAGE, AWAITED, RATES_IN,
+    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, STAGE, AWAITED, RATES_IN, EXTENDED,
 ) = _INTEGERS.values()
 # fmt: on
 INTEGERS = len(_INTEGERS)

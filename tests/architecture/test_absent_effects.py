@@ -15,12 +15,12 @@ from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import fingerprint
 from flexclear.pipeline.dynamics import loads
-from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile import functions, reach
+from flexclear.pipeline.dynamics.compile.reach import imported
 from flexclear.pipeline.dynamics.compile.sources import (
     DESCRIBED,
     abreast,
     along,
-    imported,
     kernels,
     sources,
     straight,
@@ -154,7 +154,7 @@ def parts(path: Path) -> Parts:
 
 def reached(texts: dict[str, str]) -> set[str]:
     """Modules of this tower that the machine code depends on."""
-    return {name for text in texts.values() for name in functions.reached(text)}
+    return {name for text in texts.values() for name in reach.reached(text)}
 
 
 #: effect -> word that its generated source must have, modules it must reach
@@ -378,14 +378,15 @@ def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
     """Steps know neither joints nor bodies nor laws; what is recorded and the equations know no integrator."""
     one, whole = CASES["clearance"][0], CASES["everything"][0]
     mine, theirs = digests(one, SCHEME), digests(whole, SCHEME)
-    assert [name for name in mine if mine[name] == theirs[name]] == ["observe", "advance"]
+    assert [name for name in mine if mine[name] == theirs[name]] == ["resolve", "observe", "advance"]
     # they end on guards, whatever these watch: sliding in joints or along coordinates
     hinges, springs = CASES["rubbing hinges"][0], replace(CASES["springs"][0], closures=True, load_kinks=True)
     assert digests(hinges, SCHEME)["advance"] == digests(springs, SCHEME)["advance"] != mine["advance"]
     assert digests(replace(one, frictions=()), SCHEME)["advance"] != mine["advance"]  # it has no guards
     radau = digests(one, Scheme("radau"))
-    assert [name for name in mine if mine[name] != radau[name]] == ["advance"]
+    assert [name for name in mine if mine[name] != radau[name]] == ["resolve", "advance"]
     assert digests(CASES["ideal"][0], SCHEME)["advance"] != mine["advance"]  # it has no contacts to watch
+    assert "resolve" not in digests(CASES["ideal"][0], SCHEME)
     assert "project" not in digests(CASES["tree"][0], SCHEME)
 
 

@@ -7,7 +7,7 @@ import pytest
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile import reach
 from flexclear.pipeline.dynamics.compile.sources import sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from flexclear.pipeline.dynamics.integrate import NAMES
@@ -31,7 +31,7 @@ STEPPING = {"adaptive", "fixed"}
 
 def reached(scheme: Scheme) -> set[str]:
     """Modules of the family that the machine code of a scheme depends on."""
-    modules = {name for text in sources(PARTS, scheme).values() for name in functions.reached(text)}
+    modules = {name for text in sources(PARTS, scheme).values() for name in reach.reached(text)}
     return {name.removeprefix(f"{PACKAGE}.") for name in modules if name.startswith(f"{PACKAGE}.")}
 
 
@@ -102,5 +102,5 @@ def test_no_number_of_the_solver_is_compiled_in(root: Path, one: dict, other: di
 @pytest.mark.parametrize("solver", [{}, {"step": 1e-5}, {"integrator": "rk4", "step": 1e-5, "events": "at step ends"}])
 def test_the_key_of_a_run_holds_what_its_code_reaches(root: Path, solver: dict) -> None:
     scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": solver})
-    known = functions.SOURCES.closure(["flexclear.stages.simulation", *simulation.modules(scene)]).keys()
+    known = reach.SOURCES.closure(["flexclear.stages.simulation", *simulation.modules(scene)]).keys()
     assert {f"{PACKAGE}.{name}" for name in reached(scheme_of(scene.solver))} <= set(known)

@@ -10,8 +10,9 @@ from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.dynamics import effects
-from flexclear.pipeline.dynamics.compile import functions
-from flexclear.pipeline.dynamics.compile.sources import kernels, modules, sources
+from flexclear.pipeline.dynamics.compile import reach
+from flexclear.pipeline.dynamics.compile.reach import modules
+from flexclear.pipeline.dynamics.compile.sources import kernels, sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 
 BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
@@ -56,7 +57,7 @@ def test_what_a_part_compiles_reaches_its_module(package: str, name: str) -> Non
     """The digest of a compiled function changes with the sources of its parts."""
     parts = CODE[package](name)
     texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
-    reached = {found for text in texts for found in functions.reached(text)}
+    reached = {found for text in texts for found in reach.reached(text)}
     assert module_of(package, name) in reached
 
 
@@ -87,7 +88,7 @@ def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, 
     for scheme in effects.schemes(scene):
         parts = Parts(tuple(sorted(possible)), closures=True)
         texts = (sources(parts, scheme) | kernels(parts)).values()
-        assert {found for text in texts for found in functions.reached(text)} <= set(known)
+        assert {found for text in texts for found in reach.reached(text)} <= set(known)
 
 
 def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
@@ -125,7 +126,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     if family == "stop":
         tables["stop"]["end"]["coordinate"] = "rotation"
     texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
-    reached = {found for text in texts for found in functions.reached(text)}
+    reached = {found for text in texts for found in reach.reached(text)}
     scene = scene_with({"type": "cylindrical"}, **tables)
     known = Sources(root).closure(["flexclear.stages.simulation", *modules(scene)]).keys()
     assert module in reached

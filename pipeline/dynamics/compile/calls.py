@@ -25,9 +25,9 @@ _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
 _FLOAT, _INTEGER = types.float64, types.int64
 _TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, rows, columns
 #: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, f, w, n, y, retractment, out,
-#: total); (h, f, w, n, t); (h, f, w, n). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and
-#: columns, tolerance, out with its length); (h, f, w, n, t, repeat, outputs with their number, rows, events);
-#: (table, places, numbers)
+#: total); (h, f, w, n, t); (h, f, w, n); (h, f, w, n, step, t_new, rows, events). Of what Python calls (`functions`):
+#: (h, f, w, n, rows, pieces with rows and columns, tolerance, out with its length); (h, f, w, n, t, repeat, outputs
+#: with their number, rows, events); (table, places, numbers)
 SIGNATURES = {
     "evaluate": types.int64(*_TABLES, types.float64, _PLACE, _PLACE),
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
@@ -36,6 +36,7 @@ SIGNATURES = {
     "describe": types.int64(*_TABLES),
     "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, _FLOATS, _INTEGER),
     "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
+    "resolve": types.int64(*_TABLES, _FLOAT, _FLOAT, *_TABLE, *_TABLE),
     "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS),
 }
 
@@ -48,8 +49,10 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, arrays = values
         given = []
-        for k in range(len(arguments.types)):
+        for k, kind in enumerate(arguments.types):
             value = builder.extract_value(arrays, k)
+            if isinstance(kind, types.Array):
+                value = context.make_array(kind)(context, builder, value=value).data
             given.append(value)
         function = ir.FunctionType(ir.IntType(64), [value.type for value in given])
         return builder.call(builder.inttoptr(where, function.as_pointer()), given)
@@ -117,3 +120,12 @@ def project(h, f, w, n, t, y, dy, tolerance):
 def retract(d, y, retractment, out, total):
     """Positions after a retractment: `equations.retraction`."""
     call(d.h[m.RETRACT], (d.h, d.f, d.w, d.n, y, retractment, out, total))
+
+
+@kernel
+def resolve(d, step, t_new, rows, events):
+    """The events of a step: `integrate.stepper.make_resolution`."""
+    (count, width), (event_count, event_width) = rows.shape, events.shape
+    record = (rows, count, width, events, event_count, event_width)
+    happened = call(d.h[m.RESOLVE], (d.h, d.f, d.w, d.n, float(step), float(t_new), *record))
+    return happened, d.extended == 1, d.resolved_end, d.resolved_step

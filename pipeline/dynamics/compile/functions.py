@@ -25,9 +25,9 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version, sources_of
+from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import sources
+from flexclear.pipeline.dynamics.compile import reach, sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
 from flexclear.pipeline.dynamics.compile.files import bring, compiled, interpreted, loaded
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
@@ -35,7 +35,6 @@ from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, 
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
-SOURCES = sources_of(TREE)
 #: what the functions are to who waits for them
 WORDS = {
     "evaluate": "equations of motion",
@@ -43,6 +42,7 @@ WORDS = {
     "retract": "retractions",
     "observe": "recorded quantities",
     "advance": "integrator",
+    "resolve": "integrator's events",
     "prescribe": "laws of time",
     "describe": "recorded quantities",
     SPECIALISED: "equations of motion of this mechanism alone",
@@ -57,15 +57,14 @@ ADDRESSES = {
     "describe": m.DESCRIBE,
     "project": m.PROJECT,
     "retract": m.RETRACT,
+    "resolve": m.RESOLVE,
     "prescribe": m.PRESCRIBE,
 }
 #: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the
 #: kernels have most kernels in common, which each process compiles once
-ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESCRIBED, WHOLE, SPECIALISED)
+ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESCRIBED, WHOLE, SPECIALISED, "resolve")
 #: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
-#: where the code of kernels is, and what they number by
-CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.scene.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _TABLES, _TABLE_AT = (_PLACE,) * 4, (_PLACE, _INTEGER, _INTEGER)
@@ -271,22 +270,6 @@ def digest(source: str) -> str:
     """Digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
     total = hashlib.sha256(source.encode())
     total.update(f"{library_version('numba')} {library_version('llvmlite')} {sys.version_info[:2]}".encode())
-    for name, source_digest in sorted(reached(source).items()):
+    for name, source_digest in sorted(reach.reached(source).items()):
         total.update(f"{name} {source_digest}".encode())
     return total.hexdigest()[:20]
-
-
-def reached(source: str) -> dict[str, str]:
-    """Digests of the modules with `CODE` that a generated source imports, directly or not.
-
-    Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
-    """
-    source_texts: dict[str, str] = {}
-    waiting = sorted(sources.imported(source))
-    while waiting:
-        name = waiting.pop()
-        module = SOURCES.module(name) if name.startswith(CODE) and name not in source_texts else None
-        if module is not None and not module.package:
-            source_texts[name] = module.digest
-            waiting.extend(module.own)
-    return source_texts

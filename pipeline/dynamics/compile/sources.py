@@ -12,14 +12,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene import integrators
-from flexclear.pipeline.core.scene.events import with_switched
 from flexclear.pipeline.core.scene.registry import listed
-from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file
 from flexclear.pipeline.dynamics.compile import formulas
 from flexclear.pipeline.dynamics.effects import (
     FORMS,
@@ -30,14 +27,10 @@ from flexclear.pipeline.dynamics.effects import (
     SURFACES,
     Parts,
     Scheme,
-    most_parts,
-    named,
-    schemes,
 )
 from flexclear.pipeline.dynamics.effects.effect import PACKAGE, Effect
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 DYNAMICS = "flexclear.pipeline.dynamics"
@@ -106,45 +99,15 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
         by_name["project"] = _project(parts)
     if integrators.INTEGRATORS[scheme.integrator].retracts:
         by_name["retract"] = _retract(parts)
+    steps = _steps(parts, scheme)
+    if "events" in steps.given:
+        by_name["resolve"] = _resolve(steps, scheme)
     return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
 
 
 def kernels(parts: Parts) -> dict[str, str]:
     """Source by name of what a mechanism of these parts calls whose wiring has no code of its own."""
     return {"evaluate": _evaluate(parts), "describe": _text(*_description(parts), DESCRIBE, _formulas(parts))}
-
-
-def modules(scene: Scene) -> tuple[str, ...]:
-    """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
-    files import.
-
-    Raises InputError when a name is not listed in its family.
-    """
-    scene = with_switched(scene) if scene.event else scene
-    names, parts = {part.module for part in named(scene)}, most_parts(scene)
-    names = names.union(*(effect.modules for effect in parts.present))
-    either = (parts, replace(parts, articulated=True))  # which, only the tree decides
-    return tuple(sorted(names.union(*(_composed(one, scheme) for one in either for scheme in schemes(scene)))))
-
-
-@cache
-def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
-    """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
-    texts = [*sources(parts, scheme).values(), *kernels(parts).values(), straight(parts, ())]
-    texts += [abreast(parts, (), lanes=2), along(parts, ())]
-    return frozenset().union(*map(_reached, texts))
-
-
-@cache
-def _reached(source: str) -> frozenset[str]:
-    """Modules that a generated file imports; steps depend on few of the parts."""
-    return frozenset(name for name in imported(source) if source_file(TREE, name))  # others are in modules
-
-
-def imported(source: str) -> set[str]:
-    """Modules and names that a generated file imports, as `fingerprint.imported` returns those of any other source."""
-    lines = re.findall(r"^from (\S+) import (\S+)", source, re.MULTILINE)
-    return {name for module, part in lines for name in (module, f"{module}.{part}")}
 
 
 def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bool = False) -> str:
@@ -256,6 +219,23 @@ def _observe(parts: Parts) -> str:
 
 
 def _advance(parts: Parts, scheme: Scheme) -> str:
+    file = _steps(parts, scheme)
+    file.given["stepping"] = file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive")
+    if "events" in file.given:
+        file.given["resolve"] = "calls.resolve"
+    file.take(DYNAMICS, "memory as m")
+    maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
+    return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
+
+
+def _resolve(file: Composition, scheme: Scheme) -> str:
+    file.take(f"{DYNAMICS}.fields", "data")
+    maker = file.take(f"{INTEGRATORS}.stepper", "make_resolution")
+    return _text(file, f"events in steps of {scheme}", "resolution", maker, RESOLVE)
+
+
+def _steps(parts: Parts, scheme: Scheme) -> Composition:
+    """What steps, and the events in them, are made of."""
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
     file = Composition(parts)
     file.given = {
@@ -263,7 +243,6 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "project": _projection(file),
         "retract": "calls.retract",
         "method": file.take(module, method),
-        "stepping": file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
     if integrators.INTEGRATORS[scheme.integrator].reads_all:
         file.given["complete"] = "calls.evaluate"
@@ -272,9 +251,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         file.given["events"] = events
     if parts.closures:
         file.given["poses"] = file.take(INTEGRATORS, "singular_step")
-    file.take(DYNAMICS, "memory as m")
-    maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
-    return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
+    return file
 
 
 def _events(file: Composition, scheme: Scheme) -> str:
@@ -429,6 +406,11 @@ def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out,
     rows, out = calls.carray(rows, (count, width)), calls.carray(out, (length,))
     observation(h, f, w, n, rows, calls.carray(pieces, (lines, laws)), tolerance, out)
     return 0
+"""
+RESOLVE = """@calls.exported("resolve")
+def resolve(h, f, w, n, step, t_new, rows, count, width, events, event_count, event_width):
+    rows, events = calls.carray(rows, (count, width)), calls.carray(events, (event_count, event_width))
+    return resolution(data(h, f, w, n), step, t_new, rows, events)
 """
 # one function for both tasks: each would be an object of its own to fetch
 ADVANCE = """@calls.exported("advance")

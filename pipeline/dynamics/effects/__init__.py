@@ -1,7 +1,7 @@
 """What each effect of a scene brings: the parts that its machine code is composed of, and the modules that hold them.
 
 Nothing is compiled here, nor is anything imported that compiles: generated files (`compile.sources`), lazy imports
-(`core.scene.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family
+(`core.scene.registry`) and the keys of results (`compile.reach.modules`) read the same tables, those of the family
 folders, and the same declarations, those of the effects.
 
 An effect is a folder here. Its declaration is in `effect`; its other modules are called like the folder of the tower

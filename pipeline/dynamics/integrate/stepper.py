@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.projection import keep_scales, largest
@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.integrate.recording import (
 from flexclear.pipeline.dynamics.integrate.stiffness import make_detect_stiffness
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: what resolve_events returns for an event after which integration starts afresh; another positive number only
+#: what `resolve` returns for an event after which integration starts afresh; another positive number only
 #: records it
 RESTART = 1
 #: for a step of chosen length that cannot be made with its end on the event found in it; other negative numbers end the
@@ -76,20 +76,71 @@ def make_end_nowhere(evaluate_at: Callable, extend: Callable, repeat: Callable) 
     return end_on_guard
 
 
-def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-    """The kernel resolve_events of a stepper that looks for none."""
-
-    @kernel
-    def resolve_events(d, step, t_new, rows, events):
-        return 0, False, t_new, step
-
-    return resolve_events
+@kernel
+def resolve_nothing(d, step, t_new, rows, events):
+    """`resolve` of a stepper that looks for no events."""
+    return 0, False, t_new, step
 
 
 #: `guards.AMONG_CONTACTS` of scenes without guards
 NO_GUARDS = (watch_nothing, watch_nothing, watch_nothing, make_end_nowhere)
 #: `events` of scenes without contacts and guards
-NO_CONTACTS = (watch_nothing, make_no_events, never)
+NO_CONTACTS = (watch_nothing, None, never)
+
+
+class Stepping(NamedTuple):
+    """The kernels of a method (`method.Method`), with steps over singular poses where there are loops.
+
+    begin, proceed, error, keep: of the method alone.  attempt, extend: of both.  dense: the method with the
+    interpolation of both.
+    """
+
+    begin: Callable
+    proceed: Callable
+    error: Callable
+    keep: Callable
+    attempt: Callable
+    extend: Callable
+    dense: Any
+
+
+def make_stepping(
+    evaluate: Callable, retract: Callable, method: Any, poses: Any = None, complete: Callable | None = None
+) -> Stepping:
+    """The kernels that steps, and the events in them, are made with; arguments as of `make_advance`."""
+    given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
+    begin, step, error, extend, keep = method.make_kernels(*given)
+    proceed = step if method.staged else make_at_once(step)
+    attempt = make_attempt(evaluate, proceed) if method.staged else step
+    if poses is None:
+        return Stepping(begin, proceed, error, keep, attempt, extend, method)
+    along, extend, interpolate = poses.make_along(method, attempt, extend)
+    return Stepping(begin, proceed, error, keep, along, extend, replace(method, interpolate=interpolate))
+
+
+def make_resolution(
+    evaluate: Callable,
+    project: Callable,
+    retract: Callable,
+    method: Any,
+    events: tuple[Callable, Callable, Callable],
+    poses: Any = None,
+    complete: Callable | None = None,
+) -> Callable:
+    """The kernel resolution(d, step, t_new, rows, events) -> event?, which notes the rest of what `resolve` returns.
+
+    It is compiled next to the steps, and takes as long. Arguments as of `make_advance`.
+    """
+    stepping = make_stepping(evaluate, retract, method, poses, complete)
+    resolve_events = events[1](evaluate, stepping.attempt, stepping.extend, project, stepping.dense)
+
+    @kernel
+    def resolution(d, step, t_new, rows, events):
+        happened, ready, d.resolved_end, d.resolved_step = resolve_events(d, step, t_new, rows, events)
+        d.extended = 1 if ready else 0
+        return happened
+
+    return resolution
 
 
 def make_advance(
@@ -98,7 +149,8 @@ def make_advance(
     retract: Callable,
     method: Any,
     stepping: Any,
-    events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
+    events: tuple[Callable, Callable | None, Callable] = NO_CONTACTS,
+    resolve: Callable = resolve_nothing,
     poses: Any = None,
     complete: Callable | None = None,
 ) -> Callable:
@@ -110,22 +162,18 @@ def make_advance(
     stepping: the module `adaptive` or `fixed`.  poses: `singular_step`, of mechanisms with loops; trees compile none of
         it.
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
+    resolve: (d, step, t_new, rows, events) -> (event?, dense output ready?, end, step), of an accepted step
+        (`make_resolution`).
     """
-    given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
-    begin, step_itself, error, extend_itself, keep = method.make_kernels(*given)
-    proceed = step_itself if method.staged else make_at_once(step_itself)
-    attempt_itself = make_attempt(evaluate, proceed) if method.staged else step_itself
-    attempt, extend, interpolate, loops = attempt_itself, extend_itself, method.interpolate, poses is not None
+    made = make_stepping(evaluate, retract, method, poses, complete)
+    begin, proceed, error, keep, loops = made.begin, made.proceed, made.error, made.keep, poses is not None
     foresee: Any = None
     arrive: Any = None
     if loops:
-        attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
-        foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
+        foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, made.attempt, method)
     last, ends = method.last, method.ends
-    watch_start, make_resolve_events, any_closed = events
-    dense = replace(method, interpolate=interpolate)
-    resolve_events = make_resolve_events(evaluate, attempt, extend, project, dense)
-    record_outputs = make_record_outputs(extend, interpolate)
+    watch_start, _, any_closed = events
+    record_outputs = make_record_outputs(made.extend, made.dense.interpolate)
     detect_stiffness = make_detect_stiffness(method)
     first_step, error_norm, after_rejection, next_step = stepping.make_step_control(evaluate, any_closed, error, method)
 
@@ -296,7 +344,7 @@ def make_advance(
             along = loops and poses.ready(d)
             following = d.step if along else next_step(d, step, norm)
             hold_modes(d)
-            happened, known, t_end, step = resolve_events(d, step, t_new, rows, events)
+            happened, known, t_end, step = resolve(d, step, t_new, rows, events)
             if happened == AGAIN and d.fixed == 0.0 and not along:  # a polynomial would be the same again
                 d.rejected += 1
                 d.step, d.rejected_step = RETRY_FRACTION * step, 0.0

@@ -21,8 +21,7 @@ from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import library_version
-from flexclear.pipeline.dynamics.compile.sources import named
-from flexclear.pipeline.dynamics.effects import RECORDS
+from flexclear.pipeline.dynamics.effects import RECORDS, named
 from flexclear.pipeline.dynamics.effects.stops.model import ends_an_angle
 from flexclear.pipeline.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.pipeline.dynamics.model.driving import prescribed

@@ -1,0 +1,70 @@
+"""Which modules the generated files of a mechanism reach: what digests of code and keys of runs are made of."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+from flexclear.pipeline.core.scene.events import with_switched
+from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file, sources_of
+from flexclear.pipeline.dynamics.compile import sources
+from flexclear.pipeline.dynamics.effects import Parts, most_parts, named, schemes
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.dynamics.effects import Scheme
+
+SOURCES = sources_of(TREE)
+#: where the code of kernels is, and what they number by
+CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.scene.event_kinds")
+
+
+def modules(scene: Scene) -> tuple[str, ...]:
+    """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
+    files import.
+
+    Raises InputError when a name is not listed in its family.
+    """
+    scene = with_switched(scene) if scene.event else scene
+    names, parts = {part.module for part in named(scene)}, most_parts(scene)
+    names = names.union(*(effect.modules for effect in parts.present))
+    either = (parts, replace(parts, articulated=True))  # which, only the tree decides
+    return tuple(sorted(names.union(*(_composed(one, scheme) for one in either for scheme in schemes(scene)))))
+
+
+@cache
+def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
+    """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
+    texts = [*sources.sources(parts, scheme).values(), *sources.kernels(parts).values(), sources.straight(parts, ())]
+    texts += [sources.abreast(parts, (), lanes=2), sources.along(parts, ())]
+    return frozenset().union(*map(_reached, texts))
+
+
+@cache
+def _reached(source: str) -> frozenset[str]:
+    """Modules that a generated file imports; steps depend on few of the parts."""
+    return frozenset(name for name in imported(source) if source_file(TREE, name))  # others are in modules
+
+
+def imported(source: str) -> set[str]:
+    """Modules and names that a generated file imports, as `fingerprint.imported` returns those of any other source."""
+    lines = re.findall(r"^from (\S+) import (\S+)", source, re.MULTILINE)
+    return {name for module, part in lines for name in (module, f"{module}.{part}")}
+
+
+def reached(source: str) -> dict[str, str]:
+    """Digests of the modules with `CODE` that a generated source imports, directly or not.
+
+    Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
+    """
+    source_texts: dict[str, str] = {}
+    waiting = sorted(imported(source))
+    while waiting:
+        name = waiting.pop()
+        module = SOURCES.module(name) if name.startswith(CODE) and name not in source_texts else None
+        if module is not None and not module.package:
+            source_texts[name] = module.digest
+            waiting.extend(module.own)
+    return source_texts
