@@ -170,9 +170,9 @@ def show(records: list[Record]) -> dict[str, str]:
     text = (
         f"{len(done)} scenes: {said[MET]} met, {said[MET_TO_HORIZON]} met to the horizon, {said[MISSED]} missed, "
         f"{said[UNDECIDED]} not decided. Of the {decided} decided ones {within} ({within / max(decided, 1):.0%}) are "
-        f"within what is requested; the worst miss is {_worst(done)}. Median saving {np.median(saved):.3g} times "
-        f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). {same} plans are the "
-        f"scene as it is, of the others {dearer} take longer than their scene. Planning within a fifth of the full run "
+        f"within what is requested{_worst(done)}. Median saving {np.median(saved):.3g} times "
+        f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). Plans that are the scene "
+        f"as it is: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the full run "
         f"or one second in {len(cheap)}, median {np.median([r['plan_s'] for r in done]):.2g} s."
     )
     by_mechanism: Columns = {
@@ -221,11 +221,11 @@ def show(records: list[Record]) -> dict[str, str]:
 
 
 def _worst(done: list[Record]) -> str:
-    """The worst miss, in words."""
+    """The worst miss, where there is one, in words."""
     missed = [r["share"] for r in done if r["judged"] == MISSED]
     if None in missed:  # logs have no infinity
-        return "a planned run whose energy balance, for one of its members, is refused"
-    return f"{max(missed):.2g} times what is allowed" if missed else "none"
+        return "; the worst miss is a planned run whose energy balance, for one of its members, is refused"
+    return f"; the worst miss is {max(missed):.2g} times what is allowed" if missed else ""
 
 
 def _asked(of: dict[str, float]) -> str:
