@@ -172,8 +172,8 @@ def show(records: list[Record]) -> dict[str, str]:
         f"{said[UNDECIDED]} not decided. Of the {decided} decided ones {within} ({within / max(decided, 1):.0%}) are "
         f"within what is requested{_worst(done)}. Median saving {np.median(saved):.3g} times "
         f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). Plans that are the "
-        f"scene as it is: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the full "
-        f"run or one second in {len(cheap)}, median {np.median([r['plan_s'] for r in done]):.2g} s."
+        f"scene as it is: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the "
+        f"full run or one second in {len(cheap)}, median {np.median([r['plan_s'] for r in done]):.2g} s."
     )
     by_mechanism: Columns = {
         "mechanism": lambda r: r["mechanism"],
