@@ -110,8 +110,10 @@ class Answers:
     seconds: float | None = None
     questions: int = 2
 
-    def kernels(self) -> list[Task]:
-        """Those of variants that the effects need, to be compiled while the scene's own run leaves a processor idle."""
+    @cached_property
+    def kernels(self) -> dict[tuple[str, ...], Task]:
+        """Those of variants that the effects need, to be compiled while the scene's own run leaves a processor idle; by
+        what runs on them (`kernels.shared`)."""
         effects, tasks = variants.effects(self.scene), dict[tuple[str, ...], Task]()
         ideal = [effect for effect in effects if effect.kind in (CLEARANCE, FLEXIBILITY)]
         for effect in ideal if len(ideal) > 1 else ():  # without the only one it is the ideal scene, which is run
@@ -119,7 +121,7 @@ class Answers:
             variant = watched_quantities.plain(variants.without(self.scene, gone))
             variant = edited(variant, {"solver.integrator": DEFAULT}) if self.scene.by_need() else variant
             tasks[kernels.shared(variant)] = kernels.task(variant, Graph(variant, shown=False).bodies())
-        return list(tasks.values())[:AHEAD]
+        return dict(list(tasks.items())[:AHEAD])
 
     @cached_property
     def _begun(self) -> cost.Study:
@@ -170,6 +172,8 @@ class Answers:
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
             return None
+        self.workplace.bring(list(self.kernels.values()))
+        self._begun.compiled |= self.kernels
         return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task())[0]
 
 
@@ -195,9 +199,9 @@ class _Comparison:
         """The task of the answer, its points made."""
         from flexclear.pipeline.post.answers.matters import Pair, undecided
 
-        names, undone = self._affordable()
+        levels = MEMBERS if self._touching("") else (0,)
+        waiting = names = self._fitting(list(self._gone), levels[0])
         pairs = dict.fromkeys(names, 0)
-        waiting, levels = names, MEMBERS if self._touching("") else (0,)
         for members in levels:
             if members != levels[0]:
                 waiting = self._fitting(waiting, members)
@@ -213,30 +217,14 @@ class _Comparison:
         alone = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
         scenes = {name: self._variant(name) for name in ("", *names)}
-        left = [words[name] for name in undone if words[name]]
+        left = [words[name] for name in self._gone if name not in names and words[name]]
         return effect_ranking.task(self.scene, self.chosen, words, scenes, self.tasks, pairs, left)
 
-    def _affordable(self) -> tuple[list[str], list[str]]:
-        """Effects in the order in which they are examined, and those that the budget does not reach."""
-        names = list(self._gone)
-        taken, total, known = list[str](), self._seconds("", MEMBERS[0]), self._compiled
-        for name in names:
-            if self._repeats(name, taken):
-                taken.append(name)
-                continue
-            kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
-            one = self._seconds(name, MEMBERS[0]) + (0.0 if kinds in known else COMPILING / AT_ONCE)
-            if not taken or total + one <= self.study.seconds:
-                taken.append(name)
-                total, known = total + one, known | {kinds}
-        return taken, [name for name in names if name not in taken]
-
-    @property
+    @cached_property
     def _compiled(self) -> set[tuple[str, ...]]:
-        """Kinds of kernels that are there: those of the costs of accuracy, and of the run of the ideal scene."""
-        scenes = [design.scene for design in self.study.points]
-        scenes += [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
-        return {kernels.shared(scene) for scene in scenes}
+        """Kinds of kernels that are there: those of the study, and of the run of the ideal scene."""
+        scenes = [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
+        return {*self.study.compiled, *(kernels.shared(scene) for scene in scenes)}
 
     @cached_property
     def _gone(self) -> Mapping[str, frozenset[str]]:
@@ -271,13 +259,17 @@ class _Comparison:
         return (runs * self.took.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
 
     def _fitting(self, names: Sequence[str], members: int) -> list[str]:
-        """Those that the rest of the budget holds, the first ones first: what the summary says before the others."""
+        """Those that the rest of the budget holds, the first ones first: what the summary says before the others. Of
+        all at least one."""
         fitting, total = list[str](), self.spent + self._seconds("", members)
         for name in names:
-            seconds = 0.0 if self._repeats(name, fitting) else self._seconds(name, members)
-            if total + seconds <= self.study.seconds:
+            kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
+            seconds = self._seconds(name, members) + (0.0 if kinds in self._compiled else COMPILING / AT_ONCE)
+            seconds = 0.0 if self._repeats(name, fitting) else seconds
+            if total + seconds <= self.study.seconds or not (fitting or self.points):
                 fitting.append(name)
                 total += seconds
+                self._compiled.add(kinds)
         return fitting
 
     def _repeats(self, name: str, others: Sequence[str]) -> bool:

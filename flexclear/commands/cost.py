@@ -42,7 +42,7 @@ LARGEST_PEERS = 16 << 20
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
-BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
+BUDGET, POINT, COMPILING = 80.0, 0.6, 8.0
 #: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
 MOST_EVALUATIONS = 10.0
 #: of runs that were left undone, so many are named
@@ -102,8 +102,12 @@ class Study:
     """A cost study while its points are made, each from the cache where it is there.
 
     seconds: of processor that the points may take; a point counts what it took when it was made.  models: whether
+<<<<<<< HEAD
     other meshes, mode sets and beam theories are among them.  own, seconds_each: evaluations of the scene's own run,
     and what each took.
+=======
+    other meshes, mode sets and beam theories are among them.  compiled: kernels, by what runs on them.
+>>>>>>> answers
     """
 
     scene: Scene
@@ -112,6 +116,7 @@ class Study:
     integrators: Collection[str] = ()
     models: bool = False
     peers: Sequence[Track] = ()
+    compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
     runs: dict[str, Task] = field(default_factory=dict)
     points: list[cost_design.Design] = field(default_factory=list)
     undone: list[cost_design.Design] = field(default_factory=list)
@@ -121,7 +126,6 @@ class Study:
     seconds_each: float = 0.0
     _complete: bool = False
     _ensembles: dict[str, Task] = field(default_factory=dict)
-    _compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
 
     def begin(self) -> None:
         """Make the scene's own run, which predicts what others will take.
@@ -218,7 +222,7 @@ class Study:
         """Make points in this order; those that the budget no longer holds are left undone."""
         for design in designs:
             seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
-            compiling = COMPILING if kernels.shared(design.scene) not in self._compiled else 0.0
+            compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
             if self.spent + seconds + compiling > self.seconds:
                 self.undone.append(design)
             else:
@@ -229,7 +233,7 @@ class Study:
         if self.own:
             limit = min(self.scene.solver.evaluations, self._most())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self._compiled
+        names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self.compiled
         compiled = self._kernels(design)
         task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
         record, *kernel = self.workplace.datasets(*([task, compiled] if first else [task]))
@@ -255,9 +259,9 @@ class Study:
 
     def _kernels(self, design: cost_design.Design) -> Task:
         shared = kernels.shared(design.scene)
-        if shared not in self._compiled:
-            self._compiled[shared] = kernels.task(design.scene, _bundles(design))
-        return self._compiled[shared]
+        if shared not in self.compiled:
+            self.compiled[shared] = kernels.task(design.scene, _bundles(design))
+        return self.compiled[shared]
 
 
 def bring(

@@ -82,8 +82,27 @@ def test_from_the_same_starts_what_all_have_in_common_is_error_and_what_scatters
     assert (scattered.difference, scattered.uncertainty) == (0.0, pytest.approx(0.5))
     # beyond the horizon what exceeds chance counts, as a fraction of what two runs of the scene differ
     beyond = same_starts(point(1150.0, 1450.0, 850.0), point(0.0, 300.0, -300.0), q, requested)
-    chance = 2.776 * 300.0 * np.sqrt(2.0 / 3.0)
+    chance = 4.303 * 300.0 * np.sqrt(2.0 / 3.0)
     assert beyond.difference == pytest.approx(np.sqrt(1150.0**2 - chance**2) / (300.0 * np.sqrt(2.0)), rel=1e-3)
+    # one of three members that goes elsewhere is not chance, though their scatter is as large as the difference
+    astray = same_starts(point(0.0, 2.0, 3000.0), point(0.0, 1.0, -1.0), q, requested)
+    assert astray.difference == pytest.approx(3002.0 / 3.0 / np.sqrt(2.0), rel=1e-3)
+
+
+def test_verdicts_count_as_chance_what_differs_start_by_start_where_that_is_less():
+    """Four starts that scatter by half, and runs that are off by half each: two means do not decide that."""
+    n, requested, q, random = 400, 1.0, Quantity("b", "position"), np.random.default_rng(1)
+    starts = random.normal(scale=0.5, size=4)
+
+    def point(offset: float, members: bool) -> Point:
+        rows = [{"b.position.series": np.full((n, 3), [start + offset, 0.0, 0.0])} for start in starts]
+        mean = _scattered(np.full(n, np.mean(starts) + offset), np.full(n, np.std(starts, ddof=1)))
+        return replace(mean, members=rows if members else [])
+
+    alone, paired = (agreement(point(0.5, there), point(0.0, there), q, 4, requested) for there in (False, True))
+    assert verdict(alone) == "not decided"
+    assert verdict(paired) == "met"
+    assert (paired.error, paired.chance) == (pytest.approx(0.5), pytest.approx(0.0))
 
 
 def test_members_are_added_until_all_is_decided_as_far_as_they_are_affordable():

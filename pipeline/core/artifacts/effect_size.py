@@ -95,12 +95,9 @@ class Agreement:
         return members * (self.chance / room) ** 2 if room > 0.0 else np.inf
 
 
-def chance(members: int, rare: float = RARE) -> float:
-    """Standard errors of a difference of two means over so many members each that chance reaches (Student's t).
-
-    rare: how often it exceeds them.
-    """
-    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * rare))
+def chance(members: int) -> float:
+    """Standard errors of a difference of two means over so many members each that chance reaches (Student's t)."""
+    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
 
 
 def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
@@ -164,24 +161,30 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
 
     While runs of b agree within what is requested, what the starts have in common is the error: the mean of their
     differences, less LIKELY chance by Student's paired t. The rest of that mean is uncertain. Beyond, what exceeds
-    LIKELY chance of a difference of means counts, as a fraction of what may be off there (`Agreement.allowed`).
+    LIKELY chance of a difference of means that scatter as b does counts, as a fraction of what may be off there
+    (`Agreement.allowed`): runs of a that scatter more are no excuse.
     """
     if quantity.kind == "impact_times":
         return _impact_times(a, b, quantity.name)
     turning, n, error, most = quantity.kind == "orientation", len(b.members), 0.0, 0.0
     for name in (f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)):
-        distance, of_means = _along(a, b, name, n, turning=turning)
+        distance, _ = _along(a, b, name, n, turning=turning)
         if np.isinf(distance).any():
             return Influence(np.inf)
-        pairs = zip(a.members, b.members, strict=True)
-        spread = np.std([_rows(one[name]) - _rows(two[name]) for one, two in pairs], axis=0, ddof=1)
-        of_pairs = _pooled(np.linalg.norm(spread, axis=1) * (2.0 if turning else 1.0)) / np.sqrt(n)
+        of_pairs = _of_pairs(a, b, name, turning=turning)
         allowed = _allowed(b, name, requested, turning=turning)
         alike = allowed <= requested
-        doubt = np.where(alike, stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * of_pairs, chance(n, LIKELY) * of_means)
+        doubt = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
         error = max(error, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
         most = max(most, error, float(distance[alike].max(initial=0.0)))
     return Influence(error, most - error)
+
+
+def _of_pairs(a: Point, b: Point, name: str, *, turning: bool) -> np.ndarray:
+    """Standard error at each output of the mean difference of two ways to run a scene, from the same starts."""
+    pairs = zip(a.members, b.members, strict=True)
+    spread = np.std([_rows(one[name]) - _rows(two[name]) for one, two in pairs], axis=0, ddof=1)
+    return _pooled(np.linalg.norm(spread, axis=1) * (2.0 if turning else 1.0)) / np.sqrt(len(b.members))
 
 
 def _allowed(full: Point, name: str, requested: float, *, turning: bool) -> np.ndarray:
@@ -199,7 +202,8 @@ def _deviations(point: Point, name: str, *, turning: bool) -> np.ndarray:
 def agreement(planned: Point, full: Point, quantity: Quantity, members: int, requested: float) -> Agreement:
     """How well a planned run agrees with the full one in a quantity, at the output where that is decided.
 
-    members: starts of each.  requested: accuracy [SI].
+    members: starts of each; where both points hold them, their differences start by start say what may be chance, where
+    that is less than what two independent means say.  requested: accuracy [SI].
     """
     if quantity.kind == "impact_times":
         return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
@@ -210,6 +214,9 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
         if np.isinf(distance).any():
             return Agreement(np.inf, 0.0, requested)
         doubt = chance(members) * doubt
+        if min(len(planned.members), len(full.members)) > 1:
+            of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, name, turning=turning)
+            doubt = np.minimum(doubt, of_pairs)
         error = _beyond(distance, doubt)
         allowed = _allowed(full, name, requested, turning=turning)
         floor = np.maximum(allowed, np.finfo(float).tiny)  # nothing is allowed of what never changes

@@ -40,6 +40,10 @@ class Chosen:
     reference: float = np.nan
 
 
+#: the planned run is that of the scene: its integrator and tolerance stay
+AS_IT_IS = Chosen("", 0.0, {})
+
+
 @dataclass
 class Search:
     """The state of the decisions. used: of the budget, by quantity, as fractions of the requested accuracy."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -36,7 +37,10 @@ OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
 ALLOWED, LEAST_PART, SHORTER = 5e6, 0.0625, 0.25
 #: the beginning that is run to know how long the rest takes
 BEGINNING = 0.03125
-#: a pilot is given up at so many times that, and is then as one that was refused
+#: where clearance stays, decisions rest on runs over so many times that part: in most scenes over all of the time
+WHOLE_TIME = 8
+#: a pilot is given up at so many times the evaluations that it is expected to take at most, and is then as one that was
+#: refused
 GIVEN_UP = 4.0
 #: runs at tight tolerances may take so many times more
 OF_TIGHT = 2
@@ -61,7 +65,7 @@ class Extent:
     @property
     def most(self) -> int:
         """Evaluations of one run at which it is given up."""
-        return int(GIVEN_UP * ALLOWED / (MEMBERS * self.variables))
+        return int(GIVEN_UP * WHOLE_TIME * ALLOWED / (MEMBERS * self.variables))
 
 
 @dataclass
@@ -83,7 +87,6 @@ class Pilots:
     evaluations: int = 0
     work: float = 0.0
     refused_loose: bool = False
-    _extent: Extent | None = None
     _variants: dict[tuple[frozenset[str], bool], Scene] = field(default_factory=dict)
     _engines: dict[tuple[frozenset[str], int | None, str], Engine | None] = field(default_factory=dict)
 
@@ -111,13 +114,11 @@ class Pilots:
             return LOOSEST
         return float(np.clip(OF_CLEARANCE * min(clearances) / self.extent.size, TIGHTEST, LOOSEST))
 
-    @property
+    @cached_property
     def extent(self) -> Extent:
         """Of the full scene."""
-        if self._extent is None:
-            model = tabulate(build(placed(self.scene), self.bundles))
-            self._extent = Extent(model.mechanism.length, model.nq + model.nv)
-        return self._extent
+        model = tabulate(build(placed(self.scene), self.bundles))
+        return Extent(model.mechanism.length, model.nq + model.nv)
 
     def part(self, gone: Collection[Effect]) -> float:
         """The part of the time over which a variant is compared with others, so that it does not take too long.
@@ -130,6 +131,10 @@ class Pilots:
         while TAKES_LONG in self.must_run(gone, fraction).refused and fraction > LEAST_PART:
             fraction = shorter(fraction)
         return fraction
+
+    def whole(self, gone: Collection[Effect]) -> float:
+        """The part of the time over which a variant that stays loose is examined: all of it where that can be had."""
+        return min(1.0, WHOLE_TIME * self.part(gone))
 
     def point(
         self,

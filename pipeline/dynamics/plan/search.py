@@ -27,7 +27,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.pipeline.dynamics.linear.response import Response, response
-from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
+from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
 from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
@@ -43,8 +43,6 @@ OF_RESPONSE = 2.0
 SOFTER = 0.5
 #: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
-#: the planned run is that of the scene: its integrator and tolerance stay
-AS_IT_IS = Chosen("", 0.0, {})
 #: why parts go that the requested motion never feels
 UNCOUPLED = "nothing couples it to the requested quantities"
 

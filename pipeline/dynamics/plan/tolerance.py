@@ -10,7 +10,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import DEFAULT, STIFF
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect
-from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
+from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, Chosen, Search
 from flexclear.pipeline.dynamics.plan.screening_runs import (
     MEMBERS,
     OF_TIGHT,
@@ -66,7 +66,7 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
     Both integrate what is left of the scene, over the part of the time that pilots with contacts are run for.
     """
     pilots, gone, own = search.pilots, search.gone, own_method(search.pilots.scene)
-    if own is None or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
+    if own is None or chosen == AS_IT_IS or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
         return chosen
     bare = pilots.variant(gone)
     loose = bool(bare.contacts() or bare.stop)
@@ -86,10 +86,12 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
 
 
 def as_it_is(search: Search, chosen: Chosen) -> bool:
-    """Whether a planned run with contacts is not predicted to be cheaper than the scene as it is, by CHEAPER.
+    """Whether no planned run with contacts was shown to do, or none that is predicted to be cheaper by CHEAPER.
 
     Both are run over a part of the time; their costs are evaluations times variables.
     """
+    if chosen == AS_IT_IS:
+        return True
     pilots, gone, scene = search.pilots, search.gone, search.pilots.scene
     bare = pilots.variant(gone)
     if scene.solver.step is not None or not (bare.contacts() or bare.stop):

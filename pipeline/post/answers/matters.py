@@ -179,7 +179,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     said += [f"{name} calls for {more}." for name in calm[:1]]
     said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
     if result.attrs["undone"]:
-        said.insert(0, f"The budget did not reach {result.attrs['undone']}. Of the other effects:")
+        said.append(f"The budget did not reach {result.attrs['undone']}.")
     return " ".join(said)
 
 

@@ -226,7 +226,6 @@ def verified(planned: xr.Dataset) -> Table:
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
         f"{int(planned.attrs['planned_evaluations']):,} as planned"
         + (f", of {planned.attrs['members']} members each." if planned.attrs["members"] else "."),
-        *_no_gain(int(planned.attrs["full_evaluations"]), int(planned.attrs["planned_evaluations"])),
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     return Table(
@@ -288,8 +287,3 @@ def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
         [str(w) for w, recorded, reason in rows if recorded and reason == NOT_WORTH],
         [str(w) for w, recorded, _ in rows if not recorded],
     )
-
-
-def _no_gain(full: int, planned: int) -> list[str]:
-    """That a plan takes more evaluations than the scene as it is, where it does."""
-    return [f"The plan is {planned / full:.2g} times as dear as the scene as it is."] if planned > full else []
