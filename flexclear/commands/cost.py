@@ -102,12 +102,8 @@ class Study:
     """A cost study while its points are made, each from the cache where it is there.
 
     seconds: of processor that the points may take; a point counts what it took when it was made.  models: whether
-<<<<<<< HEAD
-    other meshes, mode sets and beam theories are among them.  own, seconds_each: evaluations of the scene's own run,
-    and what each took.
-=======
     other meshes, mode sets and beam theories are among them.  compiled: kernels, by what runs on them.
->>>>>>> answers
+    own, seconds_each: evaluations of the scene's own run, and what each took.
     """
 
     scene: Scene
