@@ -159,7 +159,7 @@ def test_a_checkout_without_links_has_the_keys_of_one_with_links(root: Path, wit
         "place = open_workplace()\n"
         "(graph,) = graphs(['checks/pendulum'])\n"
         "from flexclear.pipeline.core.workflow.execute import key_of\n"
-        "print(key_of(graph.simulate, {}, place.store, place.sources))\n"
+        "print(key_of(graph.simulate, {}, place.sources))\n"
     )
     keys = {run(folder, "-c", text, FLEXCLEAR_RESULTS="/nonexistent").stdout for folder in (root, without_links)}
     assert len(keys) == 1
