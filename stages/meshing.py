@@ -39,7 +39,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     factor = changes.pop("elements", None)
     if factor is not None and isinstance(table.get("elements"), int):
         changes["elements"] = factor * table["elements"]
-    for path in _named(table, recipe.parent):
+    for path in named(table, recipe.parent):
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
@@ -74,11 +74,12 @@ def kind_of(recipe: Path) -> str:
 
 def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:
     """The files that a recipe names, and those that their formats read with them, by their paths from the recipe."""
-    opened = [file for path in _named(table, folder) for file in (path, *companions(path))]
+    opened = [file for path in named(table, folder) for file in (path, *companions(path))]
     return {_relative(path, folder): path for path in opened}
 
 
-def _named(table: Mapping[str, Any], folder: Path) -> list[Path]:
+def named(table: Mapping[str, Any], folder: Path) -> list[Path]:
+    """The files that a recipe names itself."""
     shape = table.get("shape")
     return [folder / str(shape[key]) for key in FILES if key in shape] if isinstance(shape, Mapping) else []
 

@@ -113,8 +113,10 @@ def command(options: argparse.Namespace) -> None:
         export.check_format(options.out, (".zip",))
         scenes.check_target(options.out)
     if options.bundle is not None:
-        path = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
+        path, left_out = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
         print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")
+        for file in left_out:
+            print(f"left out: {file}, since a mesh names it outside of the scene's folders; move it next to the mesh")
         return
     if options.repeat is not None:
         same, said = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))

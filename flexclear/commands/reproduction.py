@@ -10,14 +10,13 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from flexclear.commands import scenes
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
-from flexclear.pipeline.core.scene.load import FILES as NAMING_FILES
 from flexclear.pipeline.core.scene.load import is_file, overridden, read_toml
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.system.external_files import companions, require_file
@@ -38,8 +37,8 @@ VARIABLES = ("FLEXCLEAR_", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_")
 DATE = (1980, 1, 1, 0, 0, 0)
 
 
-def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: Path | None) -> Path:
-    """Run a scene and write all about it into one file (zip); its path.
+def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: Path | None) -> tuple[Path, list[Path]]:
+    """Run a scene and write all about it into one file (zip); its path, and files that are left out.
 
     No path of this machine is in it: files are called by their paths relative to each other, folders in what was said
     by words.  Raises InputError for a scene that is not there.
@@ -47,7 +46,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
     scene = scenes.find_scene(name).resolve()
     if not scene.is_file():
         raise InputError(name, "there is no such file")
-    files = _opened(scene, settings)
+    files, left_out = _opened(scene, settings)
     try:
         top = Path(os.path.commonpath([path.parent for path in files]))
     except ValueError:
@@ -71,12 +70,12 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
     }
     content = {FACTS: json.dumps(facts, indent=1, sort_keys=True).encode()}
     content[LOG] = _without(done.stdout + done.stderr, hidden)[-LONGEST_LOG:].encode()
-    for path in sorted(files):
-        content[f"{FILES}/{path.relative_to(top).as_posix()}"] = _bytes(path, files)
+    for path, ours in sorted(files.items()):
+        content[f"{FILES}/{path.relative_to(top).as_posix()}"] = _text(path, files) if ours else path.read_bytes()
     path = target or Path(f"{scene.stem}.repeat.zip")
     with disk_limits(path.resolve().parent):
         publish(path.resolve(), _packed(content))
-    return path
+    return path, left_out
 
 
 def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
@@ -105,35 +104,44 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
     return done.returncode == facts["exit_code"], "\n".join(differences)
 
 
-def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
-    """The scene, what it extends, recipes, tables, meshes and what their formats read with them.
+def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], list[Path]]:
+    """All that the scene opens, and whether it is a text of ours: a scene or recipe; what is left out.
 
-    What is wrong is what the file is made for, so each is taken as far as it goes.
+    Left out is what meshes name outside of the folders of all else: it may be private, and only the mesh says so.  What
+    is wrong is what the file is made for, so each is taken as far as it goes.
     """
-    files: list[Path] = []
-    waiting: list[Path] = [scene]
+    texts, others, within = [scene], list[Path](), list[Path]()
+    for path in texts:  # grows by what these extend
+        with contextlib.suppress(FlexclearError):
+            extended = path.parent / str(read_toml(path).get("extends", path.name))
+            if is_file(extended) and extended.resolve() not in texts:
+                texts.append(extended.resolve())
+    recipes: list[Path] = []
     for changed in (settings, ()):
         with contextlib.suppress(FlexclearError):
-            waiting += _named(overridden(scene, scenes.overrides(changed)))
-    for path in waiting:
-        if path.suffix != ".toml":
-            files += [path, *companions(path)]
-        elif path.resolve() not in files and is_file(path):
-            files.append(path.resolve())
-            with contextlib.suppress(FlexclearError):
-                table = read_toml(path)
-                extended = table.get("extends")
-                waiting += [path.parent / extended] if isinstance(extended, str) else []
-                waiting += meshing.files(table, path.parent).values()
-    return sorted({path.resolve() for path in files if is_file(path)})
+            table = overridden(scene, scenes.overrides(changed))
+            recipes += _named(table, "mesh")
+            others += _named(table, "file")
+    for path in recipes:
+        with contextlib.suppress(FlexclearError):
+            others += meshing.named(read_toml(path), path.parent)
+    for path in others:
+        with contextlib.suppress(FlexclearError):
+            within.extend(companions(path))
+    ours, others, within = (
+        [path.resolve() for path in part if is_file(path)] for part in (texts + recipes, others, within)
+    )
+    folders = {path.parent for path in (*ours, *others)}
+    near = [path for path in within if any(path.is_relative_to(folder) for folder in folders)]
+    return dict.fromkeys((*others, *near), False) | dict.fromkeys(ours, True), sorted({*within} - {*near})
 
 
-def _named(node: object) -> list[Path]:
-    """Files that a scene's table names, at any depth."""
+def _named(node: object, key: str) -> list[Path]:
+    """Files that a scene's table names by a key, at any depth."""
     if isinstance(node, dict):
-        own = [Path(node[key]) for key in NAMING_FILES if isinstance(node.get(key), str)]
-        return own + _named(list(node.values()))
-    return [path for item in node for path in _named(item)] if isinstance(node, list) else []
+        own = [Path(node[key])] if isinstance(node.get(key), str) else []
+        return own + _named(list(node.values()), key)
+    return [path for item in node for path in _named(item, key)] if isinstance(node, list) else []
 
 
 def _run(
@@ -174,11 +182,9 @@ def _without(text: str, hidden: Mapping[str, str]) -> str:
     return text
 
 
-def _bytes(path: Path, files: Sequence[Path]) -> bytes:
-    """Content of a file; of a text of ours with the others' paths relative to it."""
+def _text(path: Path, files: Iterable[Path]) -> bytes:
+    """Content of a text of ours with the others' paths relative to it."""
     content = path.read_bytes()
-    if path.suffix != ".toml":
-        return content
     for other in files:
         relative = Path(os.path.relpath(other, path.parent)).as_posix()
         for text in _spellings(other):

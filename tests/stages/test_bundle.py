@@ -57,8 +57,30 @@ def test_a_failure_is_repeated_from_one_file_without_a_path_of_this_machine(
     assert "no such joint" in said
 
 
+def test_a_bundle_holds_files_of_any_name_but_none_from_elsewhere(
+    scene: Path, tmp_path: Path, command: Command
+) -> None:
+    """Scenes and recipes are known by the keys that name them; what only a mesh names may be private."""
+    folder, secret = scene.parent, tmp_path / "private.txt"
+    secret.write_text("*HEADING\nnobody's business\n")
+    recipe = f'[shape]\ntype = "mesh-file"\nfile = "{folder / "body.inp"}"\n'
+    (folder / "rod.recipe").write_text(recipe)
+    (folder / "body.inp").write_text(f"*INCLUDE, INPUT={secret}\n*INCLUDE, INPUT=parts/a.dat\n")
+    (folder / "parts" / "a.dat").write_text("*INCLUDE, INPUT=../body.inp\n")
+    (folder / "base").write_text(ROD.replace("MESH", "rod.recipe"))
+    scene.write_text('extends = "base"\n')
+    said = command("doctor", "--bundle", scene, "--out", tmp_path / "bundle.zip").out
+    assert f"left out: {secret}" in said
+    assert "a.dat" not in said
+    with zipfile.ZipFile(tmp_path / "bundle.zip") as archive:
+        names = {name.removeprefix("files/") for name in archive.namelist()} - {"facts.json", "log.txt"}
+        assert b'file = "body.inp"' in archive.read("files/rod.recipe")
+        assert not any(b"nobody" in archive.read(name) for name in archive.namelist())
+    assert names == {"mine.toml", "base", "rod.recipe", "body.inp", "parts/a.dat"}
+
+
 def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, command: Command) -> None:
-    path = reproduction.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
+    path, _ = reproduction.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"])
@@ -90,7 +112,7 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
 
 def test_a_run_that_is_repeated_is_compared_to_the_last_bit(root: Path, tmp_path: Path, command: Command) -> None:
     scene = Path(shutil.copy(root / "scenes" / "checks" / "pendulum.toml", tmp_path))
-    path = reproduction.make(str(scene), ["time.end='20 ms'"], ["numpy"], tmp_path / "bundle.zip")
+    path, _ = reproduction.make(str(scene), ["time.end='20 ms'"], ["numpy"], tmp_path / "bundle.zip")
     assert "the run is the same to the last bit" in command("doctor", "--repeat", path).out
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import meshio
@@ -154,17 +155,29 @@ REGIONS = """<dolfin><mesh_function type="int" dim="3" size="1"><entity index="0
 def several_files(folder: Path) -> dict[str, tuple[Path, set[str]]]:
     """For each format of several files the one to read, and the names of all.
 
-    With what meshio takes as well: endings in capitals, blanks before a keyword, longer names of DOLFIN's parts.
+    With what meshio takes as well: endings in capitals or of other formats, whatever blanks before a keyword and stars
+    in it, no stars or no equals sign, longer names of DOLFIN's parts.
     """
-    (folder / "a.INP").write_text(ABAQUS + "** INCLUDE, INPUT=no.inp\n *Include, input=b.inp\n")
-    (folder / "b.inp").write_text("*INCLUDE,INPUT=c.inp\r\n")
-    (folder / "c.inp").write_text(ABAQUS + ELEMENT)
+    head = "*HEADING\n** INCLUDE, INPUT=no.inp\n**INCLUDED, INPUT=no.inp\n* INCLUDE, INPUT=no.inp\n"
+    strange = (
+        " **INCLUDE, INPUT=e.ele\n\x0c*INCLUDE, INPUT=f.inp\n\xa0*INCLUDE, INPUT=g\n*I*NCL*\u0131NCLUDE, INPUT=no\n"
+    )
+    bare = "*I*NCLUD*E*, INPUT=a=h.inp\n\u0131nclude\n*\u0131nclude\r"
+    (folder / "a.INP").write_text(head + strange + bare + ABAQUS + "*INCLUDE, input=b.inp\n")
+    (folder / "b.inp").write_text("*INCLUDE,INPUT=c.dat\r\n")
+    (folder / "c.dat").write_text("*INCLUDE,INPUT=d.inp\r\n")
+    (folder / "d.inp").write_text(ABAQUS + ELEMENT)
+    for name in ("e.ele", "f.inp", "g", "h.inp", "\u0131nclude", "*\u0131nclude"):
+        (folder / name).write_text("*HEADING\n")
     tetrahedra(folder / "t")
     (folder / "d.xml").write_text(DOLFIN)
     for name in ("d_part.xml", "d_other.xml.old"):
         (folder / name).write_text(REGIONS)
     return {
-        "abaqus": (folder / "a.INP", {"a.INP", "b.inp", "c.inp"}),
+        "abaqus": (
+            folder / "a.INP",
+            {"a.INP", "b.inp", "c.dat", "d.inp", "e.ele", "f.inp", "g", "h.inp", "\u0131nclude", "*\u0131nclude"},
+        ),
         "tetgen": (folder / "t" / "body.ele", {"t/body.ele", "t/body.node"}),
         "dolfin": (folder / "d.xml", {"d.xml", "d_part.xml", "d_other.xml.old"}),
     }
@@ -192,15 +205,39 @@ def test_numbers_next_to_xdmf_are_companions(tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(tmp_path.parent)
     items = "<DataItem Format='HDF'>\n  x&#46;h5:/data0\n</DataItem><DataItem Format='Binary'>b.bin</DataItem>"
     (tmp_path / "x.xdmf").write_text(f'<Xdmf><DataItem Format="XML">0 1</DataItem>{items}</Xdmf>')
-    assert companions(tmp_path / "x.xdmf") == [tmp_path / "x.h5", Path("b.bin")]
+    assert list(companions(tmp_path / "x.xdmf")) == [tmp_path / "x.h5", Path("b.bin")]
     (tmp_path / "x.xdmf").write_text("<Xdmf>")
-    assert companions(tmp_path / "x.xdmf") == []
+    assert not list(companions(tmp_path / "x.xdmf"))
 
 
-def test_includes_in_a_circle_end(tmp_path: Path) -> None:
-    (tmp_path / "a.inp").write_text("*INCLUDE, INPUT=b.inp\n")
-    (tmp_path / "b.inp").write_text("*INCLUDE, INPUT=a.inp\n*INCLUDE, INPUT=/dev/zero\n")
-    assert companions(tmp_path / "a.inp") == [tmp_path / "b.inp", Path("/dev/zero")]
+@pytest.mark.parametrize(
+    "includes, words",
+    [
+        ({"a.inp": ["b.inp"], "b.inp": ["/dev/zero", "a.inp"]}, "in a circle"),
+        ({"a.inp": ["s/../a.inp", "t/../a.inp"]}, "in a circle"),
+        ({f"{name}.inp": 2 * [f"{other}.inp"] for name, other in pairwise("abcdefghijkl")}, "after 1000 others"),
+    ],
+    ids=["two files", "spellings that grow", "twice in twice"],
+)
+def test_includes_without_end_are_refused(tmp_path: Path, includes: dict[str, list[str]], words: str) -> None:
+    """Before they are read, which meshio would do again and again."""
+    for folder in ("s", "t"):
+        (tmp_path / folder).mkdir()
+    for name, others in includes.items():
+        (tmp_path / name).write_text("".join(f"*INCLUDE, INPUT={other}\n" for other in others))
+    with pytest.raises(InputError, match=words):
+        list(companions(tmp_path / "a.inp"))
+    (tmp_path / "body.toml").write_text(TETRAHEDRA.replace("body.ele", "a.inp"))
+    with pytest.raises(InputError, match=words):
+        mesh_task(tmp_path)
+
+
+def test_a_name_that_is_a_pattern_is_refused(tmp_path: Path) -> None:
+    """Of DOLFIN, whose reader may search with it without end."""
+    (tmp_path / "(a+)+b.xml").write_text(DOLFIN)
+    (tmp_path / ("a" * 40)).touch()
+    with pytest.raises(InputError, match="its reader takes for a pattern"):
+        read_mesh(tmp_path / "(a+)+b.xml", "recipe", "cannot be read", "remedy")
 
 
 def test_parts_of_hdf5_in_other_files_are_refused(tmp_path: Path) -> None:
@@ -210,8 +247,23 @@ def test_parts_of_hdf5_in_other_files_are_refused(tmp_path: Path) -> None:
     assert len(read_mesh(tmp_path / "a.med", "recipe", "cannot be read", "remedy").points) == 4
     with h5py.File(tmp_path / "a.med", "a") as file:
         file["elsewhere"] = h5py.ExternalLink("other.h5", "/data")
-    with pytest.raises(InputError, match=r"parts in other files, such as 'elsewhere'"):
-        read_mesh(tmp_path / "a.med", "recipe", "cannot be read", "remedy")
+        with h5py.File(tmp_path / "b.med", "w", userblock_size=1024) as copy:
+            copy["elsewhere"] = h5py.ExternalLink("other.h5", "/data")
+    for name in ("a.med", "b.med"):
+        with pytest.raises(InputError, match=r"parts in other files, such as 'elsewhere'"):
+            read_mesh(tmp_path / name, "recipe", "cannot be read", "remedy")
+
+
+@pytest.mark.parametrize("start, needed", [(0, True), (512, True), (4096, True), (100, False)])
+def test_hdf5_may_begin_after_a_block_of_the_users(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: int, needed: bool
+) -> None:
+    """Seen here by the library that it asks for."""
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    (tmp_path / "a.stl").write_bytes(bytes(start) + b"\x89HDF\r\n\x1a\n" + bytes(100))
+    with pytest.raises(InputError) as error:
+        read_mesh(tmp_path / "a.stl", "recipe", "cannot be read", "remedy")
+    assert ("h5py" in str(error.value)) == needed
 
 
 def test_a_file_that_changes_while_it_is_read_stores_nothing(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-import mmap
+import os
 import re
 from collections.abc import Iterator, Mapping
 from math import prod
@@ -28,8 +28,10 @@ MOST_POINTS = 2_000_000
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
 #: bytes of the header of a VTK file that are examined
 HEADER = 2000
-#: a line of Abaqus that includes another file, as meshio takes it
-_INCLUDE = re.compile(rb"[\r\n][ \t]*\*?INCLUDE\b[^\r\n]*=([^\r\n]+)", re.IGNORECASE)
+#: files that one of Abaqus may include, counted as often as they are read
+MOST_INCLUDES = 1000
+#: what a name of DOLFIN may not have: meshio searches for its parts by a pattern with the name in it
+PATTERN = set("\\^$*+?{}[]|()")
 #: what meshio puts among the sets of cells of a Gmsh 4 file, but numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
 
@@ -102,9 +104,8 @@ def _require_mesh(path: Path, where: str, largest: int | None) -> None:
 
 def _require_whole(path: Path, where: str) -> None:
     """InputError for a file in HDF5 with parts in other files, whose edits would not be seen."""
-    with path.open("rb") as file:
-        if file.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
-            return
+    if not _is_hdf5(path):
+        return
     import h5py
 
     outside: list[str] = []
@@ -123,6 +124,16 @@ def _require_whole(path: Path, where: str) -> None:
     if outside:
         problem = f"'{path.name}' has parts in other files, such as '{outside[0]}'"
         raise InputError(where, problem, "write it again as one file")
+
+
+def _is_hdf5(path: Path) -> bool:
+    """Whether the signature is there: at the start, or after a block of the user's of 512, 1024, 2048, ... bytes."""
+    with path.open("rb") as file:
+        for start in (0, *(512 << k for k in range(path.stat().st_size.bit_length()))):
+            file.seek(start)
+            if file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
+                return True
+    return False
 
 
 def _parsed(path: Path) -> meshio.Mesh:
@@ -164,46 +175,65 @@ def _integers(data: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def companions(path: Path) -> list[Path]:
+def companions(path: Path) -> Iterator[Path]:
     """Files that meshio reads with this one: of TetGen, DOLFIN and XDMF, includes of Abaqus, and what these include.
 
     Whoever names a mesh file declares them with it: their content decides the result as well.  A file that cannot be
-    examined has none, since its reader refuses it.
+    examined has none, since its reader refuses it.  Raises InputError, after those that there are, for what no reader
+    ends with: includes in a circle, or too many; and for a name that DOLFIN's reader takes for a pattern.
     """
-    files = [path]
-    for file in files:  # grows by what these include
-        with contextlib.suppress(OSError, ValueError, SyntaxError, re.error):
-            if file.is_file():  # a device has no end
-                files += [other for other in dict.fromkeys(_named_by(file)) if other not in files]
-    return files[1:]
+    includes = path.suffix.lower() == ".inp"
+    waiting: list[tuple[Path, tuple[str, ...]]] = [(path, ())]
+    for file, above in waiting:  # grows by what these include, as often as it is read
+        within = (*above, os.path.realpath(file))
+        with contextlib.suppress(OSError, ValueError, SyntaxError):
+            if not file.is_file():  # a device has no end
+                continue
+            for other in _included_by(file) if includes else _named_by(file):
+                circle = includes and os.path.realpath(other) in within
+                if circle or len(waiting) > MOST_INCLUDES:
+                    problem = "in a circle" if circle else f"after {MOST_INCLUDES} others, and more are not read"
+                    raise InputError(str(path), f"includes '{other}' {problem}", "leave that include out")
+                yield other
+                if includes:
+                    waiting.append((other, within))
 
 
-def _named_by(path: Path) -> list[Path]:
+def _included_by(path: Path) -> Iterator[Path]:
+    """Includes of Abaqus by meshio's own rule; few lines have a U, and only these are looked at."""
+    with path.open() as file:
+        for line in file:
+            if not ("U" in line or "u" in line) or line.startswith("**"):
+                continue
+            if line.partition(",")[0].strip().replace("*", "").upper() == "INCLUDE":
+                name = Path(line.split("=")[-1].strip())
+                yield name if name.exists() else path.parent / name
+
+
+def _named_by(path: Path) -> Iterator[Path]:
     """Files that meshio opens when it reads this one, where it searches for them."""
     suffix = path.suffix.lower()
     if path.suffix in (".ele", ".node"):
-        return [path.with_suffix(".node" if path.suffix == ".ele" else ".ele")]
-    if suffix == ".xml":
+        yield path.with_suffix(".node" if path.suffix == ".ele" else ".ele")
+    elif suffix == ".xml":
+        if PATTERN & set(path.stem):
+            problem = f"its name has one of {' '.join(sorted(PATTERN))}, which its reader takes for a pattern"
+            raise InputError(str(path), problem, "rename it")
         part = re.compile(f"{path.stem}_([^.]+)\\.xml")
-        return sorted(file for file in path.resolve().parent.iterdir() if part.match(file.name))
-    if suffix == ".inp" and path.stat().st_size:
-        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-            lines = _INCLUDE.findall(b"\n" + content.readline()) + _INCLUDE.findall(content)
-        named = [Path(name.decode(errors="replace").strip()) for name in lines]
-        return [name if name.exists() else path.parent / name for name in named]
-    if suffix in (".xdmf", ".xmf"):
-        return list(_numbers_of_xdmf(path))
-    return []
+        yield from sorted(file for file in path.resolve().parent.iterdir() if part.match(file.name))
+    elif suffix in (".xdmf", ".xmf"):
+        yield from dict.fromkeys(_numbers_of_xdmf(path))
 
 
 def _numbers_of_xdmf(path: Path) -> Iterator[Path]:
     """Files with the numbers of an XDMF file, which are searched for next to it or, of plain bytes, where we are."""
     from xml.etree import ElementTree  # 5 ms, and only few meshes need it
 
+    folder = path.resolve().parent
     for _, node in ElementTree.iterparse(path):
         name = (node.text or "").strip() if node.tag == "DataItem" else ""
         if node.get("Format") == "HDF":
-            yield path.resolve().parent / name.partition(":")[0]
+            yield folder / name.partition(":")[0]
         elif node.get("Format") == "Binary":
             yield Path(name)
         node.clear()  # numbers inside of the file may be many
