@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.dynamics.specialise import straight
@@ -140,6 +140,8 @@ def test_flexible_bodies_move_as_with_the_mass_matrix(name: str, monkeypatch: py
     assert np.array_equal(L, np.tril(L))
     assert apart(L, known) < ROUNDING
     assert apart(bias(cast("Engine", one)), other.stretch(m.BIAS)[: one.model.nv]) < 1e-12  # a hundred sums
+    for mine, theirs in zip(*(carried_wrenches(cast("Engine", way)) for way in (one, other)), strict=True):
+        assert apart(mine, theirs) < 1e-12
 
 
 def probed(found: Evaluated) -> list[np.ndarray]:

@@ -1,7 +1,10 @@
 """Exact changes of forces, against differences of the compiled right-hand side over several steps."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
@@ -10,10 +13,11 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, hold
 from flexclear.pipeline.dynamics.linear.tangent import Tangent, damping, stiffness, tangent
+from flexclear.pipeline.dynamics.linear.vibrations import vibrations
 from flexclear.pipeline.dynamics.model import model as modelling
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.articulated_chains import rods
-from tests.properties.mechanisms import GRAVITY, joint, scene
+from tests.properties.mechanisms import GRAVITY, body, frame, joint, scene
 
 #: trees of both kinds, loops, couplings, flexible bodies, contacts, friction in ideal joints, bushings, controllers
 NAMES = (
@@ -108,3 +112,32 @@ def test_what_python_runs_brings_no_compiler() -> None:
     made = sources.rates(pose(load_scene(TREE / "scenes/checks/pendulum.toml"))[0].model.parts)
     assert "calls" not in made
     assert "specialise" not in made
+
+
+#: a turn of the world about no axis of its own, and its axes then
+TURN = Rotation.from_rotvec([0.3, -0.7, 1.1])
+
+
+def arm(count: int) -> Scene:
+    """An arm of rods of 0.1 m, bent at each hinge; hinges are along gravity, which is along no axis of the world."""
+    lean = TURN.as_rotvec().tolist()
+    bodies: dict[str, Any] = {"base": {"type": "ground", "frames": {"end": frame((0.0, 0.0, 0.0), lean)}}}
+    joints, origin, before = {}, np.zeros(3), "base.end"
+    for k in range(count):
+        angle = 0.3 * (-1) ** k * (1.0 + 0.1 * k)
+        along = TURN.apply([np.cos(angle), np.sin(angle), 0.0])
+        ends = {"foot": frame((0.0, 0.0, 0.0), lean), "end": frame(tuple(0.1 * along), lean)}
+        bodies[f"rod{k}"] = body(tuple(origin), frames=ends)
+        joints[f"hinge{k}"] = joint("revolute", before, f"rod{k}.foot")
+        origin, before = origin + 0.1 * along, f"rod{k}.end"
+    weight = {"g": {"type": "gravity", "acceleration": (-9.81 * TURN.apply([0.0, 0.0, 1.0])).tolist()}}
+    return Scene.model_validate(scene(bodies, joints, end=0.1, load=weight))
+
+
+def test_an_arm_that_gravity_does_not_move_rests_anywhere() -> None:
+    """Rounding of its weights is no stiffness, which the size of all that balances says."""
+    bench, q = hold(arm(16), {}, silent, None, None, False)
+    assert bench.model.parts.articulated
+    found = vibrations(bench, tangent(bench, q))
+    assert found.free == 16
+    assert found.stable

@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows, observation
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
-from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.pipeline.dynamics.run.run import begun, driven
 from flexclear.pipeline.dynamics.run.states import rows_of
 
@@ -247,6 +247,7 @@ def balancing(bench: Bench) -> float:
 def acting(bench: Bench) -> np.ndarray:
     """Forces of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and
     contact alone, in the state evaluated last, as moments [N m]."""
-    wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
-    forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
-    return np.concatenate([v.ravel() for v in [*forces, wrenches["moment"], loads["moment"]]])
+    moments, forces = carried_wrenches(bench.engine)
+    loads, touch = (bench.engine.table(table) for table in (m.LOAD, m.TOUCH))
+    pushes = [bench.model.length * rows for rows in (forces, loads["force"], touch["force"])]
+    return np.concatenate([v.ravel() for v in [*pushes, moments, loads["moment"]]])

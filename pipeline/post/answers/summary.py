@@ -90,7 +90,7 @@ def _impacts(run: xr.Dataset) -> list[str]:
         count, peak = (quantities.events(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
         closed = float(np.mean(run["contact_gap"].sel(contact=name).values < 0.0))
         sentences.append(
-            f"<b>{html.escape(name)}</b>: {impacts(len(count), closed).capitalize()}; the contact "
+            f"<b>{html.escape(name)}</b>: {impacts(len(count), closed)}; the contact "
             f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{measured(float(peak[0]), np.nan, unit)}</b>."
         )
     return sentences

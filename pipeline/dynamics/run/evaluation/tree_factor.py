@@ -40,26 +40,39 @@ def _from_gains(engine: Engine) -> np.ndarray:
     return L
 
 
+def carried_wrenches(engine: Engine, w: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return what the motion without free accelerations needs of each link and all that it carries.
+
+    Moments about the kernels' origin and forces, shapes (links, 3).  w: as of `bias`.
+    """
+    w = engine.w if w is None else w
+    moments, pushes = (_vectors(engine, w, m.WRENCH, field) for field in (m.WRENCH.moment, m.WRENCH.force))
+    if not engine.model.parts.articulated:  # passed to the ground by the kernels
+        return moments, pushes
+    own, origins = (
+        _vectors(engine, w, m.ARTICULATED, m.ARTICULATED.own_force),
+        _vectors(engine, w, m.LINK_FRAMES, m.LINK_FRAMES.origin),
+    )
+    moments = moments + _vectors(engine, w, m.ARTICULATED, m.ARTICULATED.own_moment) + np.cross(origins, own)
+    pushes = pushes + own
+    for i in range(len(moments) - 1, 0, -1):
+        above = engine.model.links[i].branch.parent
+        moments[above] += moments[i]
+        pushes[above] += pushes[i]
+    return moments, pushes
+
+
 def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
     """Return the generalised forces that the motion needs without free accelerations, shape (nv,).
 
     w: the work space; that of the last evaluation, or one of numbers with changes (`specialise.dual`).
     """
     model, w = engine.model, engine.w if w is None else w
-
-    def stretch(index: int) -> np.ndarray:
-        return w[engine.h[index] : engine.h[index] + engine.lengths[index]]
-
-    def vectors(table: Any, field: int) -> np.ndarray:
-        return stretch(table.place).reshape(-1, table.size)[:, field : field + 3]
-
     if not model.parts.articulated:
-        return stretch(m.BIAS)[: model.nv].copy()
-    carried, origins = vectors(m.ARTICULATED, m.ARTICULATED.own_force), vectors(m.LINK_FRAMES, m.LINK_FRAMES.origin)
-    moments = vectors(m.WRENCH, m.WRENCH.moment) + vectors(m.ARTICULATED, m.ARTICULATED.own_moment)
-    moments, pushes = moments + np.cross(origins, carried), vectors(m.WRENCH, m.WRENCH.force) + carried
-    turns, shifts = vectors(m.COLUMNS, m.COLUMNS.angular), vectors(m.COLUMNS, m.COLUMNS.linear)
-    numbering, forces = model.numbering, stretch(m.MODAL_BIAS)[: model.nv].copy()
+        return _stretch(engine, w, m.BIAS)[: model.nv].copy()
+    moments, pushes = carried_wrenches(engine, w)
+    turns, shifts = (_vectors(engine, w, m.COLUMNS, field) for field in (m.COLUMNS.angular, m.COLUMNS.linear))
+    numbering, forces = model.numbering, _stretch(engine, w, m.MODAL_BIAS)[: model.nv].copy()
     modal = [k for modes in numbering.modal_coordinates.values() for k in modes]
     forces[np.setdiff1d(np.arange(model.nv), modal)] = 0.0
     for i in range(len(moments) - 1, 0, -1):
@@ -68,6 +81,13 @@ def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
         mine = {*shapes, *(c for c in numbering.coordinates[i] if c < model.nv)}
         for k, column in (pair for pair in numbering.joint_route(i) if pair[0] in mine):
             forces[k] = forces[k] + np.sum(turns[column] * moments[i] + shifts[column] * pushes[i])
-        moments[above] += moments[i]
-        pushes[above] += pushes[i]
     return forces
+
+
+def _stretch(engine: Engine, w: np.ndarray, index: int) -> np.ndarray:
+    return w[engine.h[index] : engine.h[index] + engine.lengths[index]]
+
+
+def _vectors(engine: Engine, w: np.ndarray, table: Any, field: int) -> np.ndarray:
+    """A vector of each row of a table."""
+    return _stretch(engine, w, table.place).reshape(-1, table.size)[:, field : field + 3]
