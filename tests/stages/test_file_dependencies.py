@@ -159,15 +159,13 @@ def several_files(folder: Path) -> dict[str, tuple[Path, set[str]]]:
     in it, no stars or no equals sign, longer names of DOLFIN's parts.
     """
     head = "*HEADING\n** INCLUDE, INPUT=no.inp\n**INCLUDED, INPUT=no.inp\n* INCLUDE, INPUT=no.inp\n"
-    strange = (
-        " **INCLUDE, INPUT=e.ele\n\x0c*INCLUDE, INPUT=f.inp\n\xa0*INCLUDE, INPUT=g\n*I*NCL*\u0131NCLUDE, INPUT=no\n"
-    )
-    bare = "*I*NCLUD*E*, INPUT=a=h.inp\n\u0131nclude\n*\u0131nclude\r"
+    strange = " **INCLUDE, INPUT=e.ele\n\x0c*INCLUDE, INPUT=f.inp\n\xa0*INCLUDE, INPUT=g\n"
+    bare = "*I*NCLUD*E*, INPUT=a=h.inp\ninclude\r"
     (folder / "a.INP").write_text(head + strange + bare + ABAQUS + "*INCLUDE, input=b.inp\n")
     (folder / "b.inp").write_text("*INCLUDE,INPUT=c.dat\r\n")
     (folder / "c.dat").write_text("*INCLUDE,INPUT=d.inp\r\n")
     (folder / "d.inp").write_text(ABAQUS + ELEMENT)
-    for name in ("e.ele", "f.inp", "g", "h.inp", "\u0131nclude", "*\u0131nclude"):
+    for name in ("e.ele", "f.inp", "g", "h.inp", "include"):
         (folder / name).write_text("*HEADING\n")
     tetrahedra(folder / "t")
     (folder / "d.xml").write_text(DOLFIN)
@@ -176,7 +174,7 @@ def several_files(folder: Path) -> dict[str, tuple[Path, set[str]]]:
     return {
         "abaqus": (
             folder / "a.INP",
-            {"a.INP", "b.inp", "c.dat", "d.inp", "e.ele", "f.inp", "g", "h.inp", "\u0131nclude", "*\u0131nclude"},
+            {"a.INP", "b.inp", "c.dat", "d.inp", "e.ele", "f.inp", "g", "h.inp", "include"},
         ),
         "tetgen": (folder / "t" / "body.ele", {"t/body.ele", "t/body.node"}),
         "dolfin": (folder / "d.xml", {"d.xml", "d_part.xml", "d_other.xml.old"}),

@@ -201,7 +201,7 @@ def companions(path: Path) -> Iterator[Path]:
 
 def _included_by(path: Path) -> Iterator[Path]:
     """Includes of Abaqus by meshio's own rule; few lines have a U, and only these are looked at."""
-    with path.open() as file:
+    with path.open(encoding=io.text_encoding(None)) as file:  # as meshio does
         for line in file:
             if not ("U" in line or "u" in line) or line.startswith("**"):
                 continue
