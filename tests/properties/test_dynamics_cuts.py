@@ -1,52 +1,14 @@
 """A joint moves a mechanism alike whether the tree takes it or a loop is closed by it."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 import xarray as xr
 
 from flexclear.pipeline.dynamics.model import tree
-from tests.properties.mechanisms import GRAVITY, body, frame, joint, scene, simulate
+from tests.properties.mechanisms import simulate, two_loops
 
 #: joints that may close the two loops; the tree takes the others
 CUTS = (("U", "P"), ("Y", "R"), ("S", "T"))
-TILT, LEAN = (0.3, -0.2, 0.1), (-0.1, 0.4, 0.2)
-
-
-def two_loops(swapped: bool) -> dict[str, Any]:
-    """Ground-universal-a-cylindrical-b-spherical-ground, and ground-planar-c-revolute-d-spherical-ground.
-
-    swapped: whether the joints with several axes have their first frames on the moving bodies.
-    """
-    bodies = {
-        "base": {
-            "type": "ground",
-            "frames": {
-                "U": frame((0.0, 0.0, 0.0), TILT),
-                "S": frame((0.5, 0.3, 0.2)),
-                "P": frame((1.0, 0.0, 0.0), LEAN),
-                "T": frame((1.4, 0.3, -0.2)),
-            },
-        },
-        "a": body((0.0, 0.0, 0.0), frames={"U": frame((0.0, 0.0, 0.0), TILT), "Y": frame((0.3, 0.0, 0.1), LEAN)}),
-        "b": body((0.3, 0.0, 0.1), frames={"Y": frame((0.0, 0.0, 0.0), LEAN), "S": frame((0.2, 0.3, 0.1))}),
-        "c": body((1.0, 0.0, 0.0), frames={"P": frame((0.0, 0.0, 0.0), LEAN), "R": frame((0.2, 0.0, 0.0), TILT)}),
-        "d": body((1.2, 0.0, 0.0), frames={"R": frame((0.0, 0.0, 0.0), TILT), "T": frame((0.2, 0.3, -0.2))}),
-    }
-    joints = {
-        "U": joint("universal", "base.U", "a.U"),
-        "Y": joint("cylindrical", "a.Y", "b.Y"),
-        "S": joint("spherical", "b.S", "base.S"),
-        "P": joint("planar", "base.P", "c.P"),
-        "R": joint("revolute", "c.R", "d.R"),
-        "T": joint("spherical", "d.T", "base.T"),
-    }
-    if swapped:
-        for name in ("U", "Y", "P"):
-            joints[name]["between"].reverse()
-    return scene(bodies, joints, end=0.2, load=GRAVITY)
-
 
 DRIVES = {
     "second": {
@@ -59,8 +21,14 @@ DRIVES = {
 
 
 def run(monkeypatch: pytest.MonkeyPatch, swapped: bool, cut: tuple[str, ...], driven: bool = False) -> xr.Dataset:
-    """The run whose loops are closed by the joints `cut`."""
-    table = two_loops(swapped) | ({"drive": DRIVES} if driven else {})
+    """The run whose loops are closed by the joints `cut`.
+
+    swapped: whether the joints with several axes have their first frames on the moving bodies.
+    """
+    table = two_loops() | ({"drive": DRIVES} if driven else {})
+    if swapped:
+        for name in ("U", "Y", "P"):
+            table["joint"][name]["between"].reverse()
     with monkeypatch.context() as patch:
         patch.setattr(tree, "_freedom", lambda edge: int(edge.name in cut))
         return simulate(table)

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import ARRAYS, Task, facts, in_order, key, reasons
+from flexclear.pipeline.core.workflow.task import ARRAYS, Task, contents, facts, in_order, key, reasons
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             begun = store.path(task.stage, name, "part")
             with threads.one(), journal.storage(begun.parent, begun.stem) as storage:
                 product = run({**task.params, **task.context}, data, progress)
-            changed = [fact for fact, value in _facts(task, inputs, sources).items() if known[fact] != value]
+            changed = [fact for fact, value in contents(task).items() if known[fact] != value]
             if changed:
                 raise ResourceError(f"{changed[0]} changed while it was read; run again")
             record = store.put(task.stage, name, product, known, machine.instruction_set())

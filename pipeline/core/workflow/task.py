@@ -86,9 +86,14 @@ def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str,
     """
     result = {f"parameter {name}": value for name, value in flatten(task.params)}
     result |= {f"input {name}": digest for name, digest in digests.items()}
-    result |= {f"file {name}": _digest(path) for name, path in sorted(task.files.items())}
+    result |= contents(task)
     result |= sources.code((task.run.partition(":")[0], STORE, *task.modules))
     return {**result, "function": task.run}
+
+
+def contents(task: Task) -> dict[str, str]:
+    """The facts of the files that a task opens, as they are now."""
+    return {f"file {name}": _digest(path) for name, path in sorted(task.files.items())}
 
 
 def _digest(path: Path) -> str:

@@ -132,7 +132,8 @@ def make_resolution(
     It is compiled next to the steps, and takes as long. Arguments as of `make_advance`.
     """
     stepping = make_stepping(evaluate, retract, method, poses, complete)
-    resolve_events = events[1](evaluate, stepping.attempt, stepping.extend, project, stepping.dense)
+    _, make_resolve_events, _ = events
+    resolve_events = make_resolve_events(evaluate, stepping.attempt, stepping.extend, project, stepping.dense)
 
     @kernel
     def resolution(d, step, t_new, rows, events):
