@@ -265,10 +265,10 @@ class _Comparison:
         for name in names:
             kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
             seconds = self._seconds(name, members) + (0.0 if kinds in self._compiled else COMPILING / AT_ONCE)
-            seconds = 0.0 if self._repeats(name, fitting) else seconds
-            if total + seconds <= self.study.seconds or not (fitting or self.points):
+            again = self._repeats(name, fitting)
+            if again or total + seconds <= self.study.seconds or not (fitting or self.points):
                 fitting.append(name)
-                total += seconds
+                total += 0.0 if again else seconds
                 self._compiled.add(kinds)
         return fitting
 

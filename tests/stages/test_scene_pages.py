@@ -16,6 +16,6 @@ def test_a_page_in_a_folder_has_its_files_next_to_it(tmp_path: Path) -> None:
 
 
 def test_a_budget_that_reaches_one_effect_names_the_others() -> None:
-    answer = fc.effects("checks/bounce", budget=0.01)
+    answer = fc.effects("checks/bounce", budget=1e-6)
     assert answer.attrs["undone"]
-    assert answer.sizes["effect"] >= 1
+    assert any(answer["words"].values), "the effect that is all of the ideal mechanism's difference costs nothing more"

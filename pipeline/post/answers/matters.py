@@ -158,8 +158,9 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     requested: the accuracy that the scene asks for, by quantity in SI; without it three levels answer.
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
+    undone = [f"The budget did not reach {result.attrs['undone']}."] if result.attrs["undone"] else []
     if not single.sizes["effect"]:
-        return "The scene has no effect that could be taken away."
+        return " ".join(undone) or "The scene has no effect that could be taken away."
     levels = [("The requested accuracy", _limits(result, requested))] if requested else [
         (f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS
     ]  # fmt: skip
@@ -178,9 +179,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     more = "no more" if before else "none"
     said += [f"{name} calls for {more}." for name in calm[:1]]
     said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
-    if result.attrs["undone"]:
-        said.append(f"The budget did not reach {result.attrs['undone']}.")
-    return " ".join(said)
+    return " ".join(said + undone)
 
 
 def _limits(result: xr.Dataset, requested: Mapping[str, float]) -> np.ndarray:
