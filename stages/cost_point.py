@@ -30,16 +30,16 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     import numpy as np
     import xarray as xr
 
-    from flexclear.pipeline import dynamics
     from flexclear.pipeline.core.artifacts import quantities
     from flexclear.pipeline.core.scene.quantity import parse
     from flexclear.pipeline.core.system.errors import SolverError
+    from flexclear.pipeline.dynamics import analyses
 
     scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
     warm(scene, reduced, progress)
     try:
-        cost = dynamics.cost(scene, reduced, progress, brief=params["brief"])
+        cost = analyses.cost(scene, reduced, progress, brief=params["brief"])
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     done = cost.run
@@ -62,16 +62,16 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     import numpy as np
     import xarray as xr
 
-    from flexclear.pipeline import dynamics
     from flexclear.pipeline.core.artifacts import quantities
     from flexclear.pipeline.core.scene.quantity import parse
     from flexclear.pipeline.core.system.errors import SolverError
+    from flexclear.pipeline.dynamics import analyses
 
     scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)
     try:
-        done = dynamics.ensemble(scene, reduced, progress)
-        seconds = float(np.median(dynamics.cost(scene, reduced, silent, brief=True).integration))
+        done = analyses.ensemble(scene, reduced, progress)
+        seconds = float(np.median(analyses.cost(scene, reduced, silent, brief=True).integration))
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     recorded = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]

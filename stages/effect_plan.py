@@ -10,7 +10,7 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, read_toml
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import rigid_body, simulation
+from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 
 if TYPE_CHECKING:
@@ -116,12 +116,12 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     """The plan (`core.scene.plan_decisions.Plan`)."""
     from flexclear.pipeline.dynamics.plan.search import plan
 
-    rigid = {name: data for name, data in inputs.items() if name.startswith(rigid_body.PREFIX)}
+    rigid = {name: data for name, data in inputs.items() if name.startswith(simulation.RIGID)}
     fewer = less(inputs)
 
     def filled(scene: Scene) -> Scene:
         """With the rigid bodies that recipes describe."""
-        mine = {name: data for name, data in rigid.items() if name.removeprefix(rigid_body.PREFIX) in scene.meshed()}
+        mine = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
         return simulation.rebuild(simulation.params(scene), mine)
 
     own = {name: data for name, data in rigid.items() if _meshed(params["simulate"], name)}
@@ -143,4 +143,4 @@ def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
 
 def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
     """Whether a body that a recipe describes is rigid in the scene itself."""
-    return bool(simulate["scene"]["body"][name.removeprefix(rigid_body.PREFIX)]["type"] == "rigid")
+    return bool(simulate["scene"]["body"][name.removeprefix(simulation.RIGID)]["type"] == "rigid")

@@ -20,7 +20,6 @@ from flexclear.stages import (
     modal_analysis,
     reduction,
     rendering,
-    rigid_body,
     simulation,
 )
 
@@ -265,12 +264,14 @@ class Graph:
     def bodies(self) -> dict[str, Task]:
         """The tasks of bodies that runs need, as these call them: ``bundle/<body>``, ``rigid/<body>``."""
         return {f"bundle/{body}": task for body, task in self.bundle.items()} | {
-            f"{rigid_body.PREFIX}{body}": task for body, task in self.rigid.items()
+            f"{simulation.RIGID}{body}": task for body, task in self.rigid.items()
         }
 
     def _simulation(self, stage: str, params: Mapping[str, Any], shown: str = "", function: str = "") -> Task:
-        """A task of `stages.simulation`; function, shown: where they are not called as the stage."""
-        run, modules = f"simulation:{function or shown or stage}", simulation.modules(self.scene)
+        """A task of `stages.simulation`, or of `stages.analyses`; function, shown: where they are not called as it."""
+        alone = shown == "run"
+        run = "simulation:run" if alone else f"analyses:{function or stage}"
+        modules = simulation.modules(self.scene, alone=alone)
         return self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
 
     def _folder(self, below: str = "") -> str:

@@ -1,8 +1,7 @@
-"""Stage 4 and what is next to it: scene and bundles -> a run, an ensemble, sections, derivatives, vibrations."""
+"""Stage 4: scene and bundles -> a run; `stages.analyses` makes what is next to it."""
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,11 +15,8 @@ from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.task import given_arrays
-from flexclear.stages import rigid_body
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
@@ -36,6 +32,11 @@ ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
 TIMES_IN_MEMORY, TIMES_ON_DISK = 4.5, 2.0
 #: of a member of an ensemble only some bodies' motion is recorded, at most as often as this
 MEMBER_ROWS = 2000
+#: how inputs are called that hold rigid bodies of recipes, before the body's name
+RIGID = "rigid/"
+#: how well a mesh determines where its frames are, as a fraction of their distance: the middle of a hole is the mean of
+#: its nodes, and with sixteen of them around, a chord leaves the circle by two percent of a radius of a twentieth of it
+LEFT_BY_MESHES = 1e-3
 SPEND = "choose a longer output.interval, or say more in [limits]"
 
 
@@ -61,14 +62,15 @@ def params(
     return {"scene": provenance.without(table)}
 
 
-def modules(scene: Scene) -> tuple[str, ...]:
+def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
     """Modules that a run reaches by its parts' names, so that editing a law leaves scenes without it alone.
 
+    alone: whether it is a single run, of which nothing but its motion is asked.
     Raises InputError when a name is not listed in its family.
     """
     from flexclear.pipeline.dynamics.compile import reach
 
-    return reach.modules(scene)
+    return reach.modules(scene, alone=alone)
 
 
 @given_arrays
@@ -82,7 +84,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Pro
     lacks = missing_compliance(scene, reduced)
     for text in lacks:
         progress(None, text)
-    with _in_time(scene):
+    with in_time(scene):
         simulated = dynamics.simulated(scene, reduced, progress)
     warnings = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
     return {"nc": simulated.assign_attrs(warnings=warnings) if warnings else simulated}
@@ -133,57 +135,8 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[st
     return messages
 
 
-def ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
-    from flexclear.pipeline import dynamics
-
-    scene = rebuild(params, inputs)
-    check_run(scene, results_root())
-    with _in_time(scene):
-        return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
-
-
-def sections(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Sections of a periodic motion (schema SECTIONS); inputs are ``bundle/<body>``."""
-    from flexclear.pipeline import dynamics
-
-    scene = rebuild(params, inputs)
-    with _in_time(scene):
-        return {"nc": dynamics.sections(scene, bundles(inputs), progress)}
-
-
-def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Derivatives of quantities `of` by numbers of the scene, `to`.
-
-    inputs: ``bundle/<body>``, and ``run`` of a scene with contacts, which has the horizon.
-    """
-    from flexclear.pipeline.dynamics import require_without_events
-    from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
-
-    scene = rebuild(params, inputs)
-    require_without_events(scene, "derivatives")
-    horizon = float(inputs["run"]["horizon"]) if "run" in inputs else math.inf
-    with _in_time(scene):
-        names = params["of"], params["to"]
-        return {"nc": derivatives(scene, bundles(inputs), progress, *names, horizon)}
-
-
-def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The equilibrium in a `pose` (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); over the speeds of a
-    drive these alone (schema CAMPBELL).  Inputs are ``bundle/<body>``."""
-    from flexclear.pipeline import dynamics
-    from flexclear.pipeline.dynamics.linear.campbell import campbell
-
-    pose, scene, reduced = params["pose"], rebuild(params, inputs), bundles(inputs)
-    where = pose["time"], pose["drives"]
-    if "speeds" in params:
-        return {"nc": campbell(scene, reduced, progress, params["speeds"], params["drive"], *where)}
-    solve = dynamics.frequencies if pose["vibrations"] else dynamics.equilibrium
-    return {"nc": solve(scene, reduced, progress, *where, pose["moving"])}
-
-
 @contextmanager
-def _in_time(scene: Scene) -> Iterator[None]:
+def in_time(scene: Scene) -> Iterator[None]:
     """Meanwhile work is to stop when the time is over that the scene allows."""
     with stopping.until(scene.limits.time, scene.limits.time_words):
         yield
@@ -202,8 +155,37 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = N
     from flexclear.pipeline.core.scene.schema import Scene
 
     table, name = params["scene"], str(params.get("name", "scene"))
-    body = rigid_body.filled(table["body"], inputs or {})
+    body = filled(table["body"], inputs or {})
     mine = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
     scene = Scene.model_validate({**table, **mine})
     scene._name = name
     return scene
+
+
+def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[str, Any]:
+    """The table of bodies with the numbers of those that inputs ``rigid/<body>`` describe instead of their recipes."""
+    import numpy as np
+
+    from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
+
+    result = dict(bodies)
+    for name, data in inputs.items():
+        if not name.startswith(RIGID):
+            continue
+        body = name.removeprefix(RIGID)
+        frames = {
+            str(frame): {
+                "position": data["frame_position"].values[k].tolist(),
+                "quaternion": matrix_to_quaternion(data["frame_rotation"].values[k]).tolist(),
+            }
+            for k, frame in enumerate(data["frame"].values)
+        }
+        numbers = {
+            "mass": float(data["mass"].values),
+            "com": data["com"].values.tolist(),
+            "inertia": data["inertia"].values.tolist(),
+            "frames": frames,
+            "frame_tolerance": LEFT_BY_MESHES * float(np.ptp(data["frame_position"].values, axis=0).max()),
+        }
+        result[body] = {key: value for key, value in bodies[body].items() if key != "mesh"} | numbers
+    return result

@@ -12,6 +12,7 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import scene_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +88,7 @@ def rotor(speed: float, unbalance: float, axes: Mapping[str, list[float]] = UPRI
 
 
 def _steady(scene: Scene) -> xr.Dataset:
-    found = dynamics.frequencies(scene, {}, silent, moving=True)
+    found = analyses.frequencies(scene, {}, silent, moving=True)
     if found.attrs["growth"]:
         raise ArithmeticError(f"small motions grow: {found.attrs['growth']}")
     return found

@@ -17,7 +17,8 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Ensemble
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics.run.evaluation import specialised
+from flexclear.pipeline.dynamics import analyses
+from flexclear.pipeline.dynamics.run.evaluation import members
 
 #: scenes, with as many members as the paper's ensembles have
 SCENES, MEMBERS = ("csj", "far_csj_cb"), 16
@@ -68,7 +69,7 @@ def _growing(cases: Sequence[Case]) -> Measured:
 def _with_members(here: Mechanism, members: int) -> Callable[[], Any]:
     asked = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
     scene = here.scene.model_copy(update={"ensemble": asked})
-    return lambda: dynamics.ensemble(scene, here.bundles, silent)
+    return lambda: analyses.ensemble(scene, here.bundles, silent)
 
 
 def _timed(work: Callable[[], Any], workers: int = 0, *, together: bool = True) -> tuple[float, float]:
@@ -90,11 +91,11 @@ def _workers(number: int) -> Iterator[None]:
 
 @contextmanager
 def _alone() -> Iterator[None]:
-    proper, specialised.FEW = specialised.FEW, MEMBERS + 1
+    proper, members.FEW = members.FEW, MEMBERS + 1
     try:
         yield
     finally:
-        specialised.FEW = proper
+        members.FEW = proper
 
 
 def _in_turn(tasks: Mapping[str, Callable[[], tuple[float, float]]]) -> dict[str, tuple[Times, Times]]:

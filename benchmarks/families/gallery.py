@@ -17,6 +17,7 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.post import derive
 from flexclear.stages import rendering
 
@@ -306,7 +307,7 @@ def scene_of(entry: Entry) -> Scene:
 def solved(entry: Entry, scene: Scene, reduced: Bundles) -> xr.Dataset:
     """What its answer is read from."""
     if entry.linear:
-        return dynamics.frequencies(scene, reduced, silent, moving=entry.moving)
+        return analyses.frequencies(scene, reduced, silent, moving=entry.moving)
     return dynamics.simulate(scene, reduced, silent)
 
 

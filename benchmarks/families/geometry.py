@@ -24,6 +24,7 @@ from flexclear.papers.wang_wang_2019.published import TABLE8, TABLE9
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.workplace import open_workplace
 
 #: layouts of the family whose runs are made: every so manieth of a coarser grid
@@ -235,7 +236,7 @@ def flexible(layout: Layout, name: str) -> Record:
     """Means over an ensemble of each member's largest deviations from the ideal mechanism, and their spread."""
     requested = layouts.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
     ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout), {}, silent)
-    members = dynamics.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)
+    members = analyses.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)
     each = [_told(deviation) for deviation in ensemble_deviations(members, ideal, PLATFORM)]
     found = {name: [one[name] for one in each] for name in each[0]}
     found["peak_force"] = members.peak_force.sel(contact=JOINT).values.tolist()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline import dynamics
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.record.cost import Cost
 from flexclear.stages.simulation import bundles, rebuild
 
@@ -19,7 +19,7 @@ JOINT, BODY = "A1", "platform"
 def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
     """Motion of the platform and force of A1 at the regular times of one run, evaluations, processor time."""
     scene, reduced = rebuild(params, inputs), bundles(inputs)
-    found = dynamics.cost(scene, reduced, progress)
+    found = analyses.cost(scene, reduced, progress)
     run = found.run
     regular = np.arange(round((scene.time.end - scene.time.start) / scene.output.interval) + 1) * scene.output.interval
     kept = run[["position", "quaternion", "velocity", "acceleration"]].sel(body=[BODY])
@@ -35,9 +35,9 @@ def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
 def members(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
     """Members of an ensemble: motion of the platform, peak contact force, impacts; cost of one run."""
     scene, reduced = rebuild(params, inputs), bundles(inputs)
-    found = dynamics.ensemble(scene, reduced, progress)
+    found = analyses.ensemble(scene, reduced, progress)
     names = ["position", "quaternion", "velocity", "peak_acceleration", "peak_force", "impact_count"]
-    return {"nc": found[names].assign_attrs(_costs(dynamics.cost(scene, reduced, progress)))}
+    return {"nc": found[names].assign_attrs(_costs(analyses.cost(scene, reduced, progress)))}
 
 
 def _costs(found: Cost) -> dict[str, float]:

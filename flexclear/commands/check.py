@@ -20,7 +20,7 @@ from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
-from flexclear.stages import meshing, rigid_body
+from flexclear.stages import meshing, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options
 
@@ -380,10 +380,10 @@ def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
     from flexclear.pipeline.dynamics.model.mechanism import build
     from flexclear.pipeline.dynamics.run.run import placed
 
-    meshed = {f"{rigid_body.PREFIX}{name}": rigid[name] for name in whole.meshed()}
+    meshed = {f"{simulation.RIGID}{name}": rigid[name] for name in whole.meshed()}
     if meshed:
         table = whole.model_dump(mode="python", exclude_none=True)
-        table["body"] = rigid_body.filled(table["body"], meshed)
+        table["body"] = simulation.filled(table["body"], meshed)
         whole = type(whole).model_validate(table)
     return build(placed(whole), {name: rigid[name] for name in whole.flexible()})
 

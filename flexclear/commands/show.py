@@ -13,7 +13,7 @@ from flexclear.commands import scenes
 from flexclear.commands.export import as_json
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
-from flexclear.stages import meshing, rendering, rigid_body
+from flexclear.stages import meshing, rendering, simulation
 from flexclear.stages.workplace import relative
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ def _filled(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Sce
     lone: bodies that are put at the origin.
     """
     table = scene.model_dump(mode="python", exclude_none=True)
-    table["body"] = rigid_body.filled(table["body"], {f"{rigid_body.PREFIX}{n}": bodies[n] for n in scene.meshed()})
+    table["body"] = simulation.filled(table["body"], {f"{simulation.RIGID}{n}": bodies[n] for n in scene.meshed()})
     table.get("start", {}).pop("modal", None)
     for name in lone:
         table["body"][name]["pose"] = {}

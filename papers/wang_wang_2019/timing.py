@@ -96,11 +96,12 @@ def _measured(scene: Scene, bundles: Mapping[str, Labelled], *, checked: bool) -
     """The cost of a run, and why there is none."""
     from flexclear.pipeline import dynamics
     from flexclear.pipeline.core.system.errors import SolverError
+    from flexclear.pipeline.dynamics import analyses
 
     try:
         # an unmeasured start fetches the code; reports would be part of what is measured
         dynamics.simulate(_edited(scene, {"time.end": _share(scene, WARM)}), bundles, silent)
-        return dynamics.cost(scene, bundles, silent, checked=checked), ""
+        return analyses.cost(scene, bundles, silent, checked=checked), ""
     except SolverError as error:
         return None, str(error).partition(";")[0]  # what else is to be doubted of such a run is of no use here
 

@@ -106,10 +106,10 @@ def platform_deviations(scene: str, ideal: str) -> tuple[float, float, float]:
 @cache
 def frequencies(name: str, overrides: Overrides = (), time: float | None = None, *, moving: bool = False) -> xr.Dataset:
     """The equilibrium and the natural vibrations of a scene; overrides as of runs."""
-    from flexclear.pipeline import dynamics
+    from flexclear.pipeline.dynamics import analyses
 
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
-    return dynamics.frequencies(scene, bundles(scene), silent, time, None, moving)
+    return analyses.frequencies(scene, bundles(scene), silent, time, None, moving)
 
 
 def refusal(name: str, text: str, folder: Path) -> str:

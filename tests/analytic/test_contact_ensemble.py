@@ -15,6 +15,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.adaptive import LEAST_NORM
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
@@ -40,7 +41,7 @@ def scene(members: int = MEMBERS) -> Scene:
 
 @cache
 def members() -> xr.Dataset:
-    return dynamics.ensemble(scene(), {}, silent)
+    return analyses.ensemble(scene(), {}, silent)
 
 
 def test_members_start_the_asked_distance_apart_and_fall_alike() -> None:
@@ -66,7 +67,7 @@ def test_members_tell_impacts_and_their_share_of_the_time() -> None:
 @pytest.mark.parametrize("threads", [1, 3])
 def test_members_are_the_same_to_the_last_bit_whoever_makes_them(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
     monkeypatch.setattr(cores, "cores", lambda: threads)
-    assert dynamics.ensemble(scene(), {}, silent).identical(members())
+    assert analyses.ensemble(scene(), {}, silent).identical(members())
 
 
 @pytest.mark.parametrize("lanes", [4, 8])
@@ -77,7 +78,7 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
     monkeypatch.setattr(cores, "cores", lambda: 1)
     monkeypatch.setattr(specialised, "LANES", (lanes,))
     known, made = six(), listened(monkeypatch)
-    assert dynamics.ensemble(scene(members=6), {}, silent).identical(known)
+    assert analyses.ensemble(scene(members=6), {}, silent).identical(known)
     assert [len(group._words) for group in made] == ([] if INTERPRETED else [lanes])
 
 
@@ -99,7 +100,7 @@ def six() -> xr.Dataset:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(specialised, "FEW", 7)
         patch.setattr(cores, "cores", lambda: 1)
-        return dynamics.ensemble(scene(members=6), {}, silent)
+        return analyses.ensemble(scene(members=6), {}, silent)
 
 
 def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bit(
@@ -110,12 +111,12 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
     paper = load_scene(TREE / "scenes/sps4/csj.toml", override={"ensemble": asked, "time.end": "60 ms"})
     monkeypatch.setattr(cores, "cores", lambda: 1)
     made = listened(monkeypatch)
-    together = dynamics.ensemble(paper, {}, silent)
+    together = analyses.ensemble(paper, {}, silent)
     assert [bool(group._places.any()) for group in made] == ([] if INTERPRETED else [True])  # several at once
     assert (together.impact_count.values > 5).all()
     assert not np.array_equal(together.position[0], together.position[1])
     monkeypatch.setattr(specialised, "FEW", 5)
-    assert dynamics.ensemble(paper, {}, silent).identical(together)
+    assert analyses.ensemble(paper, {}, silent).identical(together)
 
 
 def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,7 +131,7 @@ def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(trajectory, "_begin_closed", fails)
     with pytest.raises(SolverError, match="the third"):
-        dynamics.ensemble(scene(), {}, silent)
+        analyses.ensemble(scene(), {}, silent)
     assert threading.active_count() == 1
 
 
@@ -185,7 +186,7 @@ def carried(**path: Any) -> Scene:
 def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
     """Nanometres apart, after a few impacts: what members and run differ by is the sensitivity of the impacts."""
     asked = carried(actuators=["rail"])
-    known, members = dynamics.simulate(asked, {}, silent), dynamics.ensemble(asked, {}, silent)
+    known, members = dynamics.simulate(asked, {}, silent), analyses.ensemble(asked, {}, silent)
     closings = known.event_kind.values == "closing"
     assert 2 <= closings.sum() < 20
     assert members.impact_count.values.tolist() == [[closings.sum()]] * 2
@@ -196,7 +197,7 @@ def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
 
 def test_members_whose_actuators_cannot_do_it_are_refused_like_the_run() -> None:
     asked = carried(actuators=["rail.spin"])
-    for made in (dynamics.simulate, dynamics.ensemble):
+    for made in (dynamics.simulate, analyses.ensemble):
         with pytest.raises(InputError, match="spin"):
             made(asked, {}, silent)
 

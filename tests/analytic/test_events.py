@@ -14,6 +14,7 @@ from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.stages import simulation
 
@@ -392,7 +393,7 @@ def test_points_of_sweeps_go_over_events() -> None:
     assert len(point.values[names[2]]) == run.sizes["time"] - 4 == 201
 
 
-@pytest.mark.parametrize("result", [dynamics.ensemble, dynamics.sections, dynamics.cost])
+@pytest.mark.parametrize("result", [analyses.ensemble, analyses.sections, analyses.cost])
 def test_results_that_know_no_events_refuse_them(result: Any) -> None:
     with pytest.raises(InputError, match="needs a scene without events"):
         result(press(), {}, silent)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.special import beta
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.laws import Expression, Harmonic, Step
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, jump, pieces_of
 from flexclear.pipeline.dynamics.model.mechanism import build
@@ -152,7 +152,7 @@ def test_the_energy_of_every_kind_of_load_by_expression_is_in_the_balance() -> N
 def test_the_frequency_about_an_equilibrium_of_a_nonlinear_spring() -> None:
     weight = {"weight": {"type": "gravity", "acceleration": [0.0, 0.0, 9.81]}}
     table = slide({"force": "-k * max(0, rail.position)^1.5", "values": {"k": f"{K} N/m^1.5"}}, load=weight)
-    found = dynamics.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None)
+    found = analyses.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None)
     rest = (MASS * 9.81 / K) ** (2.0 / 3.0)
     assert float(found.position.sel(body="slide", axis="z")) == pytest.approx(rest, rel=1e-10)
     slope = 1.5 * K * np.sqrt(rest)

@@ -8,6 +8,7 @@ from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, lasting
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.run.evaluation.observation import frames
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
@@ -103,7 +104,7 @@ def bar(mass: float, com: float, inertia: list[float], **ends: float) -> dict[st
 def test_bodies_that_only_turn_about_fixed_points_are_compared_as_well():
     """Frames of links lie on pins there, whose velocities are zero or prescribed; an ensemble diverges all the same."""
     loose = dynamics.simulate(four_bar(), {}, silent)
-    members = dynamics.ensemble(four_bar(ensemble={"members": 4}), {}, silent)
+    members = analyses.ensemble(four_bar(ensemble={"members": 4}), {}, silent)
     diverged = horizon(members.time.values, members.velocity.values)
     assert float(loose.horizon) < 0.5
     # two draws of an exponential growth from 4 and 10 nm: the same impact or one of the next

@@ -11,6 +11,7 @@ from flexclear.pipeline.core.artifacts.quantities import PERTURBATION
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.exponent import Growth, growth, start_direction
 from flexclear.pipeline.dynamics.run.horizon.tangents import differentiate
@@ -58,7 +59,7 @@ def horizons(seed: int) -> tuple[float, float]:
     table = falling(seed)
     alone = dynamics.simulate(Scene.model_validate(table), {}, silent)
     requested = {"members": MEMBERS, "perturbation": PERTURBATION * CLEARANCE}
-    members = dynamics.ensemble(Scene.model_validate(table | {"ensemble": requested}), {}, silent)
+    members = analyses.ensemble(Scene.model_validate(table | {"ensemble": requested}), {}, silent)
     return float(alone.horizon), horizon(members.time.values, members.velocity.values)
 
 

@@ -9,6 +9,7 @@ import xarray as xr
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
 from tests.analytic.integrator_scenes import double_pendulum
 from tests.analytic.integrator_scenes import trajectory as integrated
@@ -76,7 +77,7 @@ def test_nothing_is_handed_over_where_the_motion_is_not_stiff() -> None:
 @pytest.mark.usefixtures("impatient")
 def test_members_of_an_ensemble_hand_over_too() -> None:
     scene = load_scene(TREE / "scenes" / ROLLING, override={"time.end": END, "ensemble": CLOSE})
-    found = dynamics.ensemble(scene, {}, lambda fraction, text: None)
+    found = analyses.ensemble(scene, {}, lambda fraction, text: None)
     assert found.attrs["switched"].startswith("2 of 2 members")
     assert np.isfinite(found.position.values).all()
     # at 19 Hz a distance does not grow in 3 ms, but the ball chatters on the contact's two kilohertz

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.dynamics import analyses
 from tests.analytic.beam_models import build, lowest
 from tests.analytic.mechanism_runs import TREE, bundles, frequencies
 
@@ -107,7 +107,7 @@ def test_damping_of_a_clamped_rod_is_that_of_its_modes(damping: object) -> None:
     free = frequencies("checks/clamped_rod", (still,)).frequency.values
     path = TREE / "scenes" / "checks" / "clamped_rod.toml"
     scene = load_scene(path, {"body.rod.damping": damping, still[0]: still[1]})
-    found = dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None)
+    found = analyses.frequencies(scene, bundles(scene), lambda fraction, text: None)
     omega = 2.0 * np.pi * free
     if isinstance(damping, float):
         ratio = np.full(13, damping)
@@ -125,7 +125,7 @@ def test_ratios_that_are_not_one_per_mode_are_refused() -> None:
     path = TREE / "scenes" / "checks" / "clamped_rod.toml"
     scene = load_scene(path, {"body.rod.damping": {"ratios": [0.01, 0.01]}})
     with pytest.raises(InputError, match=r"2 damping ratios are given for 13 modes"):
-        dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None)
+        analyses.frequencies(scene, bundles(scene), lambda fraction, text: None)
 
 
 def test_a_falling_body_has_no_equilibrium() -> None:

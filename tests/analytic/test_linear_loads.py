@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import analyses
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import GRAVITY, Table, joint, rigid
 
@@ -17,7 +17,7 @@ SMOOTH = 1e-12  # rounding of some hundred products
 
 def frequencies(table: dict[str, Any], time: float = 0.0) -> xr.Dataset:
     scene = Scene.model_validate({"title": "test", "time": {"end": 1.0}, **table})
-    return dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None, time)
+    return analyses.frequencies(scene, bundles(scene), lambda fraction, text: None, time)
 
 
 def chain(damping: float) -> dict[str, Any]:

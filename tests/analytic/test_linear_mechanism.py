@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.linear.bench import state
 from flexclear.pipeline.dynamics.linear.equilibrium import balanced
 from flexclear.pipeline.dynamics.linear.vibrations import vibrations
@@ -41,7 +41,7 @@ def test_a_vibration_let_loose_swings_as_its_frequency_and_shape_say(number: int
 def test_the_four_legs_spin_freely_and_nothing_else_does() -> None:
     """A leg turns about the line through its two balls; its flexible rod follows without bending."""
     scene = load_scene(TREE / "scenes" / "sps4" / "far_cb.toml")
-    found = dynamics.frequencies(scene, bundles(scene), silent, 0.09)
+    found = analyses.frequencies(scene, bundles(scene), silent, 0.09)
     # 13 modes of the rod, 4 spins; the platform is held by the four drives and the central joints
     assert found.attrs["mobility"] == 17
     assert found.attrs["motions_without_stiffness"] == 4

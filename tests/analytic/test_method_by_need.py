@@ -16,6 +16,7 @@ from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
@@ -109,7 +110,7 @@ def test_dear_points_and_members_have_the_tolerance_of_runs_that_none_is_compare
     for name, values in points[0].values.items():
         np.testing.assert_array_equal(values, points[1].values[name])
     ensembles = [
-        dynamics.ensemble(edited(one, {"ensemble": {"members": 2}}), bundles(one), silent) for one in (scene, given)
+        analyses.ensemble(edited(one, {"ensemble": {"members": 2}}), bundles(one), silent) for one in (scene, given)
     ]
     np.testing.assert_array_equal(ensembles[0]["velocity"], ensembles[1]["velocity"])
 

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 from scipy.special import ellipj, ellipk
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import analyses
 from tests.analytic.mechanism_runs import frequencies, run
 from tests.properties import movable
 from tests.properties.mechanisms import Table, simulate
@@ -209,6 +209,6 @@ def test_drives_of_a_tiny_loop_reach_their_pose_as_those_of_a_large_one() -> Non
         table = hung_up(made, np.random.default_rng(3), Setting(size))
         table["load"]["gravity"]["acceleration"] = [0.0, -G, 0.0]
         table["drive"] = {"crank": {"joint": "pin0", "law": {"type": "constant", "value": 0.0}}}
-        held = dynamics.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None, None, {"crank": 0.2})
+        held = analyses.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None, None, {"crank": 0.2})
         found.append(held.frequency.values * np.sqrt(size))
     assert found[1] == pytest.approx(found[0], rel=1e-7)

@@ -5,9 +5,9 @@ import pytest
 from numpy.polynomial import Legendre
 from scipy.linalg import eigh
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.dynamics import analyses
 from tests.analytic.test_turning_beams import flapping_and_lagging
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene
 from tests.reference.turning_beams import WRIGHT
@@ -48,7 +48,7 @@ def blades(hinge: tuple[float, float, float], count: int = 1, size: float = 1.0,
 
 def steady(table: Table) -> np.ndarray:
     """Angular frequencies of small motions about steady turning [rad/s]."""
-    found = dynamics.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None, moving=True)
+    found = analyses.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None, moving=True)
     return 2.0 * np.pi * found.frequency.values
 
 

@@ -14,6 +14,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.post.sections.verdict import derive
 
 #: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
@@ -32,7 +33,7 @@ def with_torque(scene: Scene, amplitude: float, **sections: object) -> Scene:
 
 
 def test_a_pendulum_that_is_driven_hard_is_chaotic_with_the_exponent_of_its_tangent_equations(pendulum: Scene) -> None:
-    found = dynamics.sections(edited(pendulum, {"sections.exponent_periods": 400}), {}, silent)
+    found = analyses.sections(edited(pendulum, {"sections.exponent_periods": 400}), {}, silent)
     verdict = derive(found)
     assert verdict.attrs["verdict"] == "chaotic"
     assert float(verdict.exponent_low) < CHAOTIC < float(verdict.exponent_high)
@@ -42,7 +43,7 @@ def test_a_pendulum_that_is_driven_hard_is_chaotic_with_the_exponent_of_its_tang
 
 def test_a_page_of_verdicts_has_them_for_programs_too(pendulum: Scene, tmp_path: Path) -> None:
     gentle = with_torque(pendulum, 1e-3, transient=0, periods=30, exponent_periods=30)
-    found = dynamics.sections(gentle, {}, silent)
+    found = analyses.sections(gentle, {}, silent)
     verdict = derive(found)
     write_page({"checks/pendulum": verdict}, {"checks/pendulum": found}, {}, tmp_path / "chaos.md")
     with (tmp_path / "chaos/verdicts.csv").open(newline="") as file:
@@ -56,7 +57,7 @@ def test_a_page_of_verdicts_has_them_for_programs_too(pendulum: Scene, tmp_path:
 def test_a_pendulum_that_is_driven_gently_is_periodic_and_forgets_its_start_at_its_damping(pendulum: Scene) -> None:
     # small swings: exp(-t / 4) whatever the phase, so that the torque's period leaves exp(-T / 4)
     gentle = with_torque(pendulum, 1e-3, transient=0, periods=30, exponent_periods=30)
-    found = dynamics.sections(gentle, {}, silent)
+    found = analyses.sections(gentle, {}, silent)
     verdict = derive(found)
     period = float(found.attrs["period"])
     assert verdict.attrs["verdict"] == "periodic"
@@ -68,7 +69,7 @@ def test_a_pendulum_that_is_driven_gently_is_periodic_and_forgets_its_start_at_i
 def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Scene) -> None:
     # a harmonic torque goes on by itself: five periods in one run are five periods one by one
     period = pendulum.time.end
-    one_by_one = dynamics.sections(with_torque(pendulum, 1.5, transient=0, periods=20, exponent_periods=20), {}, silent)
+    one_by_one = analyses.sections(with_torque(pendulum, 1.5, transient=0, periods=20, exponent_periods=20), {}, silent)
     run = dynamics.simulate(edited(pendulum, {"time.end": 5.0 * period, "output.interval": period}), {}, silent)
     strobed = run.sel(time=period * np.arange(1, 5), method="nearest")
     # neighbours part by exp(0.112 x 47 s) = 200 of a tolerance of 1e-10, and both runs err
@@ -89,7 +90,7 @@ def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Sce
 )
 def test_what_cannot_be_looked_at_is_refused(pendulum: Scene, change: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        dynamics.sections(edited(pendulum, change), {}, silent)
+        analyses.sections(edited(pendulum, change), {}, silent)
 
 
 def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
@@ -100,7 +101,7 @@ def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[s
 def test_the_repeated_stroke_with_clearance_and_rigid_rods_settles_on_one_period() -> None:
     scene = fc.load_scene("scenes/sps4/variants/first_csj.toml")
     short = edited(scene, {"sections.transient": 2, "sections.periods": 20, "sections.exponent_periods": 20})
-    found = dynamics.sections(short, {}, silent)
+    found = analyses.sections(short, {}, silent)
     verdict = derive(found)
     assert int(verdict.returns_after) == 1
     # of runs of the written-out stroke: 0.59 a stroke

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from tests.analytic.mechanism_runs import frequencies
 from tests.properties.mechanisms import GRAVITY, Table, joint, rigid, scene
 
@@ -60,7 +60,7 @@ def rotor(
 
 
 def steady(table: Table) -> xr.Dataset:
-    return dynamics.frequencies(Scene.model_validate(table), {}, silent, moving=True)
+    return analyses.frequencies(Scene.model_validate(table), {}, silent, moving=True)
 
 
 def deflection(speed: float) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
@@ -139,3 +140,45 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
         assert effect.modules & set(without) == set()
     if family == "stop":
         assert "flexclear.pipeline.dynamics.contact.normal.flores" in modules(scene)
+
+
+def reached(root: Path, scene: Scene) -> set[str]:
+    """Modules in the key of a single run."""
+    return set(Sources(root).closure(["flexclear.stages.simulation", *modules(scene, alone=True)]))
+
+
+DYNAMICS = "flexclear.pipeline.dynamics"
+#: what no single run without `[accuracy]`, with a method of its own and without actuators on a path can reach
+OTHERS = ("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice")
+OTHERS += ("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual")
+OTHERS += ("specialise.abreast", "run.evaluation.batched_evaluation", "model.refill")
+
+
+def test_a_single_run_depends_on_no_other_result(root: Path) -> None:
+    names = reached(root, load_scene(root / "scenes" / "sps4" / "csj.toml"))
+    found = {n for n in names for other in OTHERS if n.startswith(f"{DYNAMICS}.{other}")}
+    assert found == set()
+    assert {n for n in names if n.startswith(("flexclear.pipeline.structure", "flexclear.pipeline.post"))} == set()
+
+
+#: scene, what it is given, and which ways of a run it then may take
+WAYS: list[tuple[str, dict[str, Any], set[str]]] = [
+    ("sps4/ideal", {}, set()),
+    ("sps4/csj", {}, {"horizon"}),
+    ("sps4/ideal", {"accuracy": {"rod1.position": "1 um"}}, {"accuracy", "method selection"}),
+    ("sps4/ideal", {"accuracy": {"rod1.position": "1 um"}, "solver": {"integrator": "dop853"}}, {"accuracy"}),
+    ("sps4/ideal", {"solver": {}}, {"accuracy", "method selection"}),
+    ("gallery/stewart", {"solver.rtol": 1e-9}, {"inverse dynamics"}),
+]
+
+
+@pytest.mark.parametrize("name, change, known", WAYS)
+def test_a_way_of_a_run_is_in_the_keys_of_the_scenes_that_call_for_it(
+    root: Path, name: str, change: dict[str, Any], known: set[str]
+) -> None:
+    scene = load_scene(root / "scenes" / f"{name}.toml", change)
+    assert set(effects.ways(scene)) == known
+    names = reached(root, scene)
+    for way in import_module(effects.RUNS).NAMES:
+        assert (module_of(effects.RUNS, way) in names) == (way in known), way
+        assert (effects.way(scene, way) is not None) == (way in known), way

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import read_toml
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.geometric_stiffness import variables
@@ -122,7 +122,7 @@ def mast(tmp_path: Path, mass: float, modes: dict[str, object] = USUAL, elements
     made = Scene.model_validate(scene(bodies, joints, end=1.0, load=load, drive=drive))
     kept = made.flexible()["beam"].modes
     reduced = reduce(kept.reference, kept.count, kept.interfaces, material=light, elements=elements)
-    return dynamics.frequencies(made, {"beam": reduced.bundle}, lambda fraction, text: None)
+    return analyses.frequencies(made, {"beam": reduced.bundle}, lambda fraction, text: None)
 
 
 STIFFNESS = 200e9 * np.pi * 1.6e-11 / 4.0  #: E I [N m^2]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, hold
 from flexclear.pipeline.dynamics.linear.tangent import Tangent, damping, stiffness, tangent
@@ -79,9 +79,9 @@ def test_forces_of_a_deep_tree_change_as_their_differences_say(driven: tuple[int
 
 def test_a_deep_tree_vibrates_as_with_its_mass_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
     table = Scene.model_validate(rods(16, plane=True))
-    deep = dynamics.frequencies(table, {}, silent).frequency.values
+    deep = analyses.frequencies(table, {}, silent).frequency.values
     monkeypatch.setattr(modelling, "articulated", lambda numbering: False)
-    shallow = dynamics.frequencies(table, {}, silent).frequency.values
+    shallow = analyses.frequencies(table, {}, silent).frequency.values
     assert deep == pytest.approx(shallow, rel=1e-9)
 
 
@@ -102,7 +102,7 @@ def test_friction_at_rest_is_a_strong_damper() -> None:
         "ground": {"type": "ground", "frames": {"floor": {}}},
         "ball": {**ball, "pose": {"position": [0.0, 0.0, radius - mass * g / 1e7]}},
     }
-    found = dynamics.frequencies(Scene.model_validate(scene(bodies, {"floor": contact}, load=GRAVITY)), {}, silent)
+    found = analyses.frequencies(Scene.model_validate(scene(bodies, {"floor": contact}, load=GRAVITY)), {}, silent)
     rate = 1.5 * static * mass * g / slow * (1.0 / mass + radius**2 / inertia)
     # its arm is shorter than its radius by the depth of the contact, 4e-5 of it
     assert np.sort(found.decay_rate.values)[-2:] == pytest.approx([rate, rate], rel=1e-3)

@@ -12,10 +12,10 @@ import meshio
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.post.render import film_speed, forms, gl, joint_view, player, surfaces, vibrations
 from flexclear.pipeline.post.render.forms import Seat, equivalent, wheels
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
@@ -275,7 +275,7 @@ def test_a_path_is_a_round_tube_that_does_not_twist():
 @pytest.fixture(scope="module")
 def swinging() -> tuple[Mechanism, Vibrations]:
     """A pendulum about its lowest place, and how it is drawn vibrating."""
-    linear = dynamics.frequencies(load_scene("scenes/checks/pendulum.toml"), {}, silent)
+    linear = analyses.frequencies(load_scene("scenes/checks/pendulum.toml"), {}, silent)
     drawn = mechanism(vibrations.as_run(linear), {}, Looks())
     return drawn, vibrations.vibrations(drawn, linear)
 

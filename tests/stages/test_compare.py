@@ -20,7 +20,7 @@ from flexclear.pipeline.post.overview import comparison, curves, figures
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import rigid
-from flexclear.stages import rigid_body
+from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
 from tests.paper import synthetic
@@ -56,7 +56,7 @@ def test_no_modes_make_a_rigid_body_and_so_does_the_recipe_alone(crank: Path):
     pose = {"position": [0.05, 0, 0]}
     table = {"rod": {"type": "rigid", "mesh": "rod.toml", "pose": pose}}
     data = rigid.build(kind.build(read_recipe(crank.parent / "rod.toml")))
-    filled = rigid_body.filled(table, {"rigid/rod": data})["rod"]
+    filled = simulation.filled(table, {"rigid/rod": data})["rod"]
     assert filled["mass"] == float(data["mass"])
     assert set(filled["frames"]) == {"big_end", "middle", "small_end"}
     assert filled["pose"] == pose

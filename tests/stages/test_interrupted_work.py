@@ -23,6 +23,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import pieces, trajectory
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -128,11 +129,11 @@ def test_a_killed_ensemble_goes_on_to_the_same_bits(
     """Killed with so many threads at work; what nobody kills has one."""
     scene = check(root, "bounce", ensemble={"members": 4})
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    whole = dynamics.ensemble(scene, {}, silent)
+    whole = analyses.ensemble(scene, {}, silent)
     monkeypatch.setattr(cores, "cores", lambda: threads)
     monkeypatch.setattr(cores, "_others_idle", True)
     # some 140 looks at each member: three are finished before the work is killed
-    found, kills = interrupted(lambda: dynamics.ensemble(scene, {}, silent), tmp_path, monkeypatch, 450)
+    found, kills = interrupted(lambda: analyses.ensemble(scene, {}, silent), tmp_path, monkeypatch, 450)
     assert kills >= 1
     assert found.identical(whole)
 
@@ -141,7 +142,7 @@ def test_a_killed_ensemble_goes_on_to_the_same_bits(
 def test_killed_sections_go_on_to_the_same_bits(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sections = {"transient": 2, "periods": 20, "exponent_periods": 20}
     scene = check(root, "driven_pendulum", sections=sections, **{"solver.rtol": 1e-10})
-    require_same_bits(lambda: dynamics.sections(scene, {}, silent), tmp_path, monkeypatch, 300)
+    require_same_bits(lambda: analyses.sections(scene, {}, silent), tmp_path, monkeypatch, 300)
 
 
 @pytest.mark.parametrize(
@@ -186,9 +187,9 @@ def test_what_is_left_of_a_member_is_not_used_when_a_bit_of_it_has_changed(
 ) -> None:
     scene = check(root, "bounce", ensemble={"members": 4})
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    whole = dynamics.ensemble(scene, {}, silent)
+    whole = analyses.ensemble(scene, {}, silent)
     with journal.storage(tmp_path, "key"):
-        dynamics.ensemble(scene, {}, silent)
+        analyses.ensemble(scene, {}, silent)
     parts = sorted(tmp_path.glob("*.part"))
     assert len(parts) == 4
     for path in parts:
@@ -197,7 +198,7 @@ def test_what_is_left_of_a_member_is_not_used_when_a_bit_of_it_has_changed(
         path.write_bytes(content)
     with journal.storage(tmp_path, "key") as kept:
         assert all(kept.find(path.name.split(".")[1]) is None for path in parts)
-        assert dynamics.ensemble(scene, {}, silent).identical(whole)
+        assert analyses.ensemble(scene, {}, silent).identical(whole)
 
 
 @pytest.mark.usefixtures("often")

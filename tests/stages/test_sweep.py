@@ -22,6 +22,7 @@ from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.run.evaluation import engine
 from flexclear.pipeline.post.overview.sweep_figures import figures
 from flexclear.stages.simulation import modules
@@ -110,7 +111,7 @@ def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
     vary = {"load.torque.force.amplitude": [0.9, 1.5]}
     found = fc.sweep(path, vary, keep, set=count, workers=1)
     asked = {"load.torque.force.amplitude": 1.5, "sections.exponent_periods": 20, **count}
-    whole = dynamics.sections(load_scene(path, override=asked), {}, silent)
+    whole = analyses.sections(load_scene(path, override=asked), {}, silent)
     here = found.isel({"load.torque.force.amplitude": 1})
     assert here["bob.position.sections"].dims == ("section", "axis")
     assert np.array_equal(here["bob.position.sections"].values, whole["position"].sel(body="bob").values)

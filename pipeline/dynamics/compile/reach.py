@@ -8,9 +8,10 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene.events import with_switched
+from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file, sources_of
 from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.effects import Parts, most_parts, named, schemes
+from flexclear.pipeline.dynamics.effects import RUNS, Parts, most_parts, named, schemes, ways
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -21,24 +22,26 @@ SOURCES = sources_of(TREE)
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.scene.event_kinds")
 
 
-def modules(scene: Scene) -> tuple[str, ...]:
+def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
     """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
     files import.
 
+    alone: whether it is a run without others next to it, and without derivatives.
     Raises InputError when a name is not listed in its family.
     """
     scene = with_switched(scene) if scene.event else scene
     names, parts = {part.module for part in named(scene)}, most_parts(scene)
+    names = names.union(module_of(RUNS, way) for way in ways(scene))
     names = names.union(*(effect.modules for effect in parts.present))
     either = (parts, replace(parts, articulated=True))  # which, only the tree decides
-    return tuple(sorted(names.union(*(_composed(one, scheme) for one in either for scheme in schemes(scene)))))
+    return tuple(sorted(names.union(*(_composed(one, scheme, alone) for one in either for scheme in schemes(scene)))))
 
 
 @cache
-def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
+def _composed(parts: Parts, scheme: Scheme, alone: bool) -> frozenset[str]:
     """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
     texts = [*sources.sources(parts, scheme).values(), *sources.kernels(parts).values(), sources.straight(parts, ())]
-    texts += [sources.abreast(parts, (), lanes=2), sources.along(parts, ())]
+    texts += [] if alone else [sources.abreast(parts, (), lanes=2), sources.along(parts, ())]
     return frozenset().union(*map(_reached, texts))
 
 

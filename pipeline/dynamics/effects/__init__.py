@@ -17,7 +17,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene import integrators
-from flexclear.pipeline.core.scene.registry import module_of
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.effects.effect import Effect
@@ -31,7 +32,7 @@ SURFACES, NORMAL_LAWS, FORMS, FRICTION_LAWS = (
 )
 LOADS, LAWS = "flexclear.pipeline.dynamics.loads", "flexclear.pipeline.dynamics.drives"
 RECORDS = "flexclear.pipeline.dynamics.record"
-EVENTS = "flexclear.pipeline.dynamics.events"
+EVENTS, RUNS = "flexclear.pipeline.dynamics.events", "flexclear.pipeline.dynamics.run"
 INTEGRATORS, STARTS = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.starts"
 #: laws of time that are polynomials throughout, or made of others
 WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated", "delayed"}
@@ -109,12 +110,11 @@ def most_parts(scene: Scene) -> Parts:
     ideal |= {joints.HELD[joint.type] for joint in contacts.values() if joint.type in joints.HELD}
     paths = any(not hasattr(drive, "joint") for drive in scene.drive.values())
     kinds = {effect.name: effect.kinds(scene) for effect in EFFECTS}
-    touching = contacts or any(effect.touches and kinds[effect.name] is not None for effect in EFFECTS)
     chained = set(joints.CHAIN) if paths or ideal - set(joints.WHOLE) else set()
     return Parts(
         joints=tuple(sorted({"free", *ideal, *chained})),
         surfaces=tuple(sorted({joint.type for joint in contacts.values()})),
-        forms=tuple(sorted(import_module(FORMS).NAMES)) if touching else (),
+        forms=tuple(sorted(import_module(FORMS).NAMES)) if _touches(scene) else (),
         frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
         effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
@@ -123,6 +123,11 @@ def most_parts(scene: Scene) -> Parts:
         harmonics=bool(_laws(scene) - WITHOUT_SINES),
         load_kinks=any(getattr(load, "bends", False) for load in scene.load.values()),
     )
+
+
+def _touches(scene: Scene) -> bool:
+    """Whether there are contacts, or effects that have some."""
+    return bool(scene.contacts()) or any(effect.touches and effect.kinds(scene) is not None for effect in EFFECTS)
 
 
 def load_kind(scene: Scene, name: str) -> str:
@@ -165,6 +170,24 @@ def named(scene: Scene) -> Iterator[Named]:
     if scene.event:
         yield Named(EVENTS, "phases", "[event]")
         yield from (Named(LAWS, law, "law") for law in ("constant", "delayed", "sum"))
+
+
+def ways(scene: Scene) -> list[str]:
+    """What the run of a scene may call for and those of others do not, as `dynamics.run` lists it."""
+    found = []
+    if any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
+        found.append("inverse dynamics")
+    if scene.accuracy.quantities if scene.accuracy is not None else scene.solver.by_need:
+        found += ["accuracy", *(["method selection"] if scene.by_need() else [])]
+    return found + (["horizon"] if _touches(scene) else [])
+
+
+def way(scene: Scene, name: str) -> Any:
+    """What `dynamics.run` lists under a name, imported now, where the scene calls for it; else None.
+
+    The key of a run holds it in that case alone.
+    """
+    return lookup(RUNS, name, where="run") if name in ways(scene) else None
 
 
 def schemes(scene: Scene) -> list[Scheme]:

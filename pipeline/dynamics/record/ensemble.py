@@ -29,7 +29,7 @@ from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
-from flexclear.pipeline.dynamics.run.evaluation.specialised import abreast
+from flexclear.pipeline.dynamics.run.evaluation.members import abreast
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed

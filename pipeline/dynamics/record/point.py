@@ -26,6 +26,7 @@ from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
+from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.specialised import side_by_side
@@ -34,7 +35,7 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, per
 from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.pipeline.dynamics.run.run import engines_alike, follow, observed, require_shallow
+from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -1,1 +1,13 @@
-"""From a consistent start to a finished run."""
+"""Integration of a scene's motion.
+
+What the runs of some scenes call for and those of others never do is listed here; which those are, `effects.ways`
+says. It is imported by `effects.way` alone, so that it is in the keys of those runs and of no others.
+"""
+
+KIND = "way of a run"
+NAMES = {
+    "accuracy": "method_choice.accuracy",
+    "horizon": "horizon.horizon:Pair",
+    "inverse dynamics": "inverse:actuated",
+    "method selection": "method_choice.method_selection:suit",
+}

@@ -12,23 +12,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled
-from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError, StoppedError
-from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import meanwhile
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import STARTS, scheme_of
+from flexclear.pipeline.dynamics.effects import STARTS, way
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.model.refill import refilled
 from flexclear.pipeline.dynamics.run import trajectory as stepping
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble, prepare
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -80,11 +78,8 @@ def placed(scene: Scene) -> Scene:
 
 def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
     """The scene with actuators driven as the paths that they shall produce demand, and the laws of their motion."""
-    if not any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
-        return scene, {}
-    from flexclear.pipeline.dynamics.run.inverse import actuated
-
-    return actuated(scene, bundles, progress)
+    actuated = way(scene, "inverse dynamics")
+    return actuated(scene, bundles, progress) if actuated else (scene, {})
 
 
 def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
@@ -105,28 +100,6 @@ def engines(
     """The engine of a run, and the maker of one that continues with another integrator, given by its name."""
     made = maker(scene, bundles, progress)
     return made("", progress), cache(lambda name: made(name, progress))
-
-
-def engines_alike(
-    known: Engine | None, scene: Scene, bundles: Mapping[str, Labelled]
-) -> tuple[Engine, Callable[[str], Engine]]:
-    """What `engines` gives, to the last bit, at less cost where an engine of another edit of the scene is `known`.
-
-    What has been compiled and judged for that serves this.  known: with the same bundles; it is not changed.  Errors as
-    of `engines`.
-    """
-    model = None if known is None or not _may_serve(known, scene) else refilled(known.model, scene)
-    if known is None or model is None:
-        return engines(scene, bundles, silent)
-    other = cache(lambda name: engine_of(edited(scene, {"solver.integrator": name}), bundles, silent))
-    return assemble(model, known.entry, known.method, known.mobility), other
-
-
-def _may_serve(known: Engine, scene: Scene) -> bool:
-    """Whether the scene runs on the same kernels, no other run finds its motion, and its start is no special one."""
-    old = known.model.scene
-    paths = any(isinstance(drive, PathDrive) for drive in [*old.drive.values(), *scene.drive.values()])
-    return not paths and scheme_of(scene.solver) == scheme_of(old.solver) and not known.mobility.singular_start
 
 
 def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[[str, Progress], Engine]:
@@ -189,9 +162,7 @@ def integrate(
 
     if not engine.model.contacts:
         return checked(lambda: steps(engine, start, progress, ours, never))
-    from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
-
-    pair = Pair(engine)
+    pair = way(scene, "horizon")(engine)
 
     def neighbour(alive: Progress) -> PerturbedRun:
         return pair.perturbed_run(start, lambda mine, y, *text: steps(mine, y, alive, others, *text), alive)

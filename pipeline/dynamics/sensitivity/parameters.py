@@ -11,10 +11,10 @@ from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.load import number_at, with_numbers
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Direction
-from flexclear.pipeline.dynamics.run.run import engines_alike
 
 #: relative change of a number by which the assembly, a smooth function of it, is differentiated: the error of central
 #: differences over four points is its fourth power, 1e-12, and starts are closed to 1e-13

@@ -1,21 +1,22 @@
 """What the steps of an integration evaluate with: code for the closure rows that it has met, alone or with others.
 
-Members of an ensemble are evaluated several at once (`run.evaluation.batched_evaluation`). How many depends on the
-machine, so the code gives the same bits for any number.
+Members of an ensemble are evaluated several at once (`run.evaluation.members`).
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.straight_code import address, made
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
+
 #: selections of closure rows for which the steps have code of their own, of one integration
 SELECTIONS = 4
-#: states that are evaluated at once: few, or many. Of fewer than `FEW` each is evaluated alone
-FEW, LANES = 2, (4, 8)
 
 
 def settle(engine: Engine, progress: Progress) -> None:
@@ -34,20 +35,6 @@ def settle(engine: Engine, progress: Progress) -> None:
         for met in straight.rows:
             address(engine.model, engine.h, straight, met, progress=progress)
     engine.connect()
-
-
-def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Places | None:
-    """Places for so many engines like this one, in so many threads; None where each is to take its own steps.
-
-    Either way they, as `another` makes them of it, evaluate with the same bits.
-    """
-    engine.straight.exact, rows = True, engine.selected.tobytes()
-    lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
-    together = members >= FEW * threads and side_by_side(engine)
-    if together and made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
-        return Places(lanes, threads)
-    settle(engine, progress)
-    return None
 
 
 def side_by_side(engine: Engine) -> bool:

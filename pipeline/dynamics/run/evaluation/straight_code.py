@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.model.mobility import Mobility
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
 #: addresses by parts, wiring, name, lanes, whether exact and whether with changes: many engines of a process use them
