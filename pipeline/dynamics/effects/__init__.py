@@ -118,7 +118,7 @@ def most_parts(scene: Scene) -> Parts:
         frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
         effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
-        closures=True,
+        closures=_loops(scene),
         flexible=bool(scene.flexible()),
         harmonics=bool(_laws(scene) - WITHOUT_SINES),
         load_kinks=any(getattr(load, "bends", False) for load in scene.load.values()),
@@ -128,6 +128,26 @@ def most_parts(scene: Scene) -> Parts:
 def _touches(scene: Scene) -> bool:
     """Whether there are contacts, or effects that have some."""
     return bool(scene.contacts()) or any(effect.touches and effect.kinds(scene) is not None for effect in EFFECTS)
+
+
+def _loops(scene: Scene) -> bool:
+    """Whether joints, contacts and paths close loops, or gears their own; the tree may break some that share bodies."""
+    if scene.gear:
+        return True
+    paths = [("", drive.frame) for drive in scene.drive.values() if isinstance(drive, PathDrive)]
+    joined: dict[str, str] = {name: "" for name, body in scene.body.items() if body.type == "ground"}
+
+    def end(body: str) -> str:
+        while body in joined:
+            body = joined[body]
+        return body
+
+    for one, other in [*(joint.between for joint in scene.joint.values()), *paths]:
+        first, second = (end(frame.partition(".")[0]) for frame in (one, other))
+        if first == second:
+            return True
+        joined[second if second else first] = first if second else second
+    return False
 
 
 def load_kind(scene: Scene, name: str) -> str:
@@ -179,7 +199,8 @@ def ways(scene: Scene) -> list[str]:
         found.append("inverse dynamics")
     if scene.accuracy.quantities if scene.accuracy is not None else scene.solver.by_need:
         found += ["accuracy", *(["method selection"] if scene.by_need() else [])]
-    return found + (["horizon"] if _touches(scene) else [])
+    found += ["horizon"] if _touches(scene) else []
+    return found + (["beginning", "collocation", "passing"] if _loops(scene) else [])
 
 
 def way(scene: Scene, name: str) -> Any:

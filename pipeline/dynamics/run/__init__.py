@@ -7,7 +7,10 @@ says. It is imported by `effects.way` alone, so that it is in the keys of those 
 KIND = "way of a run"
 NAMES = {
     "accuracy": "method_choice.accuracy",
+    "beginning": "singular_poses.beginning",
+    "collocation": "singular_poses.collocation",
     "horizon": "horizon.horizon:Pair",
     "inverse dynamics": "inverse:actuated",
     "method selection": "method_choice.method_selection:suit",
+    "passing": "singular_poses.passing",
 }

@@ -249,11 +249,10 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 
 def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> dict[str, np.ndarray]:
     """What is observed around a row next to a singular pose; nothing where the row itself is as good."""
-    from flexclear.pipeline.dynamics.run.singular_poses.collocation import CLEAR, NEARLY_CLEAR, observe_around
-
-    limit = observe_around(engine, row, motion, CLEAR)
+    poses = way(engine.model.scene, "collocation")
+    limit = poses.observe_around(engine, row, motion, poses.CLEAR)
     if limit is None and lost:
-        limit = observe_around(engine, row, motion, NEARLY_CLEAR)
+        limit = poses.observe_around(engine, row, motion, poses.NEARLY_CLEAR)
     return limit or {}
 
 
@@ -262,8 +261,7 @@ def _near_singular(
 ) -> Iterator[tuple[int, Collocation]]:
     """Rows, by number, that are too close to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
-        from flexclear.pipeline.dynamics.run.singular_poses.collocation import blurred  # which few runs need
-
+        blurred = way(engine.model.scene, "collocation").blurred
         engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):

@@ -13,6 +13,7 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects import way
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
@@ -238,15 +239,13 @@ def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
 
 def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
-    from flexclear.pipeline.dynamics.run.singular_poses.beginning import start_motion  # which few mechanisms need
-
     first = recording.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
-    way = start_motion(engine, first.copy())
-    way.lay(engine)
+    leaving = way(engine.model.scene, "beginning").start_motion(engine, first.copy())
+    leaving.lay(engine)
     first[:] = engine.view(m.Y)
     engine.view(m.PIVOT)[:] = 1.0, 0.0
-    tape.collocations.append(way)
+    tape.collocations.append(leaving)
     tape.selections[:] = [(engine.start, engine.selected.copy())]
 
 
@@ -346,13 +345,12 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
         tape.selections.append((t, engine.selected.copy()))
         return True
-    from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, lay_over  # which few runs need
-
-    made, passes = lay_over(engine)
+    passing = way(engine.model.scene, "passing")
+    made, passes = passing.lay_over(engine)
     if made is not None:
         tape.collocations.append(made)
         known = tape.passes[-1].time if tape.passes else -np.inf
-        tape.passes += [p for p in passes if p.time - known > EQUAL_TIMES * made.span]
+        tape.passes += [p for p in passes if p.time - known > passing.EQUAL_TIMES * made.span]
     return made is not None
 
 
@@ -361,10 +359,8 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
-    from flexclear.pipeline.dynamics.run.singular_poses.passing import foresee_at_start
-
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
-    return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
+    return (ahead or way(engine.model.scene, "passing").foresee_at_start(engine)) and _pass_over(engine, tape)
 
 
 def _hand_over(engine: Engine, tape: Tape) -> Handover:
