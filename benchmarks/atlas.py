@@ -220,7 +220,7 @@ DEVIATION = 1e-2
 def modules(case: Case) -> set[str]:
     """What decides about a case: its scene, the dynamics, the stages before them, and the parts that it names."""
     tasks = in_order([Graph(scene(case.of), shown=False).simulate])
-    named = {name for task in tasks for name in (*task.modules, task.run.partition(":")[0])}
+    named = {name for task in tasks for name in task.roots()}
     return {scene.__module__, "flexclear.pipeline.dynamics", *named}
 
 

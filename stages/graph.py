@@ -272,7 +272,8 @@ class Graph:
         alone = shown == "run"
         run = "simulation:run" if alone else f"analyses:{function or stage}"
         modules = simulation.modules(self.scene, alone=alone)
-        return self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
+        task = self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
+        return replace(task, met=simulation.met(self.scene)) if alone else task
 
     def _folder(self, below: str = "") -> str:
         return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""

@@ -73,6 +73,13 @@ def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
     return reach.modules(scene, alone=alone)
 
 
+def met(scene: Scene) -> dict[str, tuple[str, ...]]:
+    """Modules that a single run reaches only if it meets what they are for, by its name."""
+    from flexclear.pipeline.dynamics.compile import reach
+
+    return reach.met(scene)
+
+
 @given_arrays
 def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Progress) -> dict[str, Any]:
     """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is reported, and

@@ -51,9 +51,8 @@ def text(graph: Graph, sources: Sources) -> str:
 def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
     """Module and source text, modules in alphabetical order, each pair once."""
     tasks = in_order(graph.up_to("post"))
-    roots = {task.run.partition(":")[0] for task in tasks} | {name for task in tasks for name in task.modules}
-    reached = sources.closure(roots)
-    parts = {name for task in tasks for name in task.modules}
+    parts = {name for task in tasks for name in task.roots()}
+    reached = sources.closure(parts)
     for name in sorted(reached.keys() - set(_unused(reached, parts))):
         if name.startswith(f"{COMPILE}."):  # how code is made is no method
             continue
@@ -69,7 +68,7 @@ def _at_once(graph: Graph, sources: Sources) -> set[str]:
     tasks = in_order(graph.up_to("post"))
     own = module_name(graph.scene.solver.integrator)
     others = {f"{INTEGRATE}.{module_name(name)}" for name in INTEGRATORS} - {f"{INTEGRATE}.{own}"}
-    waiting = [task.run.partition(":")[0] for task in tasks] + [name for task in tasks for name in task.modules]
+    waiting = [name for task in tasks for name in task.roots(())]
     seen = set[str]()
     while waiting:
         name = waiting.pop()

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.dynamics import effects
 from flexclear.pipeline.dynamics.compile import reach
-from flexclear.pipeline.dynamics.compile.reach import modules
+from flexclear.pipeline.dynamics.compile.reach import met, modules
 from flexclear.pipeline.dynamics.compile.sources import kernels, sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 from flexclear.pipeline.dynamics.model.mechanism import build
@@ -172,6 +172,7 @@ WAYS: list[tuple[str, dict[str, Any], set[str]]] = [
     ("sps4/ideal", {"accuracy": {"rod1.position": "1 um"}}, {"accuracy", "method selection", *LOOPS}),
     ("sps4/ideal", {"accuracy": {"rod1.position": "1 um"}, "solver": {"integrator": "dop853"}}, {"accuracy", *LOOPS}),
     ("sps4/ideal", {"solver": {}}, {"accuracy", "method selection", *LOOPS}),
+    ("checks/expressions", {"solver.rtol": 1e-9}, {"expressions"}),
     ("gallery/stewart", {"solver.rtol": 1e-9}, {"inverse dynamics", *LOOPS}),
 ]
 
@@ -182,8 +183,9 @@ def test_a_way_of_a_run_is_in_the_keys_of_the_scenes_that_call_for_it(
 ) -> None:
     scene = load_scene(root / "scenes" / f"{name}.toml", change)
     assert set(effects.ways(scene)) == known
-    names = reached(root, scene)
-    for way in import_module(effects.RUNS).NAMES:
+    names, known = reached(root, scene), known - LOOPS
+    assert (effects.SINGULAR in met(scene)) == (set(effects.ways(scene)) >= LOOPS)
+    for way in set(import_module(effects.RUNS).NAMES) - LOOPS:
         assert (module_of(effects.RUNS, way) in names) == (way in known), way
         assert (effects.way(scene, way) is not None) == (way in known), way
 
@@ -203,3 +205,16 @@ def test_only_scenes_whose_joints_make_loops_have_closures() -> None:
     assert (True, False) not in found
     assert (False, False) in found
     assert (True, True) in found
+
+
+def test_what_a_run_may_meet_is_in_no_key_before_it_has(root: Path) -> None:
+    """Another integrator that takes over, articulated inertias of a deep tree, singular poses."""
+    scene = load_scene(root / "scenes" / "sps4" / "csj.toml")
+    names, may = reached(root, scene), met(scene)
+    assert set(may) == {effects.DEEP, effects.SINGULAR, effects.METHOD.format("radau")}
+    later = {f"{DYNAMICS}.equations.articulated", f"{DYNAMICS}.integrate.radau"}
+    later |= {f"{DYNAMICS}.run.singular_poses.{name}" for name in LOOPS}
+    assert later & names == set()
+    assert later <= {name for known in may.values() for name in known}
+    assert set(modules(scene, alone=True)).union(*may.values()) <= set(modules(scene))
+    assert effects.METHOD.format("radau") not in met(load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": {}}))

@@ -13,8 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexclear.pipeline.core.artifacts.disk import read_checked
+from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.core.workflow.encounters import meet, noted
+from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import (
     ABOVE,
     TREE,
@@ -26,7 +30,7 @@ from flexclear.pipeline.core.workflow.fingerprint import (
     sources_of,
 )
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
-from flexclear.stages import derived_series, simulation
+from flexclear.stages import derived_series, rigid_body, simulation
 from flexclear.stages.graph import Graph
 from tests.processes import copied
 
@@ -389,3 +393,40 @@ def without_sources(node: object) -> object:
     if isinstance(node, dict):
         return {key: without_sources(value) for key, value in node.items() if key != "source"}
     return [without_sources(item) for item in node] if isinstance(node, (list, tuple)) else node
+
+
+@pytest.mark.parametrize("meets", [False, True])
+def test_code_for_what_a_run_has_not_met_does_not_count(
+    root: Path, copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, meets: bool
+) -> None:
+    """What was made without it stays valid when it is edited, and what was made with it does not."""
+    name = "flexclear.pipeline.post.sections.chaos"
+
+    def run(params: object, inputs: object, progress: object) -> dict[str, bytes]:
+        if meets:
+            meet("chaos")
+        return {"nc": b"result"}
+
+    monkeypatch.setattr(rigid_body, "run", run)
+    store, sources = Store(tmp_path / "results"), Sources(root)
+    task = Task("s", "scene", "flexclear.stages.rigid_body:run", {}, "runs/scene", met={"chaos": (name,)})
+    record = execute(task, {}, store, sources, silent)
+    assert (f"module {name}" in record.facts) is meets
+    assert find(task, {}, store, sources) == record
+    path = copy / "pipeline" / "post" / "sections" / "chaos.py"
+    path.write_text(path.read_text() + "\nEDITED = 1\n")
+    edited = Sources(copy)
+    assert find(task, {}, store, edited) == (None if meets else record)
+    (state,) = states([task], store, edited)
+    assert state.why == ((f"module {name} changed",) if meets else ())
+
+
+def test_what_several_tasks_meet_at_once_counts_for_each() -> None:
+    with noted() as one:
+        meet("first")
+        with noted() as other:
+            meet("second")
+        meet("third")
+    meet("last")
+    assert one == {"first", "second", "third"}
+    assert other == {"second"}

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from itertools import combinations
 
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.system import machine, threads
 from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.core.workflow import journal
+from flexclear.pipeline.core.workflow import encounters, journal
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import ARRAYS, Task, contents, facts, in_order, key, reasons
 
@@ -31,7 +32,7 @@ def key_of(task: Task, inputs: Mapping[str, Record], sources: Sources) -> str:
 
 def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
     """The fresh artifact of a task whose inputs are fresh, now also shown in its folder; or None."""
-    record = store.find(task.stage, key_of(task, inputs, sources))
+    record = _found(task, inputs, store, sources)
     if record is not None:
         store.show(record, task.folder, task.names, task.label)
     return record
@@ -45,19 +46,20 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
     known = _facts(task, inputs, sources)
     name = key(known)
     with store.lock(task.stage, name, lambda: progress(None, "waiting for another process that makes the same")):
-        record = Store(store.root).find(task.stage, name)  # whoever requested the task has reported its faults
+        record = _found(task, inputs, Store(store.root), sources)  # whoever requested it has reported its faults
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
             load = store.arrays if hasattr(run, ARRAYS) else store.load
             data = {role: load(above) for role, above in inputs.items()}
             begun = store.path(task.stage, name, "part")
-            with threads.one(), journal.storage(begun.parent, begun.stem) as storage:
+            with threads.one(), encounters.noted() as met, journal.storage(begun.parent, begun.stem) as storage:
                 product = run({**task.params, **task.context}, data, progress)
             changed = [fact for fact, value in contents(task).items() if known[fact] != value]
             if changed:
                 raise ResourceError(f"{changed[0]} changed while it was read; run again")
-            record = store.put(task.stage, name, product, known, machine.instruction_set())
+            of_this = _facts(task, inputs, sources, [name for name in task.met if name in met])
+            record = store.put(task.stage, key(of_this), product, of_this, machine.instruction_set())
             storage.remove()
     store.show(record, task.folder, task.names, task.label)
     return record
@@ -75,13 +77,15 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
-    now = _facts(task, fresh, sources)
     last = store.last(task.folder, task.label)
+    # of what the last run has not met no code counts
+    names = [name for name, modules in task.met.items() if last and all(f"module {m}" in last.facts for m in modules)]
+    now = _facts(task, fresh, sources, names)
     if last is None and stale:
         return State(task, None, ("never run",))
     above = [f"its input {name} would be made again" for name in sorted(stale)]
     if not stale:
-        record = store.find(task.stage, key(now))
+        record = _found(task, fresh, store, sources)
         if record is not None:
             return State(task, record, ())
     why = reasons(now, None if last is None else last.facts, stale) + above
@@ -94,5 +98,17 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
     return State(task, None, tuple(why))
 
 
-def _facts(task: Task, inputs: Mapping[str, Record], sources: Sources) -> dict[str, str]:
-    return facts(task, {name: record.digest for name, record in inputs.items()}, sources)
+def _found(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
+    """The artifact of a task, whatever it has met of what it may."""
+    for count in range(len(task.met) + 1):
+        for met in combinations(task.met, count):
+            record = store.find(task.stage, key(_facts(task, inputs, sources, met)))
+            if record is not None:
+                return record
+    return None
+
+
+def _facts(
+    task: Task, inputs: Mapping[str, Record], sources: Sources, met: Iterable[str] | None = None
+) -> dict[str, str]:
+    return facts(task, {name: record.digest for name, record in inputs.items()}, sources, met)

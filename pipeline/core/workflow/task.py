@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -41,6 +41,7 @@ class Task:
     context: what the function is given as well, and its result must not show: where files lie, names for messages.
     inputs: tasks whose artifact ``nc`` it is given, by name.
     modules: modules that it reaches by a name in `params`, next to those it imports.
+    met: modules that it reaches only if it meets what they are for (`encounters`), by the name of that.
     folder: where its files are shown, below the results folder; empty: nowhere.
     names: file of the artifact -> name shown there; a file that is not listed keeps its name.
     exclusive: whether nothing else may run next to it (measurements of time).
@@ -54,10 +55,16 @@ class Task:
     part: str = ""
     inputs: Mapping[str, Task] = field(default_factory=dict)
     modules: tuple[str, ...] = ()
+    met: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
     exclusive: bool = False
     context: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
+
+    def roots(self, met: Iterable[str] | None = None) -> tuple[str, ...]:
+        """Modules by which it reaches all others, if it meets what is named, or by default all that it may."""
+        names = self.met if met is None else met
+        return (self.run.partition(":")[0], *self.modules, *(module for name in names for module in self.met[name]))
 
     @property
     def label(self) -> str:
@@ -79,15 +86,16 @@ def in_order(tasks: list[Task]) -> list[Task]:
     return list(ordered)
 
 
-def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:
+def facts(task: Task, digests: Mapping[str, str], sources: Sources, met: Iterable[str] | None = None) -> dict[str, str]:
     """Everything that decides the artifact, in words: kind and name -> value.
 
-    digests: digest of each input that is known; leave one out to compare the rest.
+    digests: digest of each input that is known; leave one out to compare the rest.  met: names in `Task.met` of what
+    was met; all by default.
     """
     result = {f"parameter {name}": value for name, value in flatten(task.params)}
     result |= {f"input {name}": digest for name, digest in digests.items()}
     result |= contents(task)
-    result |= sources.code((task.run.partition(":")[0], STORE, *task.modules))
+    result |= sources.code((*task.roots(met), STORE))
     return {**result, "function": task.run}
 
 

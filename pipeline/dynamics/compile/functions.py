@@ -25,6 +25,7 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
+from flexclear.pipeline.core.workflow.encounters import meet
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import reach, sources
@@ -32,7 +33,7 @@ from flexclear.pipeline.dynamics.compile.compiler_process import second_process
 from flexclear.pipeline.dynamics.compile.files import bring, compiled, interpreted, loaded
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
 from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
-from flexclear.pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.dynamics.effects import DEEP, METHOD, Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
 #: what the functions are to who waits for them
@@ -196,6 +197,9 @@ def entry(
 
     equations: sources by name of KERNELS, or of straight code. Where there is none, kernels are compiled instead.
     """
+    meet(METHOD.format(scheme.integrator))
+    if parts.articulated:
+        meet(DEEP)
     folder, began = writable(kernel_root(), tell), time.monotonic()
     texts = {**sources.sources(parts, scheme), **equations}
     files = {name: _file(folder, name, source) for name, source in texts.items()}

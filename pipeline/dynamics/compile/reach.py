@@ -11,7 +11,18 @@ from flexclear.pipeline.core.scene.events import with_switched
 from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file, sources_of
 from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.effects import RUNS, Parts, most_parts, named, schemes, ways
+from flexclear.pipeline.dynamics.effects import (
+    DEEP,
+    METHOD,
+    POSES,
+    RUNS,
+    SINGULAR,
+    Parts,
+    most_parts,
+    named,
+    schemes,
+    ways,
+)
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -26,15 +37,39 @@ def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
     """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
     files import.
 
-    alone: whether it is a run without others next to it, and without derivatives.
+    alone: whether it is a run without others next to it, and without derivatives; what it may meet is in `met` then.
     Raises InputError when a name is not listed in its family.
     """
-    scene = with_switched(scene) if scene.event else scene
-    names, parts = {part.module for part in named(scene)}, most_parts(scene)
-    names = names.union(module_of(RUNS, way) for way in ways(scene))
-    names = names.union(*(effect.modules for effect in parts.present))
-    either = (parts, replace(parts, articulated=True))  # which, only the tree decides
-    return tuple(sorted(names.union(*(_composed(one, scheme, alone) for one in either for scheme in schemes(scene)))))
+    found, scene = _of_parts(scene), _switched(scene)
+    found |= set().union(*(_composed(most_parts(scene), scheme, alone) for scheme in schemes(scene)[: _needed(scene)]))
+    return tuple(sorted(found if alone else found.union(*met(scene, alone=False).values())))
+
+
+def met(scene: Scene, *, alone: bool = True) -> dict[str, tuple[str, ...]]:
+    """Modules that such a run reaches only if it meets something, by the name that `encounters` has for that."""
+    scene = _switched(scene)
+    parts, known = most_parts(scene), schemes(scene)
+    deep = [_composed(replace(parts, articulated=True), scheme, alone) for scheme in known]
+    found = {DEEP: frozenset().union(*deep)}
+    found |= {METHOD.format(s.integrator): _composed(parts, s, alone) for s in known[_needed(scene) :]}
+    poses = frozenset(module_of(RUNS, way) for way in ways(scene) if way in POSES)
+    found |= {SINGULAR: poses} if poses else {}
+    return {name: tuple(sorted(of_it)) for name, of_it in found.items()}
+
+
+def _of_parts(scene: Scene) -> set[str]:
+    scene = _switched(scene)
+    names = {part.module for part in named(scene)}.union(*(one.modules for one in most_parts(scene).present))
+    return names.union(module_of(RUNS, way) for way in ways(scene) if way not in POSES)
+
+
+def _switched(scene: Scene) -> Scene:
+    return with_switched(scene) if scene.event else scene  # type: ignore[no-any-return]
+
+
+def _needed(scene: Scene) -> int:
+    """How many of `schemes` count whatever the run meets: where one is chosen all of them do."""
+    return len(schemes(scene)) if scene.by_need() else 1
 
 
 @cache

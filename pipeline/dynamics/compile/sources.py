@@ -16,14 +16,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene import integrators
-from flexclear.pipeline.core.scene.registry import listed
-from flexclear.pipeline.dynamics.compile import formulas
+from flexclear.pipeline.core.scene.registry import listed, lookup
 from flexclear.pipeline.dynamics.effects import (
     FORMS,
     FRICTION_LAWS,
     INTEGRATORS,
     JOINTS,
     LOADS,
+    RUNS,
     SURFACES,
     Parts,
     Scheme,
@@ -107,7 +107,10 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
 
 def kernels(parts: Parts) -> dict[str, str]:
     """Source by name of what a mechanism of these parts calls whose wiring has no code of its own."""
-    return {"evaluate": _evaluate(parts), "describe": _text(*_description(parts), DESCRIBE, _formulas(parts))}
+    return {
+        "evaluate": _evaluate(parts),
+        "describe": _text(*_description(parts), _calling("describe", "description"), _formulas(parts)),
+    }
 
 
 def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bool = False) -> str:
@@ -174,14 +177,16 @@ def _evaluate(parts: Parts) -> str:
     file, what, _, _ = _equations(parts)
     file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({_harmonics(file)})"
     maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
-    return _text(file, what, "right_hand_side", maker, EVALUATE, _formulas(parts))
+    return _text(
+        file, what, "right_hand_side", maker, _calling("evaluate", "right_hand_side", "t, y, dy"), _formulas(parts)
+    )
 
 
 def _prescribe(parts: Parts) -> str:
     file = Composition(parts)
     if parts.harmonics:
         file.given["harmonics"] = _harmonics(file)
-    return _text(file, "laws of time", "laws", file.take(PRESCRIBED, "make_laws"), PRESCRIBE)
+    return _text(file, "laws of time", "laws", file.take(PRESCRIBED, "make_laws"), _calling("prescribe", "laws", "t"))
 
 
 def _harmonics(file: Composition) -> str:
@@ -203,7 +208,13 @@ def _project(parts: Parts) -> str:
 def _retract(parts: Parts) -> str:
     file = _joints(parts)
     maker = file.take(f"{DYNAMICS}.equations.retraction", "make_retraction")
-    return _text(file, f"retraction of {', '.join(parts.joints)}", "retraction", maker, RETRACT)
+    return _text(
+        file,
+        f"retraction of {', '.join(parts.joints)}",
+        "retraction",
+        maker,
+        _calling("retract", "retraction", "y, displacement, out, total"),
+    )
 
 
 def _description(parts: Parts) -> tuple[Composition, str, str, str]:
@@ -319,7 +330,11 @@ def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
 def _formulas(parts: Parts) -> str:
     """The kernels of the expressions of loads."""
     written = [(n, kind.split(maxsplit=1)) for n, kind in enumerate(parts.loads)]
-    return "\n\n".join(formulas.source(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1)
+    texts = [(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1]
+    if not texts:
+        return ""
+    formulas = lookup(RUNS, "expressions", where="parts")  # as `effects.ways` has it of scenes with such loads
+    return "\n\n".join(formulas.source(*text) for text in texts)
 
 
 def _close(file: Composition) -> None:
@@ -331,6 +346,12 @@ def _close(file: Composition) -> None:
 
 def _projection(file: Composition) -> str:
     return "calls.project" if file.parts.closures else file.take(f"{DYNAMICS}.equations.projection", "no_projection")
+
+
+def _calling(name: str, kernel: str, arguments: str = "") -> str:
+    """The function that others call by its address for a kernel that returns nothing."""
+    given = ", ".join(["h, f, w, n", *([arguments] if arguments else [])])
+    return f'@calls.exported("{name}")\ndef {name}({given}):\n    {kernel}({given})\n    return 0\n'
 
 
 def _text(
@@ -349,16 +370,6 @@ def _text(
     )
 
 
-EVALUATE = """@calls.exported("evaluate")
-def evaluate(h, f, w, n, t, y, dy):
-    right_hand_side(h, f, w, n, t, y, dy)
-    return 0
-"""
-PRESCRIBE = """@calls.exported("prescribe")
-def prescribe(h, f, w, n, t):
-    laws(h, f, w, n, t)
-    return 0
-"""
 # laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
 STRAIGHT = """WIRING = (
 {wiring})
@@ -392,16 +403,6 @@ def lanes(table, places, numbers):
 PROJECT = """@calls.exported("project")
 def project(h, f, w, n, t, y, dy, tolerance):
     return projection(h, f, w, n, t, y, dy, tolerance)
-"""
-RETRACT = """@calls.exported("retract")
-def retract(h, f, w, n, y, displacement, out, total):
-    retraction(h, f, w, n, y, displacement, out, total)
-    return 0
-"""
-DESCRIBE = """@calls.exported("describe")
-def describe(h, f, w, n):
-    description(h, f, w, n)
-    return 0
 """
 OBSERVE = """@calls.exported("observe")
 def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out, length):

@@ -20,6 +20,7 @@ from flexclear.pipeline.core.scene import integrators
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
+from flexclear.pipeline.core.workflow.encounters import meet
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.effects.effect import Effect
 
@@ -34,6 +35,10 @@ LOADS, LAWS = "flexclear.pipeline.dynamics.loads", "flexclear.pipeline.dynamics.
 RECORDS = "flexclear.pipeline.dynamics.record"
 EVENTS, RUNS = "flexclear.pipeline.dynamics.events", "flexclear.pipeline.dynamics.run"
 INTEGRATORS, STARTS = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.starts"
+#: ways over singular poses and out of them, and what they are for: a run of loops may meet some, and few do
+POSES, SINGULAR = ("beginning", "collocation", "passing"), "singular poses"
+#: what a run meets whose tree is deep; what it meets that is integrated by a method
+DEEP, METHOD = "a deep tree", "the method {}"
 #: laws of time that are polynomials throughout, or made of others
 WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated", "delayed"}
 
@@ -200,7 +205,11 @@ def ways(scene: Scene) -> list[str]:
     if scene.accuracy.quantities if scene.accuracy is not None else scene.solver.by_need:
         found += ["accuracy", *(["method selection"] if scene.by_need() else [])]
     found += ["horizon"] if _touches(scene) else []
-    return found + (["beginning", "collocation", "passing"] if _loops(scene) else [])
+    if scene.meshed() or any(body.frame_tolerance for body in scene.rigid().values()):
+        found.append("frames to a tolerance")
+    if any(" " in load_kind(scene, name) for name in scene.forces()):
+        found.append("expressions")
+    return found + ([*POSES] if _loops(scene) else [])
 
 
 def way(scene: Scene, name: str) -> Any:
@@ -208,7 +217,11 @@ def way(scene: Scene, name: str) -> Any:
 
     The key of a run holds it in that case alone.
     """
-    return lookup(RUNS, name, where="run") if name in ways(scene) else None
+    if name not in ways(scene):
+        return None
+    if name in POSES:
+        meet(SINGULAR)
+    return lookup(RUNS, name, where="run")
 
 
 def schemes(scene: Scene) -> list[Scheme]:

@@ -10,7 +10,8 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.model import fitting, given_start
+from flexclear.pipeline.dynamics.effects import way
+from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
 from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, far_apart, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
@@ -58,7 +59,8 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     if mechanism.has_paths or not (mechanism.all_rigid or asked):
         return settled(mechanism, poses)
     closed = close(mechanism, joints, poses)
-    if closed is None and (scene := fitting.fitted(mechanism, joints, poses)) is not None:
+    fitting = way(mechanism.scene, "frames to a tolerance") if closed is None else None
+    if fitting is not None and (scene := fitting.fitted(mechanism, joints, poses)) is not None:
         fits = assembled(build(scene, {}), given)
         return replace(fits, choice=" ".join([fitting.changed(mechanism.scene, scene), fits.choice]).strip())
     if closed is None and mechanism.all_rigid:

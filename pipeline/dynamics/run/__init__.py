@@ -9,6 +9,8 @@ NAMES = {
     "accuracy": "method_choice.accuracy",
     "beginning": "singular_poses.beginning",
     "collocation": "singular_poses.collocation",
+    "expressions": ".compile.formulas",
+    "frames to a tolerance": ".model.fitting",
     "horizon": "horizon.horizon:Pair",
     "inverse dynamics": "inverse:actuated",
     "method selection": "method_choice.method_selection:suit",
