@@ -64,7 +64,7 @@ def _of_parts(scene: Scene) -> set[str]:
 
 
 def _switched(scene: Scene) -> Scene:
-    return with_switched(scene) if scene.event else scene  # type: ignore[no-any-return]
+    return with_switched(scene) if scene.event else scene
 
 
 def _needed(scene: Scene) -> int:
