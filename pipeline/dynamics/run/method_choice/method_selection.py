@@ -45,9 +45,9 @@ FASTER_VIBRATIONS = 2.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
 CHEAP, WORTH_STIFF, CRAWLING = 200.0, 3000.0, 300_000.0
-#: the same in a scene with contacts, at which each method begins again: of the default method before the exponential one
-#: is tried, and at the pace of a run before it hands on to one that is not known yet. A method is compiled once, for some
-#: seconds (the slider-crank of `flexclear new`: 13 s for two that gave up, where the default one took 0.5 s)
+#: the same in a scene with contacts, at which each method begins again: of the default method before the exponential
+#: one is tried, and at the pace of a run before it hands on to one that is not known yet. A method is compiled once,
+#: for some seconds (the slider-crank of `flexclear new`: 13 s for two that gave up, where the default one took 0.5 s)
 BETWEEN_CONTACTS, WORTH_COMPILING = 3e6, 1e6
 #: what the stiff method is taken to cost where nothing is known of it, at a tolerance and at looser ones
 UNKNOWN, AT = 20_000.0, 1e-4
