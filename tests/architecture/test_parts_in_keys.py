@@ -151,9 +151,11 @@ def reached(root: Path, scene: Scene) -> set[str]:
 
 DYNAMICS = "flexclear.pipeline.dynamics"
 #: what no single run without `[accuracy]`, with a method of its own and without actuators on a path can reach
-OTHERS = ("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice")
-OTHERS += ("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual")
-OTHERS += ("specialise.abreast", "run.evaluation.batched_evaluation", "model.refill")
+OTHERS = (
+    *("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice"),
+    *("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual"),
+    *("specialise.abreast", "run.evaluation.batched_evaluation", "run.evaluation.members", "model.refill"),
+)
 
 
 def test_a_single_run_depends_on_no_other_result(root: Path) -> None:
