@@ -118,6 +118,8 @@ class Study:
     undone: list[cost_design.Design] = field(default_factory=list)
     spent: float = 0.0
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
+    #: by integrator, the loosest tolerance at which a point used up its evaluations
+    used_up: dict[str, float] = field(default_factory=dict)
     own: float = 0.0
     seconds_each: float = 0.0
     _complete: bool = False
@@ -219,10 +221,15 @@ class Study:
         for design in designs:
             seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
             compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
-            if self.spent + seconds + compiling > self.seconds:
+            if self.spent + seconds + compiling > self.seconds or self._crawls(design):
                 self.undone.append(design)
             else:
                 self._made(design)
+
+    def _crawls(self, design: cost_design.Design) -> bool:
+        """Whether its method used up its evaluations at a tolerance that is no tighter."""
+        solver = design.scene.solver
+        return solver.step is None and solver.rtol <= self.used_up.get(solver.integrator, 0.0)
 
     def _made(self, design: cost_design.Design) -> xr.Dataset:
         """One point, brought up to date."""
@@ -237,10 +244,11 @@ class Study:
         self.runs[design.key] = task
         self.points.append(design)
         solver = design.scene.solver
-        if "refused" in record.attrs:
-            self.spent += POINT + (
-                self._most() * self.seconds_each if "evaluations" in record.attrs["refused"] else 0.0
-            )
+        if "evaluations" in record.attrs.get("refused", ""):
+            self.spent += POINT + self._most() * self.seconds_each
+            self.used_up[solver.integrator] = max(solver.rtol, self.used_up.get(solver.integrator, 0.0))
+        elif "refused" in record.attrs:
+            self.spent += POINT
         else:
             self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
             if solver.step is None and design.group in ("tolerance", "sampling"):
@@ -249,9 +257,11 @@ class Study:
         return record
 
     def _most(self) -> int:
-        """Evaluations that a point may take: a power of ten, so that its key does not change with each budget."""
+        """Evaluations that a point may take: 1, 2 or 5 times a power of ten, so that its key does not change with each
+        budget."""
         affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
-        return int(10.0 ** math.ceil(math.log10(affordable)))
+        below = 10 ** math.floor(math.log10(affordable))
+        return next(factor * below for factor in (1, 2, 5, 10) if factor * below >= affordable)
 
     def _kernels(self, design: cost_design.Design) -> Task:
         shared = kernels.shared(design.scene)
