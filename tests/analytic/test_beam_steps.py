@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.structure.closed_form import frequencies as closed_form
+from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.slices import slices
 from flexclear.pipeline.structure.kinds import kind

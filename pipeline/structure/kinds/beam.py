@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.structure.closed_form import comparison
+from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe import beam_mesh
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
@@ -121,5 +121,5 @@ KIND = Kind(
     vtu=beam_mesh.as_vtu,
     assemble=assemble,
     words=lambda model, families, vectors: [name.partition("_")[0] for name in families],
-    exact=comparison.columns,
+    exact=closed_form.columns,
 )
