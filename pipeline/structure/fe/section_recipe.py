@@ -7,11 +7,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Area, Length, Number, Part, SecondMoment
+from flexclear.pipeline.core.scene.fields import Area, Length, Number, Part, Positive, SecondMoment
 from flexclear.pipeline.structure.fe import section as sections
 from flexclear.pipeline.structure.fe.section import Section, Value
-
-Positive = Field(gt=0.0)
 
 
 def _pair(value: Any) -> Any:
@@ -32,17 +30,22 @@ ShearCoefficient = Annotated[
 ]
 
 
-class CircleSection(Part):
+class KnownSection(Part):
+    """What sections have whose constants follow from lengths."""
+
+    shear_coefficient: ShearCoefficient | None = None
+    """kappa instead of Cowper's (1966)"""
+
+
+class CircleSection(KnownSection):
     """Full circle."""
 
     type: Literal["circle"]
     radius: Annotated[Length, Positive]
     """of the circle"""
-    shear_coefficient: ShearCoefficient | None = None
-    """kappa instead of Cowper's (1966)"""
 
 
-class TubeSection(Part):
+class TubeSection(KnownSection):
     """Circular tube; `inner_radius` is that of the hole."""
 
     type: Literal["tube"]
@@ -50,8 +53,6 @@ class TubeSection(Part):
     """of the outer circle and of the hole"""
     inner_radius: Annotated[Length, Positive]
     """of the outer circle and of the hole"""
-    shear_coefficient: ShearCoefficient | None = None
-    """kappa instead of Cowper's (1966)"""
 
     @model_validator(mode="after")
     def _has_a_wall(self) -> TubeSection:
@@ -62,7 +63,7 @@ class TubeSection(Part):
         return self
 
 
-class RectangleSection(Part):
+class RectangleSection(KnownSection):
     """Full rectangle, `width` along y and `height` along z of the rod."""
 
     type: Literal["rectangle"]
@@ -70,8 +71,6 @@ class RectangleSection(Part):
     """along y and along z of the rod"""
     height: Annotated[Length, Positive]
     """along y and along z of the rod"""
-    shear_coefficient: ShearCoefficient | None = None
-    """kappa instead of Cowper's (1966)"""
 
 
 class GeneralSection(Part):
@@ -111,12 +110,9 @@ class EqualAreaSquare(Part):
     type: Literal["equal-area-square"]
 
 
-StiffnessSection = Annotated[
-    CircleSection | TubeSection | RectangleSection | GeneralSection, Field(discriminator="type")
-]
-InertiaSection = Annotated[
-    CircleSection | TubeSection | RectangleSection | GeneralSection | EqualAreaSquare, Field(discriminator="type")
-]
+AnySection = CircleSection | TubeSection | RectangleSection | GeneralSection
+StiffnessSection = Annotated[AnySection, Field(discriminator="type")]
+InertiaSection = Annotated[AnySection | EqualAreaSquare, Field(discriminator="type")]
 
 #: lengths that a linear taper changes
 DIMENSIONS: dict[str, tuple[str, ...]] = {

@@ -21,7 +21,8 @@ def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None =
     reference condition of the modes says.  Units per modal coordinate: q in m, for modal masses of 1 kg.
     """
     model = of_mesh(mesh).assemble(mesh)
-    vectors, drawn = modes["vector"].values, model.drawn
+    vectors = modes["vector"].values
+    drawn = model.drawn.moved(vectors)
     integrals = model.integrate(vectors)
     moved = np.stack([frame.motion @ vectors for frame in model.interfaces])
     values = {
@@ -30,9 +31,9 @@ def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None =
         **model.frames(),
         "frame_translation_shape": moved[:, :3],
         "frame_rotation_shape": moved[:, 3:],
-        "shape_translation": (drawn.translation @ vectors).reshape(-1, 3, vectors.shape[1]),
-        "shape_rotation": (drawn.rotation @ vectors).reshape(-1, 3, vectors.shape[1]),
-        **drawn.at_rest(),
+        "shape_translation": drawn[:, :3],
+        "shape_rotation": drawn[:, 3:],
+        **model.drawn.at_rest(),
         "modal_stiffness": np.diag((2.0 * np.pi * modes["frequency"].values) ** 2),
         "frequency": modes["frequency"].values,
     }

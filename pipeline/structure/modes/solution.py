@@ -105,11 +105,9 @@ def _frame(model: Model, name: str) -> Interface:
 
 
 def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[str, Any]:
-    n = vectors.shape[1]
-    moved = [(motion @ vectors).reshape(-1, 3, n) for motion in (model.drawn.translation, model.drawn.rotation)]
     return {
         "frequency": (("mode",), eigen.frequency(values)),
-        "shape": (("node", "dof", "mode"), np.concatenate(moved, axis=1)),
+        "shape": (("node", "dof", "mode"), model.drawn.moved(vectors)),
         "vector": (("unknown", "mode"), vectors),
         "node_position": (("node", "axis"), model.drawn.position),
         "cell_node": (("cell", "corner"), model.drawn.cell),

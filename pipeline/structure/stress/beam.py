@@ -21,7 +21,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
 from flexclear.pipeline.structure.fe.section import POINTS, Section
-from flexclear.pipeline.structure.fe.slices import Maps, slices
+from flexclear.pipeline.structure.fe.slices import slices
 from flexclear.pipeline.structure.stress.outline import Outline, outline
 
 CONSTANTS = ("area", "second_moment")
@@ -55,6 +55,7 @@ def _sections(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarr
 def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray) -> dict[str, Any]:
     body = slices(mesh, beam)
     shape = ("slice", "axis", "mode")
+    moved = (body.motion @ vectors).reshape(-1, 6, vectors.shape[1])
     x, cells = mesh["abscissa"].values, mesh.sizes["cell"]
     positions, ending = x[nodes], np.tile([False, True], cells)
     lumps = x[mesh["lump_node"].values] if "lump_node" in mesh else np.empty(0)
@@ -64,8 +65,8 @@ def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray
         "slice_mass": (("slice",), body.mass),
         "slice_position": (("slice", "axis"), body.position),
         "slice_spread": (("slice", "axis", "axis2"), body.spread),
-        "slice_translation_shape": (shape, _shapes(body.translation, vectors)),
-        "slice_rotation_shape": (shape, _shapes(body.rotation, vectors)),
+        "slice_translation_shape": (shape, moved[:, :3]),
+        "slice_rotation_shape": (shape, moved[:, 3:]),
         "slice_beyond": (("section", "slice"), np.hstack([inside, _beyond(lumps, positions, ending)]).astype(np.int8)),
         "frame_beyond": (
             ("section", "frame"),
@@ -78,10 +79,6 @@ def _beyond(points: np.ndarray, positions: np.ndarray, ending: np.ndarray) -> np
     """Whether what sits on nodes at `points` lies beyond each section; where a cell ends, its end node does."""
     ahead = points[None, :] - positions[:, None]
     return (ahead > 0.0) | (ending[:, None] & (ahead == 0.0))
-
-
-def _shapes(maps: Maps, vectors: np.ndarray) -> np.ndarray:
-    return np.stack([along @ vectors for along in maps], axis=1)
 
 
 def _fibres(mesh: xr.Dataset) -> dict[str, Any]:

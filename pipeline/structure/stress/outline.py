@@ -11,7 +11,6 @@ Timoshenko & Goodier, *Theory of Elasticity*, sec. 109 (torsion of a rectangle).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +24,6 @@ AROUND = 72
 ALONG = 9
 #: odd terms of the series of a rectangle's torsion; they fall as 1/n^2 at the middle of a side
 TERMS = np.arange(1, 400, 2)
-#: a section is of a type when its torsion constant is that of the type
-SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -43,40 +40,11 @@ class Outline:
 
 def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline | None:
     """The maps of a section with these constants that is of one of `types`; None where it has no known outline."""
-    for name in types:
-        lengths = _LENGTHS[name](given) if name in _LENGTHS else None
-        if lengths is None:
-            continue
-        made = getattr(sections, name)(*lengths)
-        if len(types) == 1 or _is(made, given):
-            return _sides(made, *lengths) if name == "rectangle" else _round(made, *lengths, poisson=poisson)
-    return None
-
-
-def _is(made: Section, given: Section) -> bool:
-    a, b = (np.array([s.torsion, s.second_y, s.second_z], dtype=float) for s in (made, given))
-    return bool(np.all(np.abs(a - b) <= SAME * b))
-
-
-def _tube(given: Section) -> tuple[float, float] | None:
-    # A = pi (R^2 - r^2) and I = A (R^2 + r^2) / 4
-    total, difference = float(4.0 * given.second_y / given.area), float(given.area / math.pi)
-    if difference >= total:
+    name, lengths = sections.shape(types, given)
+    if not name:
         return None
-    return math.sqrt(0.5 * (total + difference)), math.sqrt(0.5 * (total - difference))
-
-
-def _rectangle(given: Section) -> tuple[float, float]:
-    ratio = math.sqrt(given.second_z / given.second_y)
-    return math.sqrt(given.area * ratio), math.sqrt(given.area / ratio)
-
-
-#: lengths of a section of a type with given constants, as `fe.section` takes them; None where there is none
-_LENGTHS: dict[str, Callable[[Section], tuple[float, ...] | None]] = {
-    "circle": lambda given: (math.sqrt(given.area / math.pi),),
-    "tube": _tube,
-    "rectangle": _rectangle,
-}
+    made = getattr(sections, name)(*lengths)
+    return _sides(made, *lengths) if name == "rectangle" else _round(made, *lengths, poisson=poisson)
 
 
 def _round(made: Section, radius: float, inner: float = 0.0, *, poisson: float) -> Outline:

@@ -27,7 +27,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.coordinates import AXES
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model, rows
+from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model, grouped, rows
 from flexclear.pipeline.structure.fe.solid import elasticity
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, from_stress_points, sampled
@@ -62,13 +62,14 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
     names += [f"{frame.name} {direction}" for frame in model.interfaces for direction in DIRECTIONS]
     names += [f"acceleration {k}" for k in AXES] + [f"acceleration {k} per {x}" for k in AXES for x in AXES]
     names += [f"acceleration of mode {k + 1}" for k in range(len(omega))]
+    entries, gauge = grouped(places.values())
     return {
         "stress_field": (("node", "tensor", "field"), at_nodes(solid, shown, fields)),
         "field": (("field",), names),
         "node_doubtful": (("node",), doubtful[shown].astype(np.int8)),
         "gauge": (("gauge",), list(places)),
-        "gauge_node": (("gauge_entry",), np.concatenate([np.zeros(0, dtype=np.int64), *places.values()])),
-        "gauge_index": (("gauge_entry",), np.repeat(np.arange(len(places)), [len(n) for n in places.values()])),
+        "gauge_node": (("gauge_entry",), entries),
+        "gauge_index": (("gauge_entry",), gauge),
     }
 
 

@@ -14,7 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexclear.pipeline.core.numerics.rotations import skew
-from flexclear.pipeline.structure.fe.slices import Slices, carried
+from flexclear.pipeline.structure.fe.model import node_motion
+from flexclear.pipeline.structure.fe.slices import Slices, at_centres, spread
 
 #: entries that differ by less than this fraction of the mass (times a length, where they do) are the same
 ALIKE = 1e-9
@@ -41,14 +42,8 @@ def nodes(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions: n
     size = np.array([1.0] * 3 + [np.ptp(positions, axis=0).max()] * 3)
     if np.any(np.abs(made - blocks) > ALIKE * mass[:, None, None] * np.outer(size, size)):
         return None
-    spread = 0.5 * np.trace(J, axis1=1, axis2=2)[:, None, None] * np.eye(3) - J
-    unknown = np.arange(len(node))
-    picks = []
-    for k in range(6):
-        own = component == k
-        ones = np.ones(np.count_nonzero(own))
-        picks.append(sp.csr_array((ones, (index[own], unknown[own])), shape=(len(first), len(node))))
-    return Slices(mass, positions[first] + c, spread, *carried(picks, c))
+    motion = at_centres(node_motion(index, component, len(first)), c)
+    return Slices(mass, positions[first] + c, spread(J), motion)
 
 
 def _blocks(M: sp.csr_array, index: np.ndarray, component: np.ndarray, count: int) -> np.ndarray | None:

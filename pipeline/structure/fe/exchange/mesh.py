@@ -13,8 +13,8 @@ from flexclear.pipeline.core.artifacts.schema import MATRICES, conform
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
-from flexclear.pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
-from flexclear.pipeline.structure.fe.model import symmetric
+from flexclear.pipeline.structure.fe.model import grouped, symmetric
+from flexclear.pipeline.structure.fe.recipe import Matrices, MatricesRecipe
 from flexclear.pipeline.structure.fe.vtu import vtu
 
 #: length [m], mass [kg] and time [s] of each consistent system
@@ -24,10 +24,7 @@ SYMMETRIC = 1e-9
 
 
 def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
-    """The dataset (schema MATRICES); InputError for files that do not fit together.
-
-    folder: what the recipe's files are relative to.  where: name of the recipe in messages.
-    """
+    """The dataset (schema MATRICES); InputError for files that do not fit together."""
     where = f"{path} [shape]"
     contents = _read(recipe.shape, folder, where)
     stiffness, mass, position = _in_si(contents, recipe.shape.units, where)
@@ -85,30 +82,31 @@ def _symmetric(matrix: sp.csr_array, name: str, where: str) -> sp.csr_array:
 
 
 def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: str) -> dict[str, Any]:
-    nodes, frames, origins, rotations = [], [], [], []
-    for k, (name, frame) in enumerate(recipe.frames.items()):
-        chosen = frame.nodes or (frame.node,)
-        where = f"{path} [frames.{name}]"
-        missing = [node for node in chosen if not np.any(table.node == node)]
-        if missing:
-            raise InputError(where, f"there is no node {missing[0]}", "use numbers from the table of unknowns")
-        if frame.node is not None:
-            own = set(table.component[table.node == frame.node].tolist())
-            if not own >= set(range(6)):
-                lacks = ", ".join(COMPONENTS[c] for c in sorted(set(range(6)) - own))
-                raise InputError(where, f"node {frame.node} has no {lacks}", "tie the frame to the mean of `nodes`")
-        elif len(chosen) < 3:
+    tied, origins = [], []
+    for name, frame in recipe.frames.items():
+        chosen, where = frame.nodes or (frame.node,), f"{path} [frames.{name}]"
+        needed, remedy = (6, "tie the frame to the mean of `nodes`") if frame.node is not None else (3, "name others")
+        for node in chosen:
+            own = np.bincount(table.component[table.node == node], minlength=6)
+            if not own.any():
+                raise InputError(where, f"there is no node {node}", "use numbers from the table of unknowns")
+            if not own[:needed].all():
+                lacks = ", ".join(COMPONENTS[c] for c in np.flatnonzero(own[:needed] == 0))
+                raise InputError(where, f"node {node} has no {lacks}", remedy)
+            if own[:needed].max() > 1:
+                twice = COMPONENTS[int(np.argmax(own[:needed]))]
+                raise InputError(where, f"node {node} has {own[:needed].max()} unknowns {twice}", "write each unknown once")
+        if needed == 3 and len(chosen) < 3:
             raise InputError(where, f"{len(chosen)} nodes cannot carry a frame's rotation", "name at least three")
-        nodes += list(chosen)
-        frames += [k] * len(chosen)
+        tied.append(np.array(chosen))
         origins.append(np.mean([position[table.node == node][0] for node in chosen], axis=0))
-        rotations.append(frame.orientation())
+    nodes, frames = grouped(tied)
     return {
         "frame": (("frame",), list(recipe.frames)),
         "frame_position": (("frame", "axis"), np.array(origins)),
-        "frame_rotation": (("frame", "axis", "axis2"), np.array(rotations)),
-        "tie_node": (("tie",), np.array(nodes)),
-        "tie_frame": (("tie",), np.array(frames)),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array([f.orientation() for f in recipe.frames.values()])),
+        "tie_node": (("tie",), nodes),
+        "tie_frame": (("tie",), frames),
     }
 
 

@@ -13,7 +13,15 @@ import xarray as xr
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.exchange import lumped
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS
-from flexclear.pipeline.structure.fe.model import Drawn, Integrals, Interface, Model, rigid_motions
+from flexclear.pipeline.structure.fe.model import (
+    Drawn,
+    Integrals,
+    Model,
+    interfaces,
+    node_motion,
+    rigid_motions,
+    selection,
+)
 from flexclear.pipeline.structure.fe.slices import integrate
 from flexclear.pipeline.structure.fe.solid import ties
 from flexclear.pipeline.structure.fe.solid.model import families, integrals
@@ -33,15 +41,15 @@ def assemble(mesh: xr.Dataset) -> Model:
     K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
     rigid = rigid_motions(positions, component, positions.mean(axis=0))
     _check(K, M, rigid, positions)
-    interfaces = _interfaces(mesh, component)
+    frames = interfaces(mesh, partial(_motion, mesh, component))
     names = mesh.attrs["interfaces"].split()
     return Model(
         stiffness=K,
         mass=M,
         rigid=rigid,
         position=positions,
-        interfaces=interfaces,
-        ends=tuple(frame for name in names[:2] for frame in interfaces if frame.name == name),
+        interfaces=frames,
+        ends=tuple(frame for name in names[:2] for frame in frames if frame.name == name),
         integrate=_integrate(mesh, M, component),
         families=families(positions, component),
         drawn=_drawn(mesh, component),
@@ -126,41 +134,21 @@ def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
     )
 
 
-def _interfaces(mesh: xr.Dataset, component: np.ndarray) -> tuple[Interface, ...]:
-    n, node, positions = mesh.sizes["unknown"], mesh["unknown_node"].values, mesh["unknown_position"].values
-    interfaces = []
-    for k, name in enumerate(mesh["frame"].values):
-        tied = mesh["tie_node"].values[mesh["tie_frame"].values == k]
-        rows = np.array([[_unknown(node, component, t, c, str(name)) for c in range(3)] for t in tied])
-        if len(tied) == 1:
-            turns = [_unknown(node, component, tied[0], c, str(name)) for c in range(3, 6)]
-            motion = sp.csr_array((np.ones(6), (np.arange(6), [*rows[0], *turns])), shape=(6, n))
-        else:
-            x = positions[rows[:, 0]]
-            average = ties.mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x))
-            pick = sp.csr_array((np.ones(rows.size), (np.arange(rows.size), rows.ravel())), shape=(rows.size, n))
-            motion = sp.csr_array(average @ pick)
-        position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
-        interfaces.append(Interface(str(name), position, rotation, motion))
-    return tuple(interfaces)
-
-
-def _unknown(node: np.ndarray, component: np.ndarray, number: int, requested: int, frame: str) -> int:
-    indices = np.flatnonzero((node == number) & (component == requested))
-    if len(indices) != 1:
-        raise InputError(
-            f"mesh recipe [frames.{frame}]", f"node {number} has {len(indices)} unknowns {COMPONENTS[requested]}"
-        )
-    return int(indices[0])
+def _motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_array:
+    """Motion of frame k: that of its node, or the mean one of its nodes."""
+    tied, node = mesh["tie_node"].values[mesh["tie_frame"].values == k], mesh["unknown_node"].values
+    count = 6 if len(tied) == 1 else 3
+    rows = np.array([[np.flatnonzero((node == t) & (component == c))[0] for c in range(count)] for t in tied])
+    pick = selection(rows.ravel(), len(component))
+    if len(tied) == 1:
+        return pick
+    x = mesh["unknown_position"].values[rows[:, 0]]
+    return sp.csr_array(ties.mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x)) @ pick)
 
 
 def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
     """Nodes as points; a component that a node does not have is drawn at rest."""
     numbers, first, index = np.unique(mesh["unknown_node"].values, return_index=True, return_inverse=True)
-    n, count = mesh.sizes["unknown"], len(numbers)
-    maps = []
-    for start in (0, 3):
-        own = np.flatnonzero((component >= start) & (component < start + 3))
-        rows = 3 * index.ravel()[own] + component[own] - start
-        maps.append(sp.csr_array((np.ones(own.size), (rows, own)), shape=(3 * count, n)))
-    return Drawn(mesh["unknown_position"].values[first], np.arange(count)[:, None], np.zeros(count), maps[0], maps[1])
+    count, position = len(numbers), mesh["unknown_position"].values[first]
+    motion = node_motion(index.ravel(), component, count)
+    return Drawn(position, np.arange(count)[:, None], np.zeros(count), motion)

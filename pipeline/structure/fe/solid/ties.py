@@ -95,11 +95,6 @@ def check_rank(x: np.ndarray, where: str) -> None:
         )
 
 
-def slaves(x: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Motion of nodes that follow a frame, shape (n, 3, 6)."""
-    return np.concatenate([np.broadcast_to(np.eye(3), (len(x), 3, 3)), -skew(x - position)], axis=2)
-
-
 def mean(x: np.ndarray, weight: np.ndarray, nodes: np.ndarray, position: np.ndarray, size: int) -> sp.csr_array:
     """Motion of a frame that follows nodes, as functionals of all nodes' displacements, shape (6, 3 size)."""
     w = weight / weight.sum()
