@@ -133,9 +133,8 @@ def paper_markdown(content: Content) -> str:
         "# The paper, reproduced\n",
         f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
         "commands next to it.\n",
-        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear "
-        "report` draws every figure and table "
-        "into `results/figures` and `results/tables`.\n",
+        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear report` "
+        "draws every figure and table into `results/figures` and `results/tables`.\n",
         "## Figures and tables\n",
         _index(),
         "## Tables\n",

@@ -97,22 +97,20 @@ def _about_section(agree: list[bool], square: xr.Dataset, circle: xr.Dataset) ->
     worst = int(np.argmax(change))
     verdict = "all" if all(agree) else f"{sum(agree)} of {count}"
     return (
-        "The column 'square inertia' takes the section's second moments in the mass matrix from the square of "
-        "equal area and those in "
-        f"the stiffness from the circle; so {verdict} of the paper's elastic values come out as printed. The "
-        "rod is round: 'circle' is the correct column, "
-        f"up to {100 * change[worst]:.1f} % away (mode {worst + 1} of those listed, {circle.kind.values[worst]})."
+        "The column 'square inertia' takes the section's second moments in the mass matrix from the square of equal "
+        f"area and those in the stiffness from the circle; so {verdict} of the paper's elastic values come out as "
+        f"printed. The rod is round: 'circle' is the correct column, up to {100 * change[worst]:.1f} % away (mode "
+        f"{worst + 1} of those listed, {circle.kind.values[worst]})."
     )
 
 
 def _about_ansys() -> str:
     ratio, bound = published.TABLE5_ANSYS[5] / published.TABLE5_ANSYS[2], euler_bernoulli_ratio()
     return (
-        "The ANSYS columns belong to no converged uniform rod: its torsional frequency is the same for "
-        "clamped and for free ends, yet they give "
-        f"{published.TABLE4_ANSYS[4]:.1f} and {published.TABLE5_ANSYS[4]:.1f} Hz; and the third free bending frequency "
-        "over the second is "
-        f"{ratio:.4f}, above the {bound:.4f} of an Euler-Bernoulli beam, which rotary inertia and shear can only lower."
+        "The ANSYS columns belong to no converged uniform rod: its torsional frequency is the same for clamped and "
+        f"for free ends, yet they give {published.TABLE4_ANSYS[4]:.1f} and {published.TABLE5_ANSYS[4]:.1f} Hz; and the "
+        f"third free bending frequency over the second is {ratio:.4f}, above the {bound:.4f} of an Euler-Bernoulli "
+        "beam, which rotary inertia and shear can only lower."
     )
 
 

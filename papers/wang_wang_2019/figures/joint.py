@@ -33,8 +33,7 @@ def _kinematics(data: Data) -> Drawing:
         figure,
         f"Figure 5: a ball of {ball:g} mm moves by {clearance:g} mm in its socket and enters the wall by "
         f"{deepest:.1f} µm at most",
-        f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), "
-        "B: of the ball (b1), "
+        f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), B: of the ball (b1), "
         f"p_SB: eccentricity (d); largest force of the {CSJ.label} run {peak:.0f} N",
     )
     return figure

@@ -100,15 +100,14 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
         "dataset) costs the same whatever the way, is in a column of its own and is in no ratio. Medians of warm "
         "repeats in one process, with other programs running, ± half their range; a ratio's "
         "± is half of what the ranges of both times leave it.",
-        f"Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
+        "Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
         f"{facts['equal_error']:g} at most over the first {100 * facts['share']:.0f} % of the stroke, where all models "
         "can be predicted point by point (the smooth ideal stroke has far less at any tolerance); one whose energy "
-        "ledger does not close at it, at the next decade at which it does. "
-        f"Paper's step: a predictor-corrector at Table 6's step of {facts['step']:g} s, contacts noticed at "
-        f"the ends of steps, whatever the error. Paper's tolerance: {facts['damped']}, a damped implicit method of "
-        f"variable step, at Table 6's integration tolerance of {1e3 * facts['tolerance']:g} mm as a fraction of the "
-        "drives' stroke "
-        f"(rtol {float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
+        "ledger does not close at it, at the next decade at which it does. Paper's step: a predictor-corrector at "
+        f"Table 6's step of {facts['step']:g} s, contacts noticed at the ends of steps, whatever the error. Paper's "
+        f"tolerance: {facts['damped']}, a damped implicit method of variable step, at Table 6's integration tolerance "
+        f"of {1e3 * facts['tolerance']:g} mm as a fraction of the drives' stroke (rtol "
+        f"{float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
         f"{float(timing.tolerance_energy_error.max()):.1g} J).",
         *(_verdict(timing, way) for way in WAYS),
         _which(timing),
@@ -153,9 +152,8 @@ def _verdict(timing: xr.Dataset, way: str) -> str:
         return f"{WAYS[way].capitalize()}: no model of the paper's table besides the ideal one could be timed."
     least, most = min(deviations, key=deviations.__getitem__), max(deviations, key=deviations.__getitem__)
     return (
-        f"{WAYS[way].capitalize()}: our ratios are "
-        f"{rounded(deviations[least], 2)} ({least}) to {rounded(deviations[most], 2)} ({most}) "
-        "times the paper's."
+        f"{WAYS[way].capitalize()}: our ratios are {rounded(deviations[least], 2)} ({least}) to "
+        f"{rounded(deviations[most], 2)} ({most}) times the paper's."
     )
 
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from flexclear.papers.wang_wang_2019 import deviations
 from flexclear.papers.wang_wang_2019 import models as paper
-from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference, mode_set
+from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
 from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.figures.errors import NOISE
 from flexclear.papers.wang_wang_2019.figures.table10 import ratios
+from flexclear.papers.wang_wang_2019.models import mode_set
 from flexclear.papers.wang_wang_2019.published import TABLE10
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.post.plotting.table import Table
@@ -287,8 +288,7 @@ def _one_stroke(data: Data) -> Outcome:
     ]
     return "cannot be determined from one stroke", (
         f"neighbours of the CSJ run stay together to {1e3 * horizon:.0f} of {1e3 * end:.0f} ms; of the undamped "
-        "FAR-CSJ "
-        f"runs they part after {min(parts):.0f} to {max(parts):.0f} ms. Sections of a repeated stroke: chaos.md"
+        f"FAR-CSJ runs they part after {min(parts):.0f} to {max(parts):.0f} ms. Sections of a repeated stroke: chaos.md"
     )
 
 

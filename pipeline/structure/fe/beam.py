@@ -25,11 +25,10 @@ import xarray as xr
 from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
 from flexclear.pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
-from flexclear.pipeline.structure.fe.model import carried, rigid_motions, selection, symmetric
+from flexclear.pipeline.structure.fe.model import DOFS, carried, rigid_motions, selection, symmetric
 from flexclear.pipeline.structure.fe.section import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
-DOFS = ("ux", "uy", "uz", "rx", "ry", "rz")
 N_DOFS = len(DOFS)
 #: degree of the extension and of the twist in a cell by the recipe's word
 DEGREE = {"linear": 1, "quadratic": 2}
@@ -155,20 +154,20 @@ def _form(kinematics: Kinematics, density: Any) -> BilinearForm:
 
 
 def _strain_energy(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
-    a, b = kinematics.strains(trial), kinematics.strains(test)
+    a, b = kinematics.strains(*trial), kinematics.strains(*test)
     coupled = a["bend_v"] * b["bend_w"] + a["bend_w"] * b["bend_v"]
     return sum(p[name] * a[name] * b[name] for name in a) + p["bend_both"] * coupled
 
 
 def _kinetic_energy(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
-    (s, (t, v, w)), (ds, (dt, dv, dw)) = kinematics.section(trial), kinematics.section(test)
+    (s, (t, v, w)), (ds, (dt, dv, dw)) = kinematics.section(*trial), kinematics.section(*test)
     translation = p["line"] * sum(x * dx for x, dx in zip(s, ds, strict=True))
     slopes = p["slope_v"] * v * dv + p["slope_w"] * w * dw + p["slope_both"] * (v * dw + w * dv)
     return translation + p["twist"] * t * dt + slopes
 
 
 def _work_of_tension(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
-    (_, v, w), (_, dv, dw) = kinematics.section(trial)[0], kinematics.section(test)[0]
+    (_, v, w), (_, dv, dw) = kinematics.section(*trial)[0], kinematics.section(*test)[0]
     return p["force"] * (v.grad[0] * dv.grad[0] + w.grad[0] * dw.grad[0])
 
 

@@ -13,6 +13,8 @@ from flexclear.pipeline.core.numerics.rotations import skew
 
 #: directions of a frame's motion, in the order of every six
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+#: the same of a node's unknowns
+DOFS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)

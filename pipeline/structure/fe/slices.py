@@ -105,7 +105,7 @@ def _motion(beam: Beam) -> sp.csr_array:
     first = 6 * np.arange(basis.dx.size).reshape(shape)
     entries = []
     for i, column in enumerate(basis.element_dofs):
-        s, (t, v, w) = beam.kinematics.section(basis.basis[i])
+        s, (t, v, w) = beam.kinematics.section(*basis.basis[i])
         for k, values in enumerate((*s, t, -1.0 * w, v)):
             of_function = (np.asarray(values), first + k, column[:, None])
             entries.append([np.broadcast_to(part, shape).ravel() for part in of_function])

@@ -22,22 +22,18 @@ FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4)
 def assemble(mesh: xr.Dataset) -> Model:
     """The model of a beam mesh (schema MESH)."""
     beam = beams.assemble(mesh)
+    start = beam.node_position[0] - beam.along[0] * beam.axes[:, 0]
     return Model(
         stiffness=beam.stiffness,
         mass=beam.mass,
         rigid=beams.rigid_vectors(beam, beam.node_position.mean(axis=0)),
-        position=_place(beam),
+        position=start + np.outer(beam.along, beam.axes[:, 0]),
         interfaces=interfaces(mesh, lambda k: _node(beam, mesh["frame_node"].values[k])),
         ends=_ends(mesh, beam),
         integrate=lambda vectors: integrate(slices(mesh, beam), vectors),
         families=_families(beam),
         drawn=_drawn(mesh, beam),
     )
-
-
-def _place(beam: Beam) -> np.ndarray:
-    start = beam.node_position[0] - beam.along[0] * beam.axes[:, 0]
-    return start + np.outer(beam.along, beam.axes[:, 0])
 
 
 def _ends(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:

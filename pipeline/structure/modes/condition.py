@@ -87,8 +87,5 @@ def check(model: Model, condition: Condition) -> None:
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / max(lengths.max(), 1e-300)] * 3])
     left = 6 - np.linalg.matrix_rank(np.asarray(held @ model.rigid) * scale, tol=1e-9)
     if left:
-        raise InputError(
-            WHERE,
-            f"the held motions leave {left} rigid-body motions of the body free",
-            'hold six motions that fix it, or take mean axes: reference = "mean-axis"',
-        )
+        problem = f"the held motions leave {left} rigid-body motions of the body free"
+        raise InputError(WHERE, problem, 'hold six motions that fix it, or take mean axes: reference = "mean-axis"')

@@ -53,11 +53,8 @@ def residual_flexibility(model: Model, given: Given) -> Condition:
 def mean_axis(model: Model, given: Given) -> Condition:
     """The shapes of the condition that `given.of` names, linear and angular momentum taken out."""
     if given.of is None or given.of == "mean-axis":
-        raise InputError(
-            "modes.of",
-            "mean-axis changes the shapes of another condition, and none is named",
-            'name it, as of = "craig-bampton"',
-        )
+        problem = "mean-axis changes the shapes of another condition, and none is named"
+        raise InputError("modes.of", problem, 'name it, as of = "craig-bampton"')
     based: Condition = lookup(FAMILY, given.of, where="modes.of")(model, given)
     note = f"shapes of {given.of}; their linear and angular momentum was taken out"
     return replace(based, mean_axes=True, note=note)
