@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019 import figures
+from flexclear.papers.wang_wang_2019 import DOCUMENTS, figures
 from flexclear.papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.pages import Part, downloads, figures_of, media, page, prose
@@ -23,28 +23,6 @@ from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, from_
 if TYPE_CHECKING:
     from flexclear.pipeline.core.system.progress import Progress
 
-#: what the page shows of the project's own pages: heading, file, sections, endings of the pictures
-DOCUMENTS: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...]]] = {
-    "accuracy": (
-        "Accuracy against time",
-        "accuracy.md",
-        ("What to choose", "sps4/csj", "sps4/far_csj_cb"),
-        ("work_precision.png",),
-    ),
-    "stability": (
-        "Stability: hard cases, and what became of each",
-        "stability.md",
-        ("", "One parameter at a time"),
-        ("sweeps.png",),
-    ),
-    "chaos": ("Periodic or chaotic", "chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
-    "conditions": (
-        "Reference conditions of the modes",
-        "reference-conditions.md",
-        ("In short", "What holds of the paper's statements"),
-        (),
-    ),
-}
 #: of a run's attributes, those that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
 
@@ -93,7 +71,7 @@ def collect(
 
 
 def _documents(docs: Path) -> dict[str, str]:
-    return {key: section(docs / file, heads, endings) for key, (_, file, heads, endings) in DOCUMENTS.items()}
+    return {name: section(docs / f"{name}.md", heads, endings) for name, (_, heads, endings) in DOCUMENTS.items()}
 
 
 def _variants(folder: Path) -> list[tuple[str, str]]:

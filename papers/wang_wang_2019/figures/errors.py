@@ -14,7 +14,7 @@ from flexclear.papers.wang_wang_2019.deviations import (
     max_deviation,
     velocity_at_events,
 )
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
 from flexclear.papers.wang_wang_2019.published import TABLE7, TABLE8, TABLE9, MaximumError
 from flexclear.pipeline.post.plotting.table import Table
 from flexclear.pipeline.post.single_run.series import parameters
@@ -26,7 +26,6 @@ ROWS: tuple[tuple[str, str, float, str | None], ...] = (
     ("displacement z0 (mm)", "displacement", 1e3, "displacement"),
     ("velocity z0 (mm/s)", "velocity", 1e3, "velocity"),
 )
-ABSENT = "–"
 #: deviations below this fraction of the printed ones are called zero: the paper prints four digits
 NOTHING = 1e-4
 #: values below this are rounding of the runs and differ between machines (positions of 0.1 m to 16 digits, in mm)

@@ -10,7 +10,7 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from flexclear.papers.wang_wang_2019 import published
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
 from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
 from flexclear.papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
 from flexclear.pipeline.post.plotting.table import Table
@@ -28,7 +28,6 @@ COLUMNS = (
     "exact Rayleigh beam (Hz)",
     "exact Timoshenko beam (Hz)",
 )
-ABSENT = "–"
 LEAST = 1e-3  # the last digit printed [Hz]
 MEANING = "± of ours: how much the frequency changes on a mesh of four times as many elements."
 
@@ -154,7 +153,6 @@ BODIES = {
     "ball": "ball_A1",
     "moving platform": "platform",
 }
-ABSENT = "–"
 
 
 def _parts(data: Data) -> Table:
@@ -176,20 +174,23 @@ def _parts(data: Data) -> Table:
 def _part(member: str, bodies: dict[str, Any]) -> tuple[str, ...]:
     printed, name = TABLE1[member], BODIES.get(member)
     ours = bodies[name] if name else None
-    mass = f"{ours['mass']:.2f}" if ours else ABSENT
     return (
         member,
         name or ABSENT,
-        f"{printed.mass:.2f}" if printed.mass is not None else ABSENT,
-        mass,
-        f"{printed.length:g}" if printed.length is not None else ABSENT,
-        _moments(printed.inertia),
-        _moments(1e6 * np.diag(np.array(ours["inertia"]))) if ours else ABSENT,
+        _said(printed.mass, "{:.2f}"),
+        _said(ours and ours["mass"], "{:.2f}"),
+        _said(printed.length, "{:g}"),
+        _said(printed.inertia, MOMENTS),
+        _said(ours and 1e6 * np.diag(np.array(ours["inertia"])), MOMENTS),
     )
 
 
-def _moments(values: Any) -> str:
-    return ABSENT if values is None else ", ".join(f"{v:.3f}" for v in values)
+#: three of them
+MOMENTS = "{:.3f}, {:.3f}, {:.3f}"
+
+
+def _said(values: Any, form: str) -> str:
+    return ABSENT if values is None else form.format(*np.atleast_1d(values))
 
 
 MATERIAL = {
@@ -224,25 +225,21 @@ def _material(data: Data) -> Table:
 
 def _joint(data: Data) -> Table:
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
-    socket, ball = joint["socket_material"], joint["ball_material"]
+    ball, young = joint["ball_radius"], f"{1e-9 * TABLE3['youngs_modulus']:g}"
     rows = (
-        (
-            "socket radius (mm)",
-            f"{1e3 * TABLE3['socket_radius']:g}",
-            f"{1e3 * (joint['ball_radius'] + joint['clearance']):g}",
-        ),
-        ("ball radius (mm)", f"{1e3 * TABLE3['ball_radius']:g}", f"{1e3 * joint['ball_radius']:g}"),
+        ("socket radius (mm)", f"{1e3 * TABLE3['socket_radius']:g}", f"{1e3 * (ball + joint['clearance']):g}"),
+        ("ball radius (mm)", f"{1e3 * TABLE3['ball_radius']:g}", f"{1e3 * ball:g}"),
         ("clearance (mm)", "0.5, as follows", f"{1e3 * joint['clearance']:g}"),
-        ("Poisson's ratio, socket and ball", f"{TABLE3['poisson']:g}", f"{socket['poisson']:g}, {ball['poisson']:g}"),
-        (
-            "Young's modulus (GPa), socket and ball",
-            f"{1e-9 * TABLE3['youngs_modulus']:g}",
-            f"{1e-9 * socket['youngs_modulus']:g}, {1e-9 * ball['youngs_modulus']:g}",
-        ),
+        ("Poisson's ratio, socket and ball", f"{TABLE3['poisson']:g}", _both(joint, "poisson", 1.0)),
+        ("Young's modulus (GPa), socket and ball", young, _both(joint, "youngs_modulus", 1e-9)),
         ("density (kg/m³)", f"{TABLE3['density']:g}", "not used: masses are those of Table 1"),
         ("coefficient of restitution", "not printed", f"{joint['normal']['restitution']:g}, assumed"),
     )
     return Table("Table 3: the joint with clearance", HEADS, rows, (_stiffness(joint),))
+
+
+def _both(joint: dict, name: str, factor: float) -> str:
+    return ", ".join(f"{factor * joint[material][name]:g}" for material in ("socket_material", "ball_material"))
 
 
 def _stiffness(joint: dict) -> str:

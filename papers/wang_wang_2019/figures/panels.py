@@ -260,8 +260,7 @@ def _of_both(ideal: paper.Motion, others: Sequence[paper.Motion]) -> tuple[str, 
 def _tilt(data: Data) -> Drawing:
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(1, 1, (6.4, 3.5))
-    axes[0, 0].plot(ideal.time, ideal.angle, color=paper.IDEAL.color, lw=1.8)
-    axes[0, 0].set(xlabel="time (s)", ylabel="angle about y0 (rad)", xlim=(ideal.time[0], ideal.time[-1]))
+    _alone(axes[0, 0], paper.ANGLE, ideal, 1.8)
     _mark_extreme(axes[0, 0], ideal.time, ideal.angle)
     tilt = float(np.degrees(np.abs(ideal.angle).max()))
     style.heading(
@@ -272,20 +271,19 @@ def _tilt(data: Data) -> Drawing:
     return figure
 
 
+def _alone(axes: style.Axes, quantity: Quantity, motion: paper.Motion, width: float) -> None:
+    axes.plot(motion.time, quantity.values(motion), color=motion.model.color, lw=width)
+    axes.set(xlabel="time (s)", ylabel=quantity.label, xlim=(motion.time[0], motion.time[-1]))
+
+
 def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None:
     """A dot and the value at the largest tilt."""
     i = int(np.argmax(np.abs(angle)))
     axes.plot(time[i], angle[i], "o", color=paper.IDEAL.color, ms=5)
     text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s".replace("-", "−")
-    below = angle[i] > 0.0
-    axes.annotate(
-        text,
-        (time[i], angle[i]),
-        xytext=(0, -110 if below else 110),
-        textcoords="offset points",
-        ha="center",
-        color=style.SOFT,
-    )
+    shift = (0, -110 if angle[i] > 0.0 else 110)
+    look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "color": style.SOFT}
+    axes.annotate(text, (time[i], angle[i]), xytext=shift, **look)
 
 
 def _response(data: Data) -> Drawing:
@@ -293,8 +291,7 @@ def _response(data: Data) -> Drawing:
     figure, axes = style.grid(2, 2, (9.4, 5.8))
     shown = QUANTITIES[1:]
     for letter, panel, quantity in zip("abcd", axes.flat, shown, strict=True):
-        panel.plot(ideal.time, quantity.values(ideal), color=paper.IDEAL.color, lw=1.6)
-        panel.set(xlabel="time (s)", ylabel=quantity.label, xlim=(ideal.time[0], ideal.time[-1]))
+        _alone(panel, quantity, ideal, 1.6)
         panel.set_title(f"({letter}) {quantity.title}")
     style.heading(
         figure,

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
 from flexclear.papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE6, TABLE10
 from flexclear.pipeline.post.overview.curves import rounded
 from flexclear.pipeline.post.plotting.table import Table
 
 REFERENCE = "sps4/ideal"
-ABSENT = "–"
 #: ways as the timing calls them, and in heads
 WAYS = {"equal": "equal error", "step": "paper's step", "tolerance": "paper's tolerance"}
 #: a ratio within this factor of the paper's is the same in magnitude
@@ -74,23 +73,23 @@ def made(repeats: xr.DataArray) -> np.ndarray:
 
 def _ratio(timing: xr.Dataset, way: str, name: str) -> str:
     """Ratio of the medians, +- half the range that the repeats of both leave it."""
-    own, base = (made(timing[f"{way}_integration_seconds"].sel(scene=scene)) for scene in (name, REFERENCE))
+    own, base = _repeats(timing, way, name), _repeats(timing, way, REFERENCE)
     if not own.size or not base.size:
         return ABSENT
-    ratio = np.median(own) / np.median(base)
     half = 0.0 if name == REFERENCE else 0.5 * (own.max() / base.min() - own.min() / base.max())
-    return f"{ratio:.3g} ± {rounded(half, 1)}"
+    return f"{np.median(own) / np.median(base):.3g} ± {rounded(half, 1)}"
+
+
+def _repeats(timing: xr.Dataset, way: str, name: str) -> np.ndarray:
+    """Times of the integration [s]; none of a scene that was not timed."""
+    return made(timing[f"{way}_integration_seconds"].sel(scene=timing.scene == name))
 
 
 def ratios(timing: xr.Dataset, way: str) -> dict[str, float]:
     """CPU time of the integration over the ideal model's, of the models that the paper's table has."""
-    base = made(timing[f"{way}_integration_seconds"].sel(scene=REFERENCE))
-    by_scene = {}
-    for scene in TABLE10:
-        own = made(timing[f"{way}_integration_seconds"].sel(scene=scene)) if scene in timing.scene.values else base[:0]
-        if scene != REFERENCE and own.size and base.size:
-            by_scene[scene] = float(np.median(own) / np.median(base))
-    return by_scene
+    base = _repeats(timing, way, REFERENCE)
+    times = {scene: _repeats(timing, way, scene) for scene in TABLE10 if scene != REFERENCE and base.size}
+    return {scene: float(np.median(own) / np.median(base)) for scene, own in times.items() if own.size}
 
 
 def _notes(timing: xr.Dataset) -> tuple[str, ...]:

@@ -152,7 +152,7 @@ class BeamRecipe(BodyRecipe):
         return self
 
 
-class StraightBeamRecipe(BeamRecipe, Piece):
+class StraightBeamRecipe(Piece, BeamRecipe):
     """A uniform or linearly tapered rod."""
 
     shape: StraightBeam

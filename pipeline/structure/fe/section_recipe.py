@@ -30,22 +30,17 @@ ShearCoefficient = Annotated[
 ]
 
 
-class KnownSection(Part):
-    """What sections have whose constants follow from lengths."""
-
-    shear_coefficient: ShearCoefficient | None = None
-    """kappa instead of Cowper's (1966)"""
-
-
-class CircleSection(KnownSection):
+class CircleSection(Part):
     """Full circle."""
 
     type: Literal["circle"]
     radius: Annotated[Length, Positive]
     """of the circle"""
+    shear_coefficient: ShearCoefficient | None = None
+    """kappa instead of Cowper's (1966)"""
 
 
-class TubeSection(KnownSection):
+class TubeSection(Part):
     """Circular tube; `inner_radius` is that of the hole."""
 
     type: Literal["tube"]
@@ -53,6 +48,8 @@ class TubeSection(KnownSection):
     """of the outer circle and of the hole"""
     inner_radius: Annotated[Length, Positive]
     """of the outer circle and of the hole"""
+    shear_coefficient: ShearCoefficient | None = None
+    """kappa instead of Cowper's (1966)"""
 
     @model_validator(mode="after")
     def _has_a_wall(self) -> TubeSection:
@@ -63,7 +60,7 @@ class TubeSection(KnownSection):
         return self
 
 
-class RectangleSection(KnownSection):
+class RectangleSection(Part):
     """Full rectangle, `width` along y and `height` along z of the rod."""
 
     type: Literal["rectangle"]
@@ -71,6 +68,8 @@ class RectangleSection(KnownSection):
     """along y and along z of the rod"""
     height: Annotated[Length, Positive]
     """along y and along z of the rod"""
+    shear_coefficient: ShearCoefficient | None = None
+    """kappa instead of Cowper's (1966)"""
 
 
 class GeneralSection(Part):

@@ -57,15 +57,8 @@ def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
         made = xr.Dataset(data)
     except ValueError as error:  # integrals in a file are of other sizes than its unknowns
         raise InputError(where, f"what the file holds does not fit together: {error}") from None
-    return conform(
-        made,
-        MATRICES,
-        title=recipe.title,
-        body_kind="matrices",
-        section="matrices",
-        inertia_section="matrices",
-        interfaces=" ".join(recipe.interfaces),
-    )
+    kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "matrices")
+    return conform(made, MATRICES, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
 
 
 def _read(shape: Matrices, folder: Path, where: str) -> Contents:

@@ -36,16 +36,8 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     for name in ("youngs_modulus", "poisson", "density"):
         data[name] = (("region",), np.array([getattr(material, name) for material in materials]))
     data |= _frames(recipe, geometry, path) | _regions(geometry)
-    return conform(
-        xr.Dataset(data),
-        SOLID,
-        title=recipe.title,
-        body_kind="solid",
-        element=geometry.element,
-        section="solid",
-        inertia_section="solid",
-        interfaces=" ".join(recipe.interfaces),
-    )
+    kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "solid") | {"element": geometry.element}
+    return conform(xr.Dataset(data), SOLID, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
 
 
 def _materials(recipe: SolidRecipe, geometry: Geometry, path: str) -> tuple[list[str], np.ndarray]:
