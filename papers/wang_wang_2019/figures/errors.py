@@ -45,20 +45,18 @@ def paper_column(head: str, values: MaximumError) -> Column:
 
 def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
     """The column of one run, +- what it changes when the run is made at a tighter tolerance."""
-    cells = []
-    for _, name, factor, _ in ROWS:
-        value, other = factor * getattr(deviation, name), factor * getattr(tighter, name)
-        cells.append(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}")
-    return head, *cells
+    pairs = zip(_values(deviation), _values(tighter), strict=True)
+    return head, *(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}" for value, other in pairs)
 
 
 def several(head: str, deviations: Sequence[Deviation]) -> Column:
     """Mean +- standard deviation over an ensemble's members."""
-    cells = []
-    for _, name, factor, _ in ROWS:
-        values = factor * np.array([getattr(deviation, name) for deviation in deviations])
-        cells.append(f"{number(values.mean())} ± {values.std(ddof=1):.1e}")
-    return head, *cells
+    by_row = np.array([_values(deviation) for deviation in deviations]).T
+    return head, *(f"{number(values.mean())} ± {values.std(ddof=1):.1e}" for values in by_row)
+
+
+def _values(deviation: Deviation) -> list[float]:
+    return [factor * getattr(deviation, name) for _, name, factor, _ in ROWS]
 
 
 def _table(title: str, columns: Sequence[Column], notes: Sequence[str]) -> Table:

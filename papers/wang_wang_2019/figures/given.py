@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import brentq
 
 from flexclear.papers.wang_wang_2019 import published
 from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
@@ -15,6 +14,7 @@ from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
 from flexclear.papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
 from flexclear.pipeline.post.plotting.table import Table
 from flexclear.pipeline.post.single_run.series import parameters
+from flexclear.pipeline.structure import closed_form
 
 COLUMNS = (
     "mode",
@@ -67,14 +67,9 @@ def _with_error(hertz: float, fine: xr.Dataset, i: int) -> str:
 
 
 def euler_bernoulli_ratio() -> float:
-    """Third over second frequency of a uniform Euler-Bernoulli beam with both ends alike (clamped or free).
-
-    Roots of cos x cosh x = 1; the frequencies go with the squares of the roots.
-    """
-    second, third = (
-        brentq(lambda x: np.cos(x) - 1.0 / np.cosh(x), c - 0.5, c + 0.5) for c in (2.5 * np.pi, 3.5 * np.pi)
-    )
-    return float((third / second) ** 2)
+    """Third over second frequency of a uniform Euler-Bernoulli beam with both ends alike (clamped or free)."""
+    _, second, third = closed_form.bending(closed_form.Span(1.0, 1.0, 1.0), "free-free", 3)
+    return float(third / second)
 
 
 def _rigid_row(number: int, modes: xr.Dataset, i: int) -> tuple[str, ...]:
