@@ -234,6 +234,13 @@ def test_causes_come_from_pairs_that_differ_in_one_thing():
     assert located == pytest.approx(1e-12 * 1e-3 / 0.5 / 0.6)  # share of the clearance, over speed, over the span
 
 
+def test_the_least_time_decides_and_evaluations_only_where_times_are_alike():
+    _, points, runs = study()
+    assert answer.cheapest(assemble(points, runs, [POSITION, TIMES]), 1e-3).name == "rk4, step 0.001 s"
+    runs["r0.001"] = run(1e-4, evaluations=50, seconds=(0.3, 0.3, 0.3))  # of dop853: 200 in 0.2 s
+    assert answer.cheapest(assemble(points, runs, [POSITION, TIMES]), 1e-3).name == "dop853, rtol 1e-06"
+
+
 def test_a_cause_that_changes_the_number_of_impacts_dominates():
     fractions = {"pin.impact_times": {"mesh": 1e-3, "beam theory": np.inf, "modal truncation": np.nan}}
     assert causes.dominant(fractions["pin.impact_times"]) == "beam theory"
@@ -265,7 +272,7 @@ def test_the_page_says_what_each_digit_costs():
     found, *_ = study()
     text = written(found, ("| a table |",), {"Error": "x/y.png"})
     assert "flexclear cost a/scene \\\n        --page docs/accuracy.md" in text
-    assert "0.001 takes rk4, step 0.001 s (50 evaluations)" in text
+    assert "0.001 takes rk4, step 0.001 s (0.2 s)" in text
     assert "1e-09 cannot be had" in text
     assert "![Error of a/scene](x/y.png)" in text
 

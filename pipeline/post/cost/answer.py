@@ -57,9 +57,7 @@ def _looser(study: xr.Dataset) -> str:
     """Whether another setting is as accurate for less."""
     _, error = _worst(study)
     same = cheapest(study, error) if np.isfinite(error) else None
-    if same is None or same.evaluations > CHEAPER * study.attrs["own_evaluations"]:
-        return ""
-    if same.seconds > CHEAPER * study.attrs["own_seconds"]:
+    if same is None or same.seconds > CHEAPER * study.attrs["own_seconds"]:
         return ""
     return f"{same.name} is as accurate for {same.seconds / study.attrs['own_seconds']:.2g} times the cost."
 
@@ -160,7 +158,7 @@ def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     """One paragraph: the cheapest way to each accuracy, what a digit costs, how far it holds, what limits the scene."""
     choices = {target: cheapest(study, target) for target in TARGETS}
     had = {target: choice for target, choice in choices.items() if choice is not None}
-    text = "; ".join(f"{target:g} takes {c.name} ({c.evaluations:.0f} evaluations)" for target, c in had.items())
+    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in had.items())
     said = [
         f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."
     ]
@@ -182,10 +180,9 @@ def _some(study: xr.Dataset, target: float) -> str:
 def _digits(had: Mapping[float, Choice]) -> str:
     loose, tight = had[max(had)], had[min(had)]
     digits = np.log10(max(had) / min(had))
-    if not digits > 0.0 or tight.evaluations <= loose.evaluations:
+    if not digits > 0.0 or tight.seconds <= loose.seconds:
         return ""
-    factor = (tight.evaluations / loose.evaluations) ** (1.0 / digits)
-    return f"Each further digit multiplies the evaluations by {factor:.2f}."
+    return f"Each further digit multiplies the time by {(tight.seconds / loose.seconds) ** (1.0 / digits):.2f}."
 
 
 def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
@@ -275,14 +272,21 @@ class Choice:
     worst: str
 
 
+#: times within this factor are alike: of a second run they differ by some per cent
+AS_FAST = 1.1
 #: where no run of a study can be compared
 NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
 
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
-    """The choice with the fewest evaluations whose largest error is at most `target`; None if there is none."""
+    """The choice with the least processor time whose largest error is at most `target`; None if there is none.
+
+    Of those whose times differ by no more than times of one run do (AS_FAST) the one with the fewest evaluations.
+    """
     good = [choice for choice in choices(study) if choice.error <= target]
-    return min(good, key=lambda choice: choice.evaluations, default=None)
+    least = min((choice.seconds for choice in good), default=np.nan)
+    fast = [choice for choice in good if not choice.seconds > AS_FAST * least]
+    return min(fast, key=lambda choice: choice.evaluations, default=None)
 
 
 def choices(study: xr.Dataset) -> list[Choice]:
