@@ -20,10 +20,10 @@ LEFT_BY_MESHES = 1e-3
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The rigid body (schema RIGID)."""
-    from flexclear.pipeline.structure.modes import rigid
+    from flexclear.pipeline.structure.modes import bundle
 
     progress(None, "mass and inertia")
-    return {"nc": rigid.build(inputs["mesh"])}
+    return {"nc": bundle.rigid(inputs["mesh"])}
 
 
 def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[str, Any]:

@@ -290,7 +290,7 @@ def _bodies(whole: Scene, seen: Findings, mesh_of: MeshOf) -> Iterator[tuple[str
 def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
     from flexclear.pipeline.structure.fe.recipe import parse
     from flexclear.pipeline.structure.kinds import kind
-    from flexclear.pipeline.structure.modes import rigid
+    from flexclear.pipeline.structure.modes import bundle
 
     table = meshing.params(path)["recipe"]
     parse(table, str(path))
@@ -305,7 +305,7 @@ def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
     if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
         return
     model = kind.of_mesh(mesh).assemble(mesh)
-    yield Body(model, rigid.of_model(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
+    yield Body(model, bundle.rigid_of(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
 
 
 def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:

@@ -141,10 +141,10 @@ def _page(scene: Scene, seen: StartView) -> bytes:
 def _body(recipe: Path) -> xr.Dataset:
     """What is rigid of a mesh, and what is drawn of it."""
     from flexclear.pipeline.structure.kinds import kind
-    from flexclear.pipeline.structure.modes import rigid
+    from flexclear.pipeline.structure.modes import bundle
 
     table: dict[str, Any] = meshing.params(recipe)["recipe"]
-    return rigid.drawn(kind.build(table, recipe.parent))
+    return bundle.drawn(kind.build(table, recipe.parent))
 
 
 def _unplaced(scene: Scene) -> list[str]:
