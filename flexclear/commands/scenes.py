@@ -61,6 +61,13 @@ def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
     return "".join(media(name, made.read(name), *text) for name, text in captions.items() if made and name in files)
 
 
+def tables(made: Made, *names: str) -> str:
+    """Tables of an artifact, which it has as Markdown, as HTML."""
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+
+    return "".join(as_html(from_markdown(made.text(name))) for name in names)
+
+
 def joined(names: Sequence[str]) -> str:
     """The name of the folder of what is made of several scenes."""
     return "+".join(name.replace("/", "_").replace(" ", "_") for name in names)

@@ -10,36 +10,24 @@ from typing import TYPE_CHECKING
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import check_target, graphs, scene_arguments
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-#: options and the keys of `[sections]` that they replace
-COUNTS = {"periods": "recorded periods", "transient": "periods before them that are not"}
-
-
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     scene_arguments(parser, "json")
-    for name, text in COUNTS.items():
-        parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
-    parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the verdict on each scene."""
-    asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
         check_target(options.page, "--page")
     workplace = open_workplace(options)
-    changes = {f"sections.{key}": value for key, value in asked.items()}
-    scenes = [edited(graph.scene, changes) if asked else graph.scene for graph in graphs(options.scenes, options.set)]
-    tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
+    tasks = {graph.scene.name: graph for graph in graphs(options.scenes, options.set)}
     judged = dict(zip(tasks, workplace.made(*(graph.verdict for graph in tasks.values())), strict=True))
     verdicts = {name: made.dataset() for name, made in judged.items()}
     print(as_json(verdicts) if options.json else "\n\n".join(text(*one) for one in verdicts.items()))

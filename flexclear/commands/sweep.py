@@ -39,7 +39,7 @@ OFTEN, FRACTION = 2.0, 0.01
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
-    add_options(parser, "usual", "json", jobs={"also": ("--workers",)})
+    add_options(parser, "usual", "json")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help=f"copy the dataset here (one sweep): {export.KNOWN}, .zarr"

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.single_run.series import derive
 from flexclear.pipeline.post.render import gl
 from flexclear.pipeline.post.render.forms import equivalent
 from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed

@@ -7,40 +7,15 @@ contact that turns by more than a sector between two outputs is spread along the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
-from flexclear.pipeline.core.numerics.rotations import angle_about_y
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
-
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
-
-from typing import TYPE_CHECKING
-
-from flexclear.pipeline.core.artifacts.quantities import IMPACT
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
-
-import json
-from typing import TYPE_CHECKING
-
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
+from flexclear.pipeline.core.artifacts.quantities import IMPACT, LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
-from flexclear.pipeline.core.numerics.rotations import first_largest, rotation_between
+from flexclear.pipeline.core.numerics.rotations import angle_about_y, first_largest, rotation_between
 from flexclear.pipeline.post.single_run.schema import POST
 
 if TYPE_CHECKING:
