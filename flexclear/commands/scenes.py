@@ -295,9 +295,16 @@ def in_file(path: Path | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if path is None or not error.place.startswith("["):
-            raise
-        raise InputError(f"{path} {error.place}", error.problem, error.remedy) from None
+        raise placed(error, path) from None
+
+
+def placed(error: InputError, path: Path | None) -> InputError:
+    """An error with the file before its place, where that is only a part of the file."""
+    if isinstance(error, InputErrors):
+        return InputErrors([placed(one, path) for one in error.errors])
+    if path is None or not error.place.startswith("["):
+        return error
+    return InputError(f"{path} {error.place}", error.problem, error.remedy)
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:

@@ -76,18 +76,12 @@ def assemble(
     changes = [[compared(pairs[name], q) for q in chosen] for name in names]
     full = next(iter(pairs.values())).full
     scales = [size(full, q) if not full.refused else np.nan for q in chosen]
+    differences = np.array([[c.difference for c in row] for row in changes])
+    uncertainties = np.array([[c.uncertainty for c in row] for row in changes])
     dims = ("effect", "quantity")
     data = {
-        "dropped": (
-            dims,
-            np.array([[c.difference for c in row] for row in changes]),
-            {"long_name": "change without it"},
-        ),
-        "dropped_uncertainty": (
-            dims,
-            np.array([[c.uncertainty for c in row] for row in changes]),
-            {"long_name": "part of the change that may be chance"},
-        ),
+        "dropped": (dims, differences, {"long_name": "change without it"}),
+        "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be chance"}),
         "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
         "scatter": (

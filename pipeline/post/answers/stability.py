@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.post.cost.study import methods
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import sentence
 
@@ -86,26 +87,19 @@ def _loops(run: xr.Dataset) -> list[Check]:
 def _agreement(study: xr.Dataset) -> list[Check]:
     """With runs at half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
     result = []
-    for group, method, setting in (
-        ("tolerance", "adaptive_integrator", "rtol"),
-        ("step", "fixed_integrator", "step"),
-    ):
-        if f"distance_by_{group}" not in study:
-            continue
-        own, at = str(study.attrs["own_integrator"]), float(study.attrs[f"own_{setting}"])
-        for m in (str(name) for name in study[method].values):
-            values = study[f"distance_by_{group}"].sel({method: m}).max("quantity", skipna=False)
-            there = [float(s) for s in study[setting].values if np.isfinite(values.sel({setting: s}))]
-            if m == own:
-                shown = [s for s in there if 0.05 * at < s < 0.9 * at]
-            else:
-                shown = [min(there)] if there else []
-            for s in shown:
-                value = float(values.sel({setting: s}))
-                name = f"agreement with {m}, {setting} {s:g}{' s' if group == 'step' else ''}"
-                result.append(
-                    Check(name, f"{value:.1e} of a size", f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance")
-                )
+    for group, method, setting, one in methods(study):
+        values = one[f"distance_by_{group}"].max("quantity", skipna=False)
+        there = [float(s) for s in study[setting].values if np.isfinite(values.sel({setting: s}))]
+        if method == study.attrs["own_integrator"]:
+            at = float(study.attrs[f"own_{setting}"])
+            shown = [s for s in there if 0.05 * at < s < 0.9 * at]
+        else:
+            shown = [min(there)] if there else []
+        for s in shown:
+            value = float(values.sel({setting: s}))
+            name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
+            limit = f"{AGREEMENT:g}"
+            result.append(Check(name, f"{value:.1e} of a size", limit, value < AGREEMENT, "a tighter tolerance"))
     return result
 
 

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.pages import media, viewer, viewer_page
 from flexclear.pipeline.post.plotting import mode_sheet
-from flexclear.pipeline.post.render import film_speed, gl, gltf, joint_view, paraview, player, vibrations
+from flexclear.pipeline.post.render import film_speed, gl, gltf, joint_view, panel, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
 from flexclear.pipeline.post.single_run.series import derive
 
@@ -140,8 +140,6 @@ def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import film_speed
-
     files = {}
     for body, bundle in _bodies(shown).items():
         suffix, content = film_speed.write(mode_sheet.frames(body, bundle, *_side(bundle)), 12, kind)
@@ -200,11 +198,9 @@ def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import film_speed, joint_view
-
     files, rate = {}, film_speed.rate(kind)
     for k, name in _joints(shown).items():
-        pictures = joint_view.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
+        pictures = panel.joint_frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
         suffix, content = film_speed.write(pictures, rate, kind)
         files[f"joint_{name}.{suffix}"] = content
     return files
