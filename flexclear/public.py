@@ -241,7 +241,7 @@ def equilibrium(
     """
     from flexclear.commands import scenes
 
-    return scenes.linear(_loaded(scene), time, drives, moving=moving, vibrations=False)
+    return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, vibrations=False)
 
 
 def frequencies(
@@ -265,7 +265,7 @@ def frequencies(
     """
     from flexclear.commands import scenes
 
-    return scenes.linear(_loaded(scene), time, drives, moving=moving, speeds=speeds, drive=drive)
+    return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, speeds=speeds, drive=drive)
 
 
 def compare(

@@ -214,7 +214,7 @@ def _page(
 ) -> bytes:
     from flexclear.pipeline.post.answers.matters import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
-    from flexclear.pipeline.post.pages import Part, downloads, listed, page
+    from flexclear.pipeline.post.pages import Part, downloads, page, prose
     from flexclear.pipeline.post.single_run.series import parameters
 
     scene = graph.scene
@@ -227,15 +227,19 @@ def _page(
         Part("run", "The run", pictures(made.get(graph.overview), FIGURES)),
         *_answered(scene, answers),
         *(compare.parts(compared) if compared is not None else []),
-        Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
-        Part("assumptions", "Assumptions, the most influential first", listed(assumptions, ("value", "assumption"))),
+        Part("doubts", "Warnings", prose(("no.", "warning"), [(f"{k + 1}", text) for k, text in enumerate(doubts)])),
+        Part(
+            "assumptions",
+            "Assumptions, the most influential first",
+            prose(("value", "assumption"), assumptions.items()),
+        ),
         Part(
             "effects",
             "Effects present and absent",
-            listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
+            prose(("effect", "in the scene"), effects(parameters(run)).items()) if run is not None else "",
         ),
-        Part("cost", "How it was computed", listed(_rows(attributes, COST), ("figure", "value"))),
-        Part("provenance", "Provenance", listed(_provenance(graph, made), ("item", "value"))),
+        Part("cost", "How it was computed", prose(("figure", "value"), _rows(attributes, COST).items())),
+        Part("provenance", "Provenance", prose(("item", "value"), _provenance(graph, made).items())),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
     ]
     dataset = None if compared is None else compared.dataset()

@@ -180,29 +180,17 @@ def deficits(graph: Graph, workplace: Workplace) -> str:
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
-def linear(
-    scene: Scene,
-    time: float | None = None,
-    drives: Mapping[str, float] | None = None,
-    *,
-    moving: bool = False,
-    vibrations: bool = True,
-    speeds: Sequence[float] | None = None,
-    drive: str | None = None,
-    workplace: Workplace | None = None,
-) -> xr.Dataset:
-    """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
+def linear(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
+    """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is.
+
+    pose: as of `Graph.linear`.
+    """
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
-    workplace = workplace or open_workplace()
-    graph = Graph(scene, shown=as_in_its_file(scene))
-    if speeds is None:
-        task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
-    else:
-        task = graph.campbell(speeds, drive, time, drives)
-    return workplace.datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
+    task = Graph(scene, shown=as_in_its_file(scene)).linear(time, **pose)
+    return (workplace or open_workplace()).datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
@@ -369,6 +357,16 @@ def moment(text: str | None) -> float | None:
         return None if text is None else quantity(text, "time")
     except ValueError as error:
         raise InputError(f"--at {text}", str(error), "give seconds, or a number with a unit of time") from None
+
+
+def write_page(page: Path, text: str, files: Mapping[str, bytes]) -> None:
+    """A page in Markdown, with files by their names in a folder of its name next to it."""
+    folder = page.parent / page.stem
+    with disk_limits(page.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            publish(folder / name, content)
+        publish(page, text.encode())
 
 
 def check_target(target: Path, option: str = "--out") -> None:

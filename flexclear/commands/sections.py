@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flexclear.commands import scenes
 from flexclear.commands.export import as_json
-from flexclear.commands.scenes import check_target, graphs, scene_arguments
-from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.stages.workplace import open_workplace
 
 if TYPE_CHECKING:
@@ -18,16 +17,16 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    scene_arguments(parser, "json")
+    scenes.scene_arguments(parser, "json")
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the verdict on each scene."""
     if options.page is not None:
-        check_target(options.page, "--page")
+        scenes.check_target(options.page, "--page")
     workplace = open_workplace(options)
-    tasks = {graph.scene.name: graph for graph in graphs(options.scenes, options.set)}
+    tasks = {graph.scene.name: graph for graph in scenes.graphs(options.scenes, options.set)}
     judged = dict(zip(tasks, workplace.made(*(graph.verdict for graph in tasks.values())), strict=True))
     verdicts = {name: made.dataset() for name, made in judged.items()}
     print(as_json(verdicts) if options.json else "\n\n".join(text(*one) for one in verdicts.items()))
@@ -42,13 +41,9 @@ def write_page(
     """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name next to it."""
     from flexclear.pipeline.post.sections.verdict_page import csv_text, markdown
 
-    folder = page.parent / page.stem
-    with disk_limits(page.parent):
-        folder.mkdir(exist_ok=True)
-        for name, picture in pictures.items():
-            publish(folder / f"{name.replace('/', '_')}.png", picture)
-        publish(folder / "verdicts.csv", csv_text(verdicts).encode())
-        publish(page, markdown(verdicts, sections, page.as_posix(), page.stem).encode())
+    files = {f"{name.replace('/', '_')}.png": picture for name, picture in pictures.items()}
+    files["verdicts.csv"] = csv_text(verdicts).encode()
+    scenes.write_page(page, markdown(verdicts, sections, page.as_posix(), page.stem), files)
 
 
 def text(scene: str, verdict: xr.Dataset) -> str:

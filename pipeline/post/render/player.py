@@ -56,12 +56,12 @@ def _largest_stress(drawn: mechanism.Mechanism, steps: np.ndarray) -> dict[str, 
     return {"label": "largest stress", "unit": unit, "values": [float(f"{v:.4g}") for v in values]}
 
 
-def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks, frames: int = FRAMES) -> dict[str, Any]:
+def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, Any]:
     """The centre of a ball or pin in its socket, for the viewer: where it may be, its path, and itself.
 
     contact: index of a joint with clearance, not of the end of a stop.
     """
-    steps, shown = _steps(run, looks, frames), joint_view.shown(run, contact)
+    steps, shown = _steps(run, looks, FRAMES), joint_view.shown(run, contact)
     centre = run["contact_offset"].values[steps, contact]
     unturned = np.tile([1.0, 0.0, 0.0, 0.0], (len(steps), 1))
     readings = [

@@ -304,14 +304,14 @@ def spread(velocity: np.ndarray) -> np.ndarray:
     return np.linalg.norm(velocity - velocity.mean(axis=0), axis=-1).max(axis=(0, 2))
 
 
-def horizon(time: np.ndarray, velocity: np.ndarray, fraction: float = SEPARATED) -> float:
-    """Time from which on `spread` stays above `share` of the largest speed; the last time if it never does [s].
+def horizon(time: np.ndarray, velocity: np.ndarray) -> float:
+    """Time from which on `spread` stays above SEPARATED of the largest speed; the last time if it never does [s].
 
     Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a
     pointwise value is one draw out of many.
     """
     peak = float(np.linalg.norm(velocity, axis=-1).max())
-    first = lasting(time, spread(velocity) > fraction * peak, LASTING * float(time[-1] - time[0]))
+    first = lasting(time, spread(velocity) > SEPARATED * peak, LASTING * float(time[-1] - time[0]))
     return float(time[-1] if first is None else time[first])
 
 
