@@ -135,7 +135,7 @@ def table(dataset: xr.Dataset) -> Table:
     for k, quantity in enumerate(dataset["quantity"].values):
         unit = str(dataset["unit"].values[k])
         for i, effect in enumerate(dataset["effect"].values):
-            cells = [_cell(dataset, name, i, i, k, unit) for name in ("dropped", "added")]
+            cells = [cell(dataset, name, (i, i, k), unit) for name in ("dropped", "added")]
             rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
     notes = [
         "Dropped: largest change of the quantity over the run when the effect is taken from the full scene. Added: "
@@ -155,11 +155,12 @@ def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
     if not len(finite) or finite.max() < 0.0:
         return "–", "–"
     j = int(np.argmax(finite))
-    return _cell(dataset, "interaction", i, j, k, unit), str(dataset["effect"].values[j])
+    return cell(dataset, "interaction", (i, j, k), unit), str(dataset["effect"].values[j])
 
 
-def _cell(dataset: xr.Dataset, name: str, i: int, j: int, k: int, unit: str) -> str:
-    return written(float(dataset[name].values[i, j, k]), float(dataset[f"{name}_uncertainty"].values[i, j, k]), unit)
+def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...], unit: str) -> str:
+    """A value of a dataset with its uncertainty, in words."""
+    return written(float(dataset[name].values[at]), float(dataset[f"{name}_uncertainty"].values[at]), unit)
 
 
 def written(value: float, uncertainty: float, unit: str) -> str:

@@ -17,7 +17,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.effect_size import Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.effect_sizes import listed, written
+from flexclear.pipeline.post.answers.effect_sizes import cell, listed
 from flexclear.pipeline.post.overview.curves import measured, rounded
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -197,14 +197,7 @@ def table(result: xr.Dataset) -> Table:
     for i, words in enumerate(str(w) for w in result["words"].values):
         if not words:
             continue
-        cells = [
-            written(
-                float(result["dropped"][i, k]),
-                float(result["dropped_uncertainty"][i, k]),
-                str(result["unit"].values[k]),
-            )
-            for k in range(result.sizes["quantity"])
-        ]
+        cells = [cell(result, "dropped", (i, k), str(unit)) for k, unit in enumerate(result["unit"].values)]
         members = int(result["members"][i])
         rows.append((words, *cells, str(members) if members else "one run"))
     notes = ["Largest change of each quantity over the run without the effect; behind ±: what of it may be chance."]

@@ -29,7 +29,7 @@ class Shown:
     """What there is to be shown.
 
     run: schema RUN; linear: schema LINEAR; bundles: schema BUNDLE by name of the flexible body.  watched,
-    curves: as of `film.film`.  title: of pages.
+    curves: as of `film.frames`.  title: of pages.
     """
 
     run: xr.Dataset | None = None
@@ -89,8 +89,9 @@ def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes
     _must_draw()
     from flexclear.pipeline.post.render import film
 
-    drawn = shown.mechanism(stressed=stressed)
-    suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind, shown.curves)
+    drawn, rate = shown.mechanism(stressed=stressed), film_speed.rate(kind)
+    frames = film.frames(drawn, derive(drawn.run), rate, shown.watched, shown.curves, shown.progress)
+    suffix, content = film_speed.write(frames, rate, kind)
     return {f"{'stress' if stressed else 'film'}.{suffix}": content}
 
 
