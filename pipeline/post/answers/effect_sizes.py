@@ -15,7 +15,7 @@ from flexclear.pipeline.core.artifacts.effect_size import Influence, influence
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.variants import Effect
-from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
+from flexclear.pipeline.post.overview.curves import in_unit, measured
 from flexclear.pipeline.post.plotting.table import Table
 
 Names = frozenset[str]
@@ -169,10 +169,7 @@ def written(value: float, uncertainty: float, unit: str) -> str:
         return "–"
     if np.isinf(value):
         return "not the same events"
-    if uncertainty > 0.0:
-        return measured(value, uncertainty, unit)
-    factor, shown = scaled(value, unit)
-    return f"{rounded(factor * value, 3)} {shown}"
+    return measured(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
 
 
 def listed(names: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.stability import ENERGY, largest_energy
+from flexclear.pipeline.post.answers.stability import ENERGY, lost_energy
 from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.single_run.series import parameters, sentence
 
@@ -109,8 +109,7 @@ def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
 
 
 def _trust(run: xr.Dataset) -> list[str]:
-    largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
-    fraction = missed / largest if largest > 0.0 else 0.0
+    fraction = float(lost_energy(run).max())
     word = "<span class='good'>closes</span>" if fraction < ENERGY else "<span class='bad'>does not close</span>"
     return [
         f"The energy balance {word}: <span class='n'>{fraction:.1e}</span> of the largest energy is unaccounted for."

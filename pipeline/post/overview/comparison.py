@@ -18,7 +18,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, measured, rounded, scaled
+from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, in_unit, measured, scaled
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
@@ -159,7 +159,7 @@ def table(compared: xr.Dataset) -> Table:
                 continue
             error = float(part["error"])
             against = "reference" if i == 0 else _difference(compared, i, j, unit)
-            rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), against))
+            rows.append((str(name), label, in_unit(float(part["largest"]), unit), _own(error, unit), against))
     notes = [
         "Own error: the largest difference between this run and the same run at a hundred times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "
@@ -186,7 +186,7 @@ def costs(compared: xr.Dataset) -> Table:
         cells = [_whole(float(part[name])) for name in COSTS]
         cells += [_whole(float(value)) for value in part["impact_count"].values]
         cells += [
-            "–" if np.isnan(value) else _number(float(value), str(unit))
+            "–" if np.isnan(value) else in_unit(float(value), str(unit))
             for value, unit in zip(part["peak_force"].values, part["peak_force_unit"].values, strict=True)
         ]
         rows.append((str(label), *cells))
@@ -201,20 +201,14 @@ def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str
         return "other number of impacts"
     error = float(compared["error"][run, quantity]) + float(compared["error"][0, quantity])
     if np.isnan(error):  # of one of the two runs it is not known
-        factor, written = scaled(value, unit)
-        return f"{rounded(factor * value, 4)} ± ? {written}"
+        return in_unit(value, unit).replace(" ", " ± ? ", 1)
     return measured(value, error, unit)
 
 
 def _own(error: float, unit: str) -> str:
     if np.isnan(error):
         return "–"
-    return "other number of impacts" if np.isinf(error) else _number(error, unit, 2)
-
-
-def _number(value: float, unit: str, digits: int = 4) -> str:
-    factor, written = scaled(value, unit)
-    return f"{rounded(factor * value, digits)} {written}"
+    return "other number of impacts" if np.isinf(error) else in_unit(error, unit, 2)
 
 
 def _whole(value: float) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
-from flexclear.pipeline.post.overview.curves import scaled
+from flexclear.pipeline.post.overview.curves import in_unit, scaled
 from flexclear.pipeline.post.render import film_speed, joint_view, mechanism, surfaces
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, axes_of, eye
@@ -164,8 +164,7 @@ def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[
         name = str(run["body"].values[body.index])
         levels = np.array([body_shape.stress_on_surface(run, bundle, name, int(step)) for step in steps]) / top
         data = np.round(255.0 * np.clip(levels, 0.0, 1.0)).astype(np.uint8)
-        factor, unit = scaled(top, "Pa")
-        content |= {"levels": base64.b64encode(data.tobytes()).decode(), "top": f"{factor * top:.3g} {unit}"}
+        content |= {"levels": base64.b64encode(data.tobytes()).decode(), "top": in_unit(top, "Pa", 3)}
     return content | ({"color": body.color, "plain": True} if body.color else {})
 
 
