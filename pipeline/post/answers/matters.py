@@ -111,13 +111,16 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
             unit, members = str(result["unit"].values[k]), int(one["members"])
-            text = _change(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
+            text = in_words(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
             said.append(f"<b>{html.escape(name)}</b>: {text}.")
     return said
 
 
-def _change(change: Influence, scale: float, unit: str, members: int, spread: float) -> str:
-    """What is different from the ideal mechanism, whose runs do not scatter. spread: standard deviation of a run."""
+def in_words(change: Influence, scale: float, unit: str, members: int = 0, spread: float = 0.0) -> str:
+    """What is different from the ideal mechanism, whose runs do not scatter, as HTML.
+
+    members: of which these are the means, 0 where one run each is compared.  spread: standard deviation of a run.
+    """
     means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
     bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
@@ -127,8 +130,8 @@ def _change(change: Influence, scale: float, unit: str, members: int, spread: fl
         value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and _percent(spread, scale)}"
         return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
     if not decided(change, scale):
-        more = needed(change, scale, members)
-        return f"changes by {bound} at most{part and _percent(change.most, scale)}{means}; about {more} would decide it"
+        more = f"; about {needed(change, scale, members)} would decide it" if members else ""
+        return f"changes by {bound} at most{part and _percent(change.most, scale)}{means}{more}"
     if change.difference > 0.0:
         slightly = "slightly, " if change.difference < SLIGHT * scale else ""
         value = measured(change.difference, change.uncertainty or np.nan, unit)
