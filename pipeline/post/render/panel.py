@@ -94,7 +94,7 @@ def panel(
         axes[2].set_title(f"{run['contact'].values[number]} {centre(run, number).removeprefix('centre ')}")
         cursors.append(Cursor(_dot(axes[2], 7), x, y))
     titles = [panel.set_title(panel.get_title(loc="left"), loc="left", fontsize=8.2) for panel in axes]
-    clock = _clock(canvas)
+    clock = _clock(canvas, 13, 0.972, style.INK)
     for panel, title in zip(axes, titles, strict=True):
         _fit(title, panel, canvas)
     canvas.draw()
@@ -116,18 +116,18 @@ def joint_frames(
         begin = np.searchsorted(time, time - TRAIL * (time[-1] - time[0]))
         force = _curve(right, run, run["contact_normal_force"].values[:, contact], "#D55E00", 0.9)
         cursors = Cursor(trail, x, y, begin), Cursor(_dot(left, 8), x, y), force
-        clock = _clock(canvas)
+        clock = _clock(canvas, 12, 0.965, "black")
         plots = Panel(canvas, canvas.copy_from_bbox(canvas.figure.bbox), cursors, clock, time)
         shown = film_speed.frame_times(run, seconds, slower, rate)
         for step, slow in zip(shown.steps(run), shown.slower, strict=True):
             yield plots.frame(int(step), f", {film_speed.speed_text(float(slow))}", 2)
 
 
-def _clock(canvas: FigureCanvasAgg) -> Any:
+def _clock(canvas: FigureCanvasAgg, fontsize: float, height: float, color: str) -> Any:
     """The text that is to show the time; the rest of the figure is drawn, with an area that is left for it."""
-    canvas.figure.suptitle(" ", fontsize=13)
-    look: dict[str, Any] = {"fontsize": 13, "fontweight": "bold", "color": style.INK, "animated": True}
-    clock = canvas.figure.text(0.5, 0.972, "", ha="center", va="center", **look)
+    canvas.figure.suptitle(" ", fontsize=fontsize)
+    look: dict[str, Any] = {"fontsize": fontsize, "fontweight": "bold", "color": color, "animated": True}
+    clock = canvas.figure.text(0.5, height, "", ha="center", va="center", **look)
     canvas.draw()
     return clock
 
