@@ -29,6 +29,8 @@ SLIGHT = 0.01
 LEVELS = (0.1, 0.01, 0.001)
 #: members of which Student's t is that of any larger number
 MANY = 1000
+#: a change of so many times the quantity's size is not given in per cent of that
+LARGE = 100.0
 #: a change that both runs' rounding could make, as a fraction of the quantity's size
 NOTHING = 1e-6
 
@@ -125,7 +127,7 @@ def in_words(change: Influence, scale: float, unit: str, members: int = 0, sprea
     bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree to {bound}"
-    part = _percent(change.difference, scale) if scale > 0.0 else ""
+    part = _percent(change.difference, scale) if change.difference < LARGE * scale else ""
     if not decided(change, scale) and spread > SLIGHT * scale:
         value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and _percent(spread, scale)}"
         return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
