@@ -25,6 +25,8 @@ from flexclear.pipeline.post.plotting.table import pipe_table
 DOCS = TREE / "docs"
 #: of a table: heading, and the cell of a record
 Columns = Mapping[str, Callable[[Record], str]]
+#: longest list of the cases that a session measured, in letters; of more their number is given
+LONGEST_LIST = 80
 #: the text where nothing was measured
 NOTHING = "Not measured."
 
@@ -94,8 +96,10 @@ def where(measured: Mapping[str, list[Session]]) -> str:
         for session in sessions:
             cases.setdefault(session_words(session), []).extend(record["case"] for record in session.records)
         for words, mine in cases.items():
-            part = name if len(cases) == 1 else f"{name} ({', '.join(dict.fromkeys(mine))})"
-            by_session.setdefault(words, []).append(part)
+            names = list(dict.fromkeys(mine))
+            listed = ", ".join(names)
+            listed = listed if len(listed) <= LONGEST_LIST else f"{len(names)} case{'s' * (len(names) > 1)}"
+            by_session.setdefault(words, []).append(name if len(cases) == 1 else f"{name} ({listed})")
     if len(by_session) == 1:
         return f"Measured {next(iter(by_session))}."
     return "Measured:\n\n" + "\n".join(f"- {', '.join(parts)}: {session}" for session, parts in by_session.items())

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from flexclear.pipeline.core.scene.limits import require_scatter
 from flexclear.pipeline.core.scene.load import edited, read_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
@@ -129,6 +130,7 @@ class Graph:
         """Members of the ensemble, if the scene asks for one."""
         if self.scene.ensemble is None:
             return None
+        require_scatter(self.scene, "[ensemble]")
         return self._simulation("ensemble", simulation.params(self.scene, ensemble=True))
 
     @cached_property

@@ -155,9 +155,7 @@ def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any], members: int) 
 
 
 def show(records: list[Record]) -> dict[str, str]:
-    """The summary, and all that was missed or is not decided; of the cases of the family as it is set."""
-    own = {case.name for case in cases()}
-    records = [r for r in records if r["case"] in own]
+    """The summary, and all that was missed or is not decided."""
     done = [r for r in records if "judged" in r]
     if not done:
         return {"summary": "Not measured.", "misses": ""}

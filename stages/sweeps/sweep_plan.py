@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import FAMILY
 from flexclear.pipeline.core.scene.design import Axis, Design, design
-from flexclear.pipeline.core.scene.limits import check_members
+from flexclear.pipeline.core.scene.limits import check_members, require_scatter
 from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.schema import Sections
@@ -238,10 +238,8 @@ def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[
             "nor members, nor an estimated error go with it",
             "keep sections alone, or make two sweeps of it",
         )
-    if sweep.members and not base.contacts() and not base.stop:
-        raise InputError(
-            f"{where} [members]", "members differ by a ball's offset, but the scene has no clearance joint", "remove it"
-        )
+    if sweep.members:
+        require_scatter(base, f"{where} [members]")
     if sweep.members and any(one.quantity.kind == "orientation" for one in recorded):
         raise InputError(f"{where} [keep]", "orientations have no mean over members", "keep a position instead")
     if sweep.error and base.solver.step is not None:

@@ -119,6 +119,17 @@ def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(tmp_path: Pat
     assert not fresh.exists()
 
 
+def test_members_that_would_all_be_the_same_run_are_refused_before_anything_runs(
+    tmp_path: Path, command: Command, fresh: Path
+):
+    (scene,) = write("pendulum", tmp_path / "own")
+    scene.write_text(scene.read_text() + "\n[ensemble]\nmembers = 3\n")
+    for verb in ("check", "run"):
+        assert "[ensemble], line" in (said := command(verb, scene, code=2).err)
+        assert "no clearance joint and no stop" in said
+    assert not fresh.exists()
+
+
 def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path, command: Command):
     scene, rod = write("slider-crank", tmp_path)
     scene.write_text(scene.read_text().replace('"0.8 kg"', "-1").replace('"crank.pin"] ', '"crank.pim"] '))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from flexclear.pipeline.core.scene.fields import Part, Time
-from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
 
 _UNITS = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 _SIZE = re.compile(r"(\d{1,15}(?:\.\d{1,15})?) ?([kMGT]?B)")
@@ -72,6 +72,13 @@ def check_members(members: int, limits: Limits, where: str = "[ensemble.members]
     if members > limits.members:
         text = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
         raise ResourceError(f"{where}: {text} are more than the {limits.members} that limits.members allows")
+
+
+def require_scatter(scene: Any, where: str) -> None:
+    """InputError for members of a scene that would all be the same run."""
+    if not scene.contacts() and not scene.stop:
+        problem = "members differ by a ball's offset, but there is no clearance joint and no stop"
+        raise InputError(where, problem, "remove it")
 
 
 def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:

@@ -17,6 +17,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.quantities import IMPACT
 from flexclear.pipeline.core.artifacts.schema import ENSEMBLE, conform
 from flexclear.pipeline.core.scene.event_kinds import CLOSING
+from flexclear.pipeline.core.scene.limits import require_scatter
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
@@ -59,12 +60,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     requested = scene.ensemble or Ensemble()
-    if not scene.contacts() and not scene.stop:
-        raise InputError(
-            "[ensemble]",
-            "its members differ by the ball's offset, but there is no clearance joint and no stop",
-            "remove it",
-        )
+    require_scatter(scene, "[ensemble]")
     engine, other = engines(scene, bundles, progress)
     names = kept_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)

@@ -45,6 +45,10 @@ FASTER_VIBRATIONS = 2.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
 CHEAP, WORTH_STIFF, CRAWLING = 200.0, 3000.0, 300_000.0
+#: the same in a scene with contacts, at which each method begins again: of the default method before the exponential
+#: one is tried, and at the pace of a run before it hands on to one that is not known yet. A method is compiled once,
+#: for some seconds (the slider-crank of `flexclear new`: 13 s for two that gave up, where the default one took 0.5 s)
+BETWEEN_CONTACTS, WORTH_COMPILING = 3e6, 1e6
 #: what the stiff method is taken to cost where nothing is known of it, at a tolerance and at looser ones
 UNKNOWN, AT = 20_000.0, 1e-4
 #: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
@@ -128,8 +132,8 @@ class Suit:
             left.remove(VIBRATING)
         others = [self.cost(name, rtol) for name in left if name != STIFF]
         if STIFF in left and STIFF not in self.seen and others:
-            enough = WORTH_STIFF * self._growth(rtol) if DEFAULT in self.seen else CRAWLING
-            if not min(others) > enough:
+            known = WORTH_COMPILING if self.touching else WORTH_STIFF * self._growth(rtol)
+            if not min(others) > (known if DEFAULT in self.seen else CRAWLING):
                 left.remove(STIFF)
         return left or [STIFF]
 
@@ -143,7 +147,8 @@ class Suit:
 
     def _vibrates(self) -> bool:
         """Whether the modes' vibrations alone make the default method dear."""
-        return self.rates.all > FASTER_VIBRATIONS * self.rates.held and self.by_stability > CHEAP
+        enough = BETWEEN_CONTACTS if self.touching else CHEAP
+        return self.rates.all > FASTER_VIBRATIONS * self.rates.held and self.by_stability > enough
 
     def best(self, rtol: float) -> str:
         """The integrator to take at a tolerance."""
@@ -202,7 +207,10 @@ class Suit:
             if not heir:
                 continue
             every = max(int(LOOK_FRACTION * most), LEAST_LOOK)
-            panel[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH_STIFF))), heir)
+            least = WORTH_STIFF
+            if self.touching and heir not in self.seen:
+                least = WORTH_COMPILING / CLEARLY_DEARER
+            panel[name] = (Judge(every, self._verdict(name, heir, max(most, least))), heir)
         return panel
 
     def _verdict(self, name: str, heir: str, most: float) -> Callable[[Engine, Sequence[Look]], str]:
