@@ -186,6 +186,9 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
 
     from flexclear.pipeline.post.plotting import style
 
+    if "other" in dataset.dims:
+        alone = xr.DataArray(np.arange(dataset.sizes["effect"]), dims="effect")
+        dataset = dataset.isel(effect=alone, other=alone)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
     columns = min(2, len(chosen))
@@ -199,15 +202,11 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 panel.set_visible(False)
                 continue
             for n, kind in enumerate(kinds):
-                values = (
-                    np.diagonal(dataset[kind].values[:, :, k])
-                    if dataset[kind].ndim == 3
-                    else dataset[kind].values[:, k]
-                )
+                values = dataset[kind].values[:, k]
                 place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
-                if f"{kind}_uncertainty" in dataset and dataset[kind].ndim == 2:
+                if f"{kind}_uncertainty" in dataset:
                     doubt = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
                     below = np.minimum(doubt, WHISKER * shown)
                     drawn = np.isfinite(shown) & (doubt > 0.0)

@@ -76,7 +76,8 @@ def assemble(
         coords={
             "run": labels,
             "quantity": [quantity.name for quantity in chosen],
-            "unit": ("quantity", [_unit(runs, quantity) for quantity in chosen]),
+            # of the last run: the scene itself, of which the others may lack a joint with clearance or a drive
+            "unit": ("quantity", [quantities.unit(list(runs.values())[-1], quantity) for quantity in chosen]),
             "time": ("time", time, {"units": "s"}),
         },
         attrs={"Conventions": "CF-1.11", "reference": labels[0]},
@@ -93,11 +94,6 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
     if not quantity.over_time or quantity.of_place:
         return difference
     return max(difference, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
-
-
-def _unit(runs: Mapping[str, xr.Dataset], quantity: Quantity) -> str:
-    """As the last run has it: the scene itself, of which the others may lack a joint with clearance or a drive."""
-    return quantities.unit(list(runs.values())[-1], quantity)
 
 
 def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
