@@ -50,10 +50,8 @@ def text(graph: Graph, sources: Sources) -> str:
 
 def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
     """Module and source text, modules in alphabetical order, each pair once."""
-    tasks = in_order(graph.up_to("post"))
-    roots = {task.run.partition(":")[0] for task in tasks} | {name for task in tasks for name in task.modules}
-    reached = sources.closure(roots)
-    parts = {name for task in tasks for name in task.modules}
+    stages, parts = _roots(graph)
+    reached = sources.closure(stages | parts)
     for name in sorted(reached.keys() - set(_unused(reached, parts))):
         if name.startswith(f"{COMPILE}."):  # how code is made is no method
             continue
@@ -63,13 +61,18 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
             yield name, key
 
 
+def _roots(graph: Graph) -> tuple[set[str], set[str]]:
+    """Modules of a scene's stages, and of its parts."""
+    tasks = in_order(graph.up_to("post"))
+    return {task.run.partition(":")[0] for task in tasks}, {name for task in tasks for name in task.modules}
+
+
 def _at_once(graph: Graph, sources: Sources) -> set[str]:
     """Modules that a run of the scene imports whatever it meets: not those that functions import where they need them,
     nor the integrators that may take over."""
-    tasks = in_order(graph.up_to("post"))
     own = module_name(graph.scene.solver.integrator)
     others = {f"{INTEGRATE}.{module_name(name)}" for name in INTEGRATORS} - {f"{INTEGRATE}.{own}"}
-    waiting = [task.run.partition(":")[0] for task in tasks] + [name for task in tasks for name in task.modules]
+    waiting = [name for names in _roots(graph) for name in names]
     seen = set[str]()
     while waiting:
         name = waiting.pop()

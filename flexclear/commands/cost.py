@@ -16,7 +16,6 @@ from pydantic import Strict, ValidationError, model_validator
 
 from flexclear.commands import cost_design, scenes
 from flexclear.commands.export import as_json
-from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.solver import of_run
@@ -338,15 +337,12 @@ def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> No
     """
     from flexclear.pipeline.post.cost.answer import markdown
 
-    sections = []
-    with disk_limits(page.parent):
-        (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
-        for name, made in studies.items():
-            said, pictures = figures_and_tables(name, made, page.stem)
-            sections.append(said)
-            for path, file in pictures.items():
-                publish(page.parent / path, made.read(file))
-        publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
+    sections, files = list[Studied](), dict[str, bytes]()
+    for name, made in studies.items():
+        said, pictures = figures_and_tables(name, made, page.stem)
+        sections.append(said)
+        files |= {Path(path).name: made.read(file) for path, file in pictures.items()}
+    scenes.write_page(page, markdown(tuple(sections), f"{page.as_posix()}{options}"), files)
 
 
 def _listed(keys: Sequence[str]) -> str:

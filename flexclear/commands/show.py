@@ -56,9 +56,7 @@ def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> t
         print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
     for gap in seen.gaps:
         print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.said}", file=sys.stderr)
-    if refused is not None and scene.path is not None and refused.place.startswith("["):
-        refused = InputError(f"{scene.path} {refused.place}", refused.problem, refused.remedy)
-    return files, refused
+    return files, None if refused is None else scenes.placed(refused, scene.path)
 
 
 @dataclass(frozen=True)

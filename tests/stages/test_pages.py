@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.post.pages import Part, downloads, listed, media, page, viewer
+from flexclear.pipeline.post.pages import Part, downloads, media, page, prose, viewer
 from flexclear.pipeline.post.plotting.table import Table, as_html
 from flexclear.pipeline.post.render import film_speed, player
 from flexclear.pipeline.post.render.mechanism import mechanism
@@ -43,7 +43,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
             viewer(player.motion(mechanism(run, {"rod1": bundle}), 24), "Motion")
             + viewer(player.modes(bundle), "Modes", play=True),
         ),
-        Part("tables", "Tables", as_html(table) + listed({"body.rod1.modes": "assumed: " + "long " * 60}, ("v", "a"))),
+        Part("tables", "Tables", as_html(table) + prose(("v", "a"), [("body.rod1.modes", "assumed: " + "long " * 60)])),
         Part("downloads", "Files", downloads({"scene.toml": b"title = 'x'"})),
     ]
     path = tmp_path_factory.mktemp("page") / "report.html"
