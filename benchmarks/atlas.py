@@ -7,21 +7,25 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from benchmarks import processes
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
+from benchmarks.layouts import ROD_CENTRE, ROD_END, Layout, edits
 from flexclear.commands.scenes import Workplace, bundles, open_workplace
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.scene.load import compose, scene_of
 from flexclear.pipeline.core.scene.quantity import parse
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import FlexclearError, SolverError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.dynamics.run.run import engine_of
@@ -29,17 +33,6 @@ from flexclear.stages.graph import Graph
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from flexclear.pipeline.core.scene.schema import Scene
-
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
-
-from benchmarks.layouts import ROD_CENTRE, ROD_END, Layout, edits
-from flexclear.pipeline.core.scene.load import compose, scene_of
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.workflow.fingerprint import TREE
 
 CLEARANCE, STIFFNESS = 0.5e-3, 1.3631e11  # Table 3 [m], eq. (26) with its data [N/m^1.5]
 #: radii of the joint circles, start height [m], and the angles of the joints that are far from singular [deg]

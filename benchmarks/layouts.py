@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.commands.scenes import find_scene
+from flexclear.papers.wang_wang_2019.deviations import Deviation
 from flexclear.papers.wang_wang_2019.published import TABLE3, TABLE8
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
@@ -270,6 +271,11 @@ def _leg(layout: Layout, k: int, *, flexible: bool, along: float, aside: float) 
         f"body.cylinder{n}.frames.P.position": [0.0, 0.0, length - ROD_END - CYLINDER_CENTRE + along],
         f"body.rod{n}.pose": rod,
     }
+
+
+def deviation_row(effect: Deviation) -> dict[str, float]:
+    """What a page tells of how far a platform is from the ideal one: angle [rad], z [m], its rate [m/s]."""
+    return {"angle": effect.angle, "displacement": effect.displacement, "velocity": effect.velocity}
 
 
 def _plain(value: Any) -> Any:

@@ -241,7 +241,7 @@ def equilibrium(
     """
     from flexclear.commands import scenes
 
-    return scenes.linear(_loaded(scene), time, drives, moving=moving, vibrations=False)
+    return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, vibrations=False)
 
 
 def frequencies(
@@ -265,7 +265,7 @@ def frequencies(
     """
     from flexclear.commands import scenes
 
-    return scenes.linear(_loaded(scene), time, drives, moving=moving, speeds=speeds, drive=drive)
+    return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, speeds=speeds, drive=drive)
 
 
 def compare(
@@ -350,7 +350,7 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     """The page with everything about a scene, one file, brought up to date.
 
     budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
-    whether these are there.  Raises FlexclearError.
+    whether those are there that take further runs.  Raises FlexclearError.
     """
     from flexclear.commands import report as report_command
     from flexclear.commands import scenes

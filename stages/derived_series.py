@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @given_arrays
 def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progress: Progress) -> dict[str, Any]:
     """The post dataset (schema POST), with what the scene says of where its values come from."""
-    from flexclear.pipeline.post import derived
+    from flexclear.pipeline.post.single_run.series import derived
 
     return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["attributes"])}
 

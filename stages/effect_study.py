@@ -1,4 +1,4 @@
-"""Stage 8: variants of a scene -> what each effect does to each quantity."""
+"""Stage 8: variants of a scene -> what each effect does to each quantity, and which effects matter."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from flexclear.pipeline.core.workflow.task import Task
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.points import Point
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
@@ -27,57 +28,103 @@ def task(
     members: int,
 ) -> Task:
     """The task of all differences.  variants, watched: the scenes by the effects that they lack, and their tasks."""
-    return Task(
-        stage="effects",
-        scene=scene.name,
-        run="flexclear.stages.effect_study:run",
-        params={
-            "scene": scene.name,
-            "title": scene.title,
-            "effects": [[effect.name, effect.kind, effect.within] for effect in effects],
-            "quantities": [q.written() for q in chosen],
-            "units": [q.unit for q in chosen],
-            "variants": [sorted(gone) for gone in watched],
-            "owners": [{k: list(v) for k, v in variant.owners().items()} for variant in variants.values()],
-            "members": members,
-        },
-        inputs={f"variant{k}": made for k, made in enumerate(watched.values())},
-        folder=f"effects/{scene.name.replace('/', '_')}",
-        names={"nc": "effects.nc"},
+    params = {
+        "effects": [[effect.name, effect.kind, effect.within] for effect in effects],
+        "variants": [sorted(gone) for gone in watched],
+        "owners": [_owners(variant) for variant in variants.values()],
+        "members": members,
+    }
+    return _task("effects", scene, chosen, params, {f"variant{k}": made for k, made in enumerate(watched.values())})
+
+
+def ranking(
+    scene: Scene,
+    chosen: Sequence[Quantity],
+    words: Mapping[str, str],
+    variants: Mapping[str, Scene],
+    tasks: Mapping[tuple[str, int], Task],
+    pairs: Mapping[str, int],
+    undone: Sequence[str],
+) -> Task:
+    """The task of the answer to which effects matter, each taken away alone.
+
+    words: of the effects.  variants: the scene without each effect, by its name (the full one by the empty name).
+    tasks: of these by name and number of members (`stages.watched_quantities`).  pairs: members with which each effect
+    is compared.
+    """
+    params = {
+        "words": dict(words),
+        "pairs": dict(pairs),
+        "owners": {name: _owners(made) for name, made in variants.items()},
+        "undone": ", ".join(undone),
+    }
+    used = sorted({("", members) for members in pairs.values()} | set(pairs.items()))
+    return _task(
+        "matters", scene, chosen, params, {f"{name}:{members}": tasks[name, members] for name, members in used}
     )
 
 
-def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+def _task(
+    stage: str, scene: Scene, chosen: Sequence[Quantity], params: Mapping[str, Any], inputs: Mapping[str, Task]
+) -> Task:
+    """stage: called as the function of this module, and its files."""
+    watched = {"quantities": [q.written() for q in chosen], "units": [q.unit for q in chosen]}
+    return Task(
+        stage=stage,
+        scene=scene.name,
+        run=f"flexclear.stages.effect_study:{stage}",
+        params={"title": scene.title, **watched, **params},
+        inputs=inputs,
+        folder=f"effects/{scene.name.replace('/', '_')}",
+        names={"nc": f"{stage}.nc"},
+    )
+
+
+def _owners(scene: Scene) -> dict[str, list[str]]:
+    return {kind: list(names) for kind, names in scene.owners().items()}
+
+
+def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of
     `watched_quantities`."""
-    from flexclear.pipeline.core.artifacts import effect_size
-    from flexclear.pipeline.core.artifacts.points import unpacked
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.answers import effect_sizes
     from flexclear.pipeline.post.plotting.table import files
 
-    effects = [Effect(*three) for three in params["effects"]]
+    there = [Effect(*three) for three in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
-    points = {}
-    for k, gone in enumerate(params["variants"]):
-        recorded = effect_size.recorded(params["owners"][k], chosen)
-        points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], recorded)["point"]
+    points = {
+        frozenset(gone): _point(inputs[f"variant{k}"], params["owners"][k], chosen)
+        for k, gone in enumerate(params["variants"])
+    }
     progress(None, "comparing")
-    dataset = effect_sizes.assemble(effects, chosen, points, params["members"], params["units"])
-    title = f"What each effect does: {params['title']}"
+    dataset = effect_sizes.assemble(there, chosen, points, params["members"], params["units"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
-    return result | effect_sizes.chart("effects", dataset, title)
+    return result | effect_sizes.chart("effects", dataset, f"What each effect does: {params['title']}")
 
 
-def page(scene: Scene, words: str, picture: bytes) -> bytes:
-    """The page of the table and the chart."""
-    from flexclear.pipeline.post.pages import Part, media
-    from flexclear.pipeline.post.pages import page as written
-    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """``matters.nc``, its table and its chart.  params: see `ranking`.  inputs: ``<effect>:<members>``."""
+    from flexclear.pipeline.core.scene.quantity import Quantity
+    from flexclear.pipeline.post.answers import effect_sizes, matters
+    from flexclear.pipeline.post.plotting.table import files
 
-    parts = [
-        Part("chart", "Chart", media("effects.png", picture, "Each effect alone")),
-        Part("table", "Table", as_html(from_markdown(words))),
-    ]
-    lead = "Every effect of the scene taken away and put in, alone and in pairs."
-    return written(f"Effects: {scene.title}", lead, parts)
+    chosen = [Quantity.read(data) for data in params["quantities"]]
+
+    def point(name: str, members: int) -> Point:
+        return _point(inputs[f"{name}:{members}"], params["owners"][name], chosen)
+
+    pairs = {name: matters.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
+    results = matters.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
+    result: dict[str, Any] = {"nc": results} | files("matters", matters.table(results))
+    listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
+    shown = listed.assign_coords(effect=listed["words"].values)
+    return result | effect_sizes.chart("matters", shown, f"What each effect does: {params['title']}")
+
+
+def _point(stored: xr.Dataset, owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> Point:
+    """The point in an artifact of `watched_quantities`."""
+    from flexclear.pipeline.core.artifacts.effect_size import recorded
+    from flexclear.pipeline.core.artifacts.points import unpacked
+
+    return unpacked(stored, recorded(owners, chosen))["point"]

@@ -183,22 +183,18 @@ class Graph:
         *,
         moving: bool = False,
         vibrations: bool = True,
-    ) -> Task:
-        """Equilibrium in one pose; with its natural vibrations shown as ``linear.nc``, else as ``equilibrium.nc``."""
-        pose = {"time": time, "drives": dict(drives or {}), "moving": moving, "vibrations": vibrations}
-        params = {**simulation.params(self.scene, without=("output",)), "pose": pose}
-        return self._simulation("linear" if vibrations else "equilibrium", params, function="linear")
-
-    def campbell(
-        self,
-        speeds: Sequence[float],
+        speeds: Sequence[float] | None = None,
         drive: str | None = None,
-        time: float | None = None,
-        drives: Mapping[str, float] | None = None,
     ) -> Task:
-        """Vibrations over the speed of a drive, shown as ``campbell.nc``."""
-        params = {**self.linear(time, drives, moving=True).params, "speeds": list(map(float, speeds)), "drive": drive}
-        return self._simulation("campbell", params, function="linear")
+        """Equilibrium in one pose; with its natural vibrations shown as ``linear.nc``, else as ``equilibrium.nc``.
+
+        speeds: of a drive; vibrations about steady motion at each of them, shown as ``campbell.nc``.
+        """
+        pose = {"time": time, "drives": dict(drives or {}), "moving": moving, "vibrations": vibrations}
+        stage, params = "linear" if vibrations else "equilibrium", simulation.params(self.scene, without=("output",))
+        if speeds is not None:
+            stage, params = "campbell", {**params, "speeds": list(map(float, speeds)), "drive": drive}
+        return self._simulation(stage, {**params, "pose": pose}, function="linear")
 
     def up_to(self, stage: str) -> list[Task]:
         """All tasks of the scene up to a stage, that stage included."""

@@ -32,7 +32,7 @@ def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
     from flexclear.pipeline.structure.fe.vtu import of_modes
-    from flexclear.pipeline.structure.modes.select import ModeRequest
+    from flexclear.pipeline.structure.modes.basis import ModeRequest
     from flexclear.pipeline.structure.modes.solution import solve
 
     count = params.get("count")

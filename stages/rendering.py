@@ -28,8 +28,6 @@ FORMATS: dict[str, tuple[str, ...]] = {
 }
 #: films of what have curves next to them
 FILMED = ("motion", "stress")
-#: keys of `[view]` that pictures of solids heed
-SEEN = ("direction", "up", "zoom", "exaggeration", "duration", "impact_slowdown")
 
 
 def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
@@ -47,7 +45,7 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     if what != "modes":
         values["bodies"] = _looks(scene)
     if scene.view is not None and what != "modes":
-        asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
+        asked = scene.view.model_dump(mode="json", exclude={"watch", "source"}, exclude_none=True)
         values |= {"view": asked} if asked else {}
     if (what == "joint" and kind in ("png", "html")) or (what in FILMED and kind in ("gif", "mp4")):
         terms = [term for quantity in scene.watched() for term in quantity.terms()]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The rigid body (schema RIGID)."""
-    from flexclear.pipeline.structure.modes import rigid
+    from flexclear.pipeline.structure.modes import bundle
 
     progress(None, "mass and inertia")
-    return {"nc": rigid.build(inputs["mesh"])}
+    return {"nc": bundle.rigid(inputs["mesh"])}

@@ -58,7 +58,7 @@ OPTIONS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
 def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) -> None:
     """Add options of `OPTIONS` by name; "said" adds quiet and verbose, "usual" what all commands take that compute.
 
-    changed: by name, keys of argparse that differ on this command, as its default; `also`: further names of it.
+    changed: by name, keys of argparse that differ on this command, as its default.
     """
     for name in names:
         if name == "usual":
@@ -69,11 +69,9 @@ def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) ->
                 flags, keys = OPTIONS[option]
                 said.add_argument(*flags, **keys)
         else:
-            flags, keys = OPTIONS[name]
-            more = dict(changed.get(name, {}))
-            also = more.pop("also", ())
+            (flags, keys), more = OPTIONS[name], changed.get(name, {})
             text = f"{keys['help']} (default {more['default']})" if "default" in more else keys["help"]
-            parser.add_argument(*flags, *also, **keys | more | {"help": text})
+            parser.add_argument(*flags, **keys | more | {"help": text})
 
 
 def seconds(given: str | float, option: str) -> float:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Record, each
+from benchmarks.page import Columns, table
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import scene_of
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import FlexclearError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
 
 if TYPE_CHECKING:
     import xarray as xr
-
-import time
-
-from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Record, each
-from benchmarks.page import Columns, table
-from flexclear.pipeline.core.system.errors import FlexclearError
 
 Table = dict[str, Any]
 #: stiffness of a shaft's end [N/m, N/rad, N m/rad], and its disc [kg, kg m^2, m]

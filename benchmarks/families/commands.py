@@ -113,14 +113,11 @@ def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "
 
 def show(records: list[Record]) -> str:
     """The table: seconds of the processor and waited for, and what the former go into in milliseconds."""
-    waited: Columns = {
-        "wall [s]": lambda r: spread(r["wall"], "s", 2) if "wall" in r else "",
-        "processors": lambda r: str(r.get("processors", "")),
-    }
     columns: Columns = {
         "command": lambda r: r["case"],
         "CPU [s]": lambda r: spread(r["cpu"], "s", 2),
-        **(waited if any("wall" in r for r in records) else {}),  # earlier records do not tell it
+        "wall [s]": lambda r: spread(r["wall"], "s", 2),
+        "processors": lambda r: str(r["processors"]),
         **{f"{part} [ms]": lambda r, part=part: _told(r["parts"], part) for part in SHOWN},  # type: ignore[misc]
     }
     return table(records, columns)

@@ -253,8 +253,9 @@ def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: 
 
     Times of ours: the whole run and, of those that reach levels, its parts.
     """
-    assert run.error is not None
-    requested = {"equal": errors.cheapest(ours, partial(_no_worse, run.error))}
+    wrong = run.error
+    assert wrong is not None
+    requested = {"equal": errors.cheapest(ours, lambda error: error.within(wrong))}
     requested |= {str(level): errors.cheapest(ours, partial(_reaches, level)) for level in levels}
     tasks: dict[tuple[str, str], Callable[[], float]] = {}
     for name, rung in requested.items():
@@ -277,16 +278,12 @@ def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: 
         for name, rung in requested.items()
         if rung
     }
-    return {"s": theirs, **_numbers(run.error), "ours": matches}
+    return {"s": theirs, **_numbers(wrong), "ours": matches}
 
 
 def _beyond(theirs: list[Error], error: Error) -> bool:
     """Whether a run of ours is no worse than any of theirs, and right to all levels."""
     return error.relative <= min(LEVELS) and all(error.within(their) for their in theirs)
-
-
-def _no_worse(than: Error, error: Error) -> bool:
-    return error.within(than)
 
 
 def _reaches(level: float, error: Error) -> bool:
@@ -299,10 +296,8 @@ def _name(rung: Rung) -> str:
 
 def show(records: list[Record]) -> str:
     """Times needed for an accuracy, then every run of Exudyn that counts with ours next to it."""
-    order, runs = list(COMPARISONS), _runs(records)
-    known = {r["case"]: r for r in records if "horizon" in r}
-    # a log may have cases that are no longer compared
-    heads = {case: known[case] for case in sorted(known, key=lambda c: order.index(c) if c in order else len(order))}
+    runs, known = _runs(records), {r["case"]: r for r in records if "horizon" in r}
+    heads = {case: known[case] for case in COMPARISONS if case in known}
     levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
     head = (
         "velocity error below",
@@ -363,9 +358,8 @@ def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
     mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
     seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
     theirs = [seconds, _called(best), short(best["position_um"])]
-    # records from before these were measured say nothing about them
-    alike, bare = (f"{mark}{best['s'] / ours[part]:.3g}" if part in ours else "" for part in ("alike_s", "bare_s"))
-    error = f"{100 * ours['alike_relative']:.2g} %" if "alike_relative" in ours else ""
+    alike, bare = (f"{mark}{best['s'] / ours[part]:.3g}" for part in ("alike_s", "bare_s"))
+    error = f"{100 * ours['alike_relative']:.2g} %"
     mine = [f"{ours['s']:.3g}", ours["run"], short(ours["position_um"])]
     return [name, *theirs, *mine, ratio, alike, error, bare]
 
@@ -386,8 +380,7 @@ def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
     return {
         asked.study: list(_tracks(runs, f"Exudyn {versions[case]}", asked.note))
         for case, runs in _runs(records).items()
-        # a log may have cases that are no longer compared
-        if (asked := COMPARISONS.get(case)) and asked.study
+        if (asked := COMPARISONS[case]).study
     }
 
 

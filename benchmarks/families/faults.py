@@ -37,7 +37,7 @@ SCENE = "checks/pendulum"
 #: what is killed, and which fraction of all kills; a sweep of a scene that takes some seconds
 COMMANDS = {
     "run": (0.25, ["run", SCENE, "checks/spring_pendulum"]),
-    "sweep": (0.15, ["sweep", "{folder}/sweep.toml", "--workers", "2"]),
+    "sweep": (0.15, ["sweep", "{folder}/sweep.toml", "--jobs", "2"]),
     "cost": (0.15, ["cost", SCENE, "--integrators", "dopri5"]),
     "report": (0.15, ["report", SCENE, "--answers", "none"]),
     "render": (0.1, ["render", SCENE, "--what", "motion", "--format", "png"]),

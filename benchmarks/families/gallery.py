@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.single_run.series import derive
 from flexclear.stages import rendering
 
 PICTURES = DOCS / "gallery"

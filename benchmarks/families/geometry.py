@@ -6,7 +6,7 @@ Runs with rigid rods over what the paper leaves open, and ensembles with flexibl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any
 
@@ -15,10 +15,10 @@ import xarray as xr
 
 from benchmarks import layouts
 from benchmarks.family import REFUSED, Case, Family, Record, each
-from benchmarks.layouts import DANGLE, DZ, Layout, Member, answer
+from benchmarks.layouts import DANGLE, DZ, Layout, Member, answer, deviation_row
 from benchmarks.page import Columns, table
 from flexclear.commands import scenes as stages
-from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
+from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
 from flexclear.papers.wang_wang_2019.models import JOINT, PLATFORM
 from flexclear.papers.wang_wang_2019.published import TABLE8, TABLE9
 from flexclear.pipeline import dynamics
@@ -67,10 +67,7 @@ def flexible_rows() -> Iterator[Record]:
 
 
 def _member(member: Member) -> Record:
-    layout, answer = member.layout, member.answer
-    place = {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height", "leg")}
-    return place | {"dz": answer.dz, "dangle": answer.dangle, "lift": answer.lift, "tilt": answer.tilt,
-                    "condition": answer.condition, "room": answer.room}  # fmt: skip
+    return asdict(member.layout) | {"leg": member.layout.leg} | asdict(member.answer)
 
 
 ROWS: dict[str, Callable[[], Iterator[Record]]] = {
@@ -229,7 +226,7 @@ def rigid(layout: Layout, choice: Open) -> Record:
         run = dynamics.simulate(requested, {}, silent)
     except SolverError as error:
         return {"verdict": REFUSED, "reason": str(error)}
-    return _told(max_deviation(run, ideal, PLATFORM)) | _peaks(run, ideal)
+    return deviation_row(max_deviation(run, ideal, PLATFORM)) | _peaks(run, ideal)
 
 
 def flexible(layout: Layout, name: str) -> Record:
@@ -237,16 +234,12 @@ def flexible(layout: Layout, name: str) -> Record:
     requested = layouts.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
     ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout), {}, silent)
     members = analyses.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)
-    each = [_told(deviation) for deviation in ensemble_deviations(members, ideal, PLATFORM)]
+    each = [deviation_row(one) for one in ensemble_deviations(members, ideal, PLATFORM)]
     found = {name: [one[name] for one in each] for name in each[0]}
     found["peak_force"] = members.peak_force.sel(contact=JOINT).values.tolist()
     found["peak_acceleration"] = members.peak_acceleration.sel(body=PLATFORM, axis="z").values.tolist()
     means = {name: float(np.mean(values)) for name, values in found.items()}
     return means | {f"{name}_std": float(np.std(values, ddof=1)) for name, values in found.items()}
-
-
-def _told(deviation: Deviation) -> Record:
-    return {"angle": deviation.angle, "displacement": deviation.displacement, "velocity": deviation.velocity}
 
 
 def _peaks(run: xr.Dataset, ideal: xr.Dataset) -> Record:

@@ -22,6 +22,7 @@ from benchmarks.timing import interleaved, once, slope
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
@@ -50,16 +51,23 @@ def _of_chain(name: str, links: int) -> Record:
     state = State(engine.start, np.zeros(0), np.zeros(0), y)
     ours, theirs = closure_rows.evaluate(engine, y, state.t)[engine.model.speeds][order], peer.hinges()
     repeat = max(EVALUATIONS // links, 10)
-    tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
-    if straight.has_straight_code:
-        tasks["straight"] = partial(evaluation_time, straight, state, repeat)
-    times = interleaved(tasks, ROUNDS)
     return {
         "by": name,
         "links": links,
         "apart": float(np.abs(theirs - ours).max() / np.abs(theirs).max()),
         "evaluations": evaluations,
         "way": "articulated inertias" if engine.model.parts.articulated else "mass matrix",
+        **_times(peer, engine, straight, state, repeat),
+    }
+
+
+def _times(peer: Peer, engine: Engine, straight: Engine, state: State, repeat: int) -> Record:
+    """Times of one evaluation by the peer, by the kernels and, where there is such, by straight code; their ratios."""
+    tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
+    if straight.has_straight_code:
+        tasks["straight"] = partial(evaluation_time, straight, state, repeat)
+    times = interleaved(tasks, ROUNDS)
+    return {
         **{label: found.record("us") for label, found in times.items()},
         "ratio": times["theirs"].over(times["ours"]),
         "straight_ratio": times["theirs"].over(times["straight"]) if "straight" in times else None,
@@ -73,67 +81,48 @@ def _record(name: str, loops: int) -> Record:
     links, numbering = engine.model.links, engine.model.numbering
     uprights = [numbering.coordinates[i][0] for i, link in enumerate(links) if i and link.kind == "revolute"]
     ours = np.sort(closure_rows.evaluate(engine, state.y, state.t)[engine.model.speeds][uprights])
-    repeat = max(EVALUATIONS // loops, 10)
-    tasks: dict[str, Callable[[], float]] = {"theirs": partial(peer.time, repeat)}
-    for label, one in (("ours", engine), ("straight", mine.engine())):
-        tasks[label] = partial(evaluation_time, one, state, repeat)
-    times = interleaved(tasks, ROUNDS)
+    times = _times(peer, engine, mine.engine(), state, max(EVALUATIONS // loops, 10))
     apart = np.abs(np.sort(peer.hinges()) - ours).max() / np.abs(ours).max()
     return {
         "by": name,
         "loops": loops,
         "apart": float(apart),
         "versions": {package: version(package) for package in ("pin", "mujoco")},
-        **{label: found.record("us") for label, found in times.items()},
-        "ratio": times["theirs"].over(times["ours"]),
-        "straight_ratio": times["theirs"].over(times["straight"]),
+        **times,
     }
 
 
 def show(records: list[Record]) -> str:
-    """Both tables."""
-    chains = [r for r in records if "links" in r]
-    parts = [_of_loops([r for r in records if "loops" in r]), _of_chains(chains) if chains else ""]
-    return "\n\n".join(part for part in parts if part)
+    """The table of closed loops with the programs' versions, and that of open chains with the growth."""
+    parts = []
+    if loops := [r for r in records if "loops" in r]:
+        versions = loops[-1]["versions"]
+        parts += [table(loops, _columns("loops")), f"Pinocchio {versions['pin']}, MuJoCo {versions['mujoco']}."]
+    if chains := [r for r in records if "links" in r]:
+        parts.append(table(chains, _columns("links")))
+    if len(chains) > 1:
+        exponent = slope([r["links"] for r in chains], [r["ours"]["us"] for r in chains])
+        parts.append(f"Time grows as the number of links to the power {exponent:.2f}.")
+    return "\n\n".join(parts)
 
 
-def _of_chains(records: list[Record]) -> str:
-    """The table of open chains."""
-    columns: Columns = {
+def _columns(what: str) -> Columns:
+    """Of the table over numbers of loops or of links; of links with the way of the kernels and what a run takes."""
+    chains = what == "links"
+    way: Columns = {"by": lambda r: r["way"]} if chains else {}
+    cost: Columns = {"evaluations of 0.2 s": lambda r: str(r["evaluations"])} if chains else {}
+    return {
         "program": lambda r: r["by"],
-        "links": lambda r: str(r["links"]),
+        what: lambda r: str(r[what]),
         "theirs [us]": lambda r: spread(r["theirs"], "us", 1),
         "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
         "ratio": lambda r: f"{r['straight_ratio']:.1f}" if "straight" in r else "",
         "kernels [us]": lambda r: spread(r["ours"], "us", 2),
         "ratio ": lambda r: f"{r['ratio']:.1f}",
-        "by": lambda r: r["way"],
+        **way,
         "accelerations differ by": lambda r: short(r["apart"]),
-        "evaluations of 0.2 s": lambda r: str(r["evaluations"]),
+        **cost,
     }
-    shown = table(records, columns)
-    if len(records) == 1:
-        return shown
-    exponent = slope([r["links"] for r in records], [r["ours"]["us"] for r in records])
-    return f"{shown}\n\nTime grows as the number of links to the power {exponent:.2f}."
-
-
-def _of_loops(records: list[Record]) -> str:
-    """The table of closed loops."""
-    if not records:
-        return ""
-    columns: Columns = {
-        "program": lambda r: r["by"],
-        "loops": lambda r: str(r["loops"]),
-        "theirs [us]": lambda r: spread(r["theirs"], "us", 1),
-        "straight [us]": lambda r: spread(r["straight"], "us", 2),
-        "ratio": lambda r: f"{r['straight_ratio']:.1f}",
-        "kernels [us]": lambda r: spread(r["ours"], "us", 2),
-        "ratio ": lambda r: f"{r['ratio']:.1f}",
-        "accelerations differ by": lambda r: short(r["apart"]),
-    }
-    versions = records[-1]["versions"]
-    return f"{table(records, columns)}\n\nPinocchio {versions['pin']}, MuJoCo {versions['mujoco']}."
 
 
 #: moments of inertia of each rod about its centre [kg m^2], its axis being z; mass and length are 1

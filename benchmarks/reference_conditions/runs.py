@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,10 @@ import flexclear as fc
 from benchmarks import family, layouts
 from benchmarks.family import Measured
 from benchmarks.family import Record as Row
+from benchmarks.layouts import deviation_row
 from benchmarks.reference_conditions import design
 from benchmarks.reference_conditions.cases import BODY
-from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
+from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
 from flexclear.stages.workplace import Workplace, check, open_workplace
 
 #: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
@@ -102,7 +104,7 @@ def far_rows() -> Iterator[Row]:
     for case, run in runs.items():
         rigid, full = runs[design.Case(case.place, design.RIGID)], runs[design.Case(case.place, design.FULL)]
         effect = max_deviation(run, rigid, BODY)
-        row = identity(case) | _deviation(effect) | _costs(run)
+        row = identity(case) | deviation_row(effect) | _costs(run)
         yield row | {
             "force": _largest(run, rigid),
             "force_error": _largest(run, full) / _largest(full, rigid),
@@ -134,7 +136,7 @@ def _with_clearance(case: design.Case, run: xr.Dataset, ideal: xr.Dataset) -> Ro
         }
         effects = ensemble_deviations(run, ideal, BODY)
         acceleration = run["peak_acceleration"].values[:, 0, 2].tolist()
-    spread |= {name: [_deviation(effect)[name] for effect in effects] for name in _deviation(effects[0])}
+    spread |= {name: [deviation_row(effect)[name] for effect in effects] for name in deviation_row(effects[0])}
     return _costs(run) | _statistics(spread | {"acceleration": acceleration}) | {"members": len(effects)}
 
 
@@ -145,22 +147,19 @@ def layout_rows(members: int) -> Iterator[Row]:
         runs = bring(design.of_layout(layout, members), place)
         ideal = next(run for case, run in runs.items() if case.condition == design.RIGID and not case.clearance)
         which: Row = {"layout": number} | ({"first": True} if layout == layouts.FIRST else {})
-        which |= {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height")}
+        which |= asdict(layout)
         for case, run in runs.items():
             row = which | identity(case) | {"clearance": case.clearance}
             if case.clearance:
                 yield row | _with_clearance(case, run, ideal)
             else:
-                yield row | _deviation(max_deviation(run, ideal, BODY)) | _costs(run) | {"force": _largest(run, ideal)}
+                effects = deviation_row(max_deviation(run, ideal, BODY))
+                yield row | effects | _costs(run) | {"force": _largest(run, ideal)}
 
 
 def _costs(run: xr.Dataset) -> Row:
     """Evaluations and processor time of the integration [s] of one run."""
     return {"evaluations": int(run.attrs["evaluations"]), "seconds": float(run.attrs["seconds"])}
-
-
-def _deviation(effect: Deviation) -> Row:
-    return {"angle": effect.angle, "displacement": effect.displacement, "velocity": effect.velocity}
 
 
 def _largest(run: xr.Dataset, other: xr.Dataset) -> float:

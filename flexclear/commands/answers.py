@@ -11,14 +11,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from flexclear.commands import cost
+from flexclear.commands import cost, scenes
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import effect_ranking, kernels, watched_quantities
+from flexclear.stages import effect_study, kernels, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 
@@ -59,7 +59,6 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
     from flexclear.pipeline.post.pages import prose
-    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     data = answer.dataset()
     if name == "accuracy":
@@ -73,9 +72,9 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
         return Said("Is it stable", data.attrs["answer"], "stability.png", caption, table)
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
-    table = as_html(from_markdown(answer.text("matters.md")))
     caption = "Change of each quantity without the effect; thin lines: what of it may be chance"
-    return Said("Which effects matter", matters.sentence(data, requested), "matters.png", caption, table)
+    text, table = matters.sentence(data, requested), scenes.tables(answer, "matters.md")
+    return Said("Which effects matter", text, "matters.png", caption, table)
 
 
 def dataset(name: str, scene: Scene, budget: str | float | None) -> xr.Dataset:
@@ -102,7 +101,7 @@ class Answers:
     """The three answers about a scene, each made when it is asked for.
 
     seconds: of processor that the runs may take; without it TIMES the scene's own run, and at least LEAST.
-    questions: among which it is divided, the costs of accuracy and the effects.
+    questions: among which it is divided, the costs of accuracy and the effects; 0 leaves nothing to measure.
     """
 
     scene: Scene
@@ -149,7 +148,7 @@ class Answers:
     def stability(self) -> Made:
         """Whether the run is stable (`stages.evaluation`), with what the costs of accuracy were measured with."""
         try:
-            study = {"study": self._study.task()}
+            study = {"study": self._study.task()} if self.questions else {}
         except SolverError:
             study = {}
         graph = Graph(self.scene, shown=False)
@@ -167,7 +166,7 @@ class Answers:
 
     @cached_property
     def matters(self) -> Made | None:
-        """Which effects matter (`stages.effect_ranking`); None for a scene without effects, or which watches
+        """Which effects matter (`stages.effect_study`); None for a scene without effects, or which watches
         nothing."""
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
@@ -216,15 +215,15 @@ class _Comparison:
             waiting = [n for n in waiting if undecided(Pair(full, self.points[n, members], members), self.chosen)]
         alone = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
-        scenes = {name: self._variant(name) for name in ("", *names)}
+        without = {name: self._variant(name) for name in ("", *names)}
         left = [words[name] for name in self._gone if name not in names and words[name]]
-        return effect_ranking.task(self.scene, self.chosen, words, scenes, self.tasks, pairs, left)
+        return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left)
 
     @cached_property
     def _compiled(self) -> set[tuple[str, ...]]:
         """Kinds of kernels that are there: those of the study, and of the run of the ideal scene."""
-        scenes = [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
-        return {*self.study.compiled, *(kernels.shared(scene) for scene in scenes)}
+        run = [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
+        return {*self.study.compiled, *(kernels.shared(scene) for scene in run)}
 
     @cached_property
     def _gone(self) -> Mapping[str, frozenset[str]]:

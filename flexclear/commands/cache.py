@@ -32,9 +32,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         below = actions.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
         if name == "explain":
             below.add_argument("what", metavar="FILE|KEY", help="a shown file, or a key or its beginning")
-        if name == "prune":
-            below.add_argument("--days", type=float, default=DAYS, help=f"keep what is younger (default {DAYS:g})")
-            below.add_argument("--dry-run", action="store_true", help="only say what would be removed")
 
 
 def command(options: argparse.Namespace) -> None:
@@ -110,24 +107,19 @@ def _explain(options: argparse.Namespace) -> None:
 def _prune(options: argparse.Namespace) -> None:
     from flexclear.pipeline.dynamics.compile.folder import prune
 
-    if not options.days >= 0.0:
-        raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
     store = open_workplace().store
     inventory = upkeep.inventory(store, whole=True)
-    chosen = upkeep.prunable(store, inventory, options.days * upkeep.DAY)
+    chosen = upkeep.prunable(store, inventory, DAYS * upkeep.DAY)
     broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]
     chosen += [artifact for artifact in broken if artifact not in chosen]
     size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in inventory.orphans)
-    kernels = 0
-    if not options.dry_run:
-        store.sweep()
-        for artifact in chosen:
-            upkeep.remove(store, artifact)
-        for path in (*inventory.orphans, *inventory.unreadable):
-            upkeep.take_away(path)
-        kernels = sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
-    verb = "would remove" if options.dry_run else "removed"
-    print(f"{verb} {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
+    store.sweep()
+    for artifact in chosen:
+        upkeep.remove(store, artifact)
+    for path in (*inventory.orphans, *inventory.unreadable):
+        upkeep.take_away(path)
+    kernels = sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
+    print(f"removed {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
     if kernels:
         print(f"removed {kernels} compiled kernels")
 

@@ -225,19 +225,11 @@ class Findings:
     warnings: list[InputError] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def attempt(self, check: Callable[[], None], place: Callable[[InputError], InputError]) -> bool:
-        """Run a check; what it raises is collected, located by `place`.  Returns whether it passed."""
-        try:
-            check()
-        except InputErrors as errors:
-            self.errors += [place(error) for error in errors.errors]
-        except InputError as error:
-            self.errors.append(place(error))
-        except ResourceError as error:
-            self.errors.append(error)
-        else:
-            return True
-        return False
+    def attempt(self, check: Callable[[], Any], path: Path | None = None) -> bool:
+        """Run a check; what it raises is collected, located in a file.  Returns whether it passed."""
+        wrong = _collect([check], path)
+        self.errors += wrong
+        return not wrong
 
 
 @dataclass(frozen=True)
@@ -259,11 +251,11 @@ def computed(whole: Scene, mesh_of: MeshOf) -> Findings:
     bodies = dict(_bodies(whole, seen, mesh_of))
     for name, body in whole.flexible().items():
         if name in bodies:
-            seen.attempt(partial(_modes, bodies[name], body), partial(_of_modes, whole, name))
+            seen.attempt(partial(_modes, bodies[name], name, body), whole.path)
     if seen.errors or set(bodies) != set(whole.recipes()):
         return seen
     rigid = {name: body.rigid for name, body in bodies.items()}
-    if seen.attempt(partial(_assembled, whole, rigid, seen), partial(_in_file, whole)):
+    if seen.attempt(partial(_assembled, whole, rigid, seen), whole.path):
         _free_motions(whole, rigid, seen)
     return seen
 
@@ -272,8 +264,8 @@ def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findi
     """A mesh recipe: its mesh, where that is allowed and can be made in seconds, and what is to be said of it."""
     seen = Findings()
     made: list[Body] = []
-    if seen.attempt(partial(meshing.check_size, path, limits or Limits()), lambda error: error):
-        seen.attempt(lambda: made.extend(_meshed(path, seen)), lambda error: error)
+    if seen.attempt(partial(meshing.check_size, path, limits or Limits())):
+        seen.attempt(lambda: made.extend(_meshed(path, seen)))
     return (made[0] if made else None), seen
 
 
@@ -290,7 +282,7 @@ def _bodies(whole: Scene, seen: Findings, mesh_of: MeshOf) -> Iterator[tuple[str
 def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
     from flexclear.pipeline.structure.fe.recipe import parse
     from flexclear.pipeline.structure.kinds import kind
-    from flexclear.pipeline.structure.modes import rigid
+    from flexclear.pipeline.structure.modes import bundle
 
     table = meshing.params(path)["recipe"]
     parse(table, str(path))
@@ -305,7 +297,7 @@ def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
     if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
         return
     model = kind.of_mesh(mesh).assemble(mesh)
-    yield Body(model, rigid.of_model(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
+    yield Body(model, bundle.rigid_of(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
 
 
 def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:
@@ -325,21 +317,13 @@ def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[In
         )
 
 
-def _modes(body: Body, part: FlexibleBody) -> None:
+def _modes(body: Body, name: str, part: FlexibleBody) -> None:
     from flexclear.pipeline.structure.modes.solution import require_possible
 
-    require_possible(body.model, part.modes, body.interfaces)
-
-
-def _of_modes(whole: Scene, body: str, error: InputError) -> InputError:
-    """An error of modes, located in the scene."""
-    return InputError(f"{whole.path or whole.name} [body.{body}.{error.place}]", error.problem, error.remedy)
-
-
-def _in_file(whole: Scene, error: InputError) -> InputError:
-    if whole.path is None or not error.place.startswith("["):
-        return error
-    return InputError(f"{whole.path} {error.place}", error.problem, error.remedy)
+    try:
+        require_possible(body.model, part.modes, body.interfaces)
+    except InputError as error:
+        raise InputError(f"[body.{name}.{error.place}]", error.problem, error.remedy) from None
 
 
 def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> None:
@@ -369,7 +353,7 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> No
         mechanism = assembled(mechanism)
         refuse_missed(mechanism)
     for body, text, remedy in forgotten(mechanism):
-        seen.warnings.append(_in_file(whole, InputError(f"[body.{body}]", text, remedy)))
+        seen.warnings.append(scenes.placed(InputError(f"[body.{body}]", text, remedy), whole.path))
     unused = unused_frames(mechanism)
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
@@ -403,7 +387,7 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) ->
         free = analyse(tabulate(mechanism)).mobility
     except InputError as error:  # others: only as flexible bodies or with clearance it moves
         if error.place.startswith(ACTING):
-            seen.errors.append(_in_file(whole, error))
+            seen.errors.append(scenes.placed(error, whole.path))
         return
     closed = " with loose joints closed" if loose(whole) else ""
     seen.notes.append(f"free motions besides the drives{closed}: {free}")

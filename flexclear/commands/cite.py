@@ -50,9 +50,8 @@ def text(graph: Graph, sources: Sources) -> str:
 
 def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
     """Module and source text, modules in alphabetical order, each pair once."""
-    tasks = in_order(graph.up_to("post"))
-    parts = {name for task in tasks for name in task.roots()}
-    reached = sources.closure(parts)
+    stages, parts = _roots(graph)
+    reached = sources.closure(stages | parts)
     for name in sorted(reached.keys() - set(_unused(reached, parts))):
         if name.startswith(f"{COMPILE}."):  # how code is made is no method
             continue
@@ -62,13 +61,18 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
             yield name, key
 
 
+def _roots(graph: Graph, met: tuple[str, ...] | None = None) -> tuple[set[str], set[str]]:
+    """Modules of a scene's stages, and of its parts and of what its run may meet, or of these: `Task.met`."""
+    roots = [task.roots(met) for task in in_order(graph.up_to("post"))]
+    return {stage for stage, *_ in roots}, {name for _, *names in roots for name in names}
+
+
 def _at_once(graph: Graph, sources: Sources) -> set[str]:
     """Modules that a run of the scene imports whatever it meets: not those that functions import where they need them,
     nor the integrators that may take over."""
-    tasks = in_order(graph.up_to("post"))
     own = module_name(graph.scene.solver.integrator)
     others = {f"{INTEGRATE}.{module_name(name)}" for name in INTEGRATORS} - {f"{INTEGRATE}.{own}"}
-    waiting = [name for task in tasks for name in task.roots(())]
+    waiting = [name for names in _roots(graph, ()) for name in names]
     seen = set[str]()
     while waiting:
         name = waiting.pop()

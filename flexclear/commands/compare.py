@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from flexclear.commands.export import as_json
-from flexclear.commands.scenes import graphs, joined, pictures, print_files, scene_arguments
+from flexclear.commands.scenes import graphs, joined, pictures, print_files, scene_arguments, tables
 from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene.variants import EFFECTS, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError
@@ -109,11 +109,9 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
 def parts(made: Made) -> list[Part]:
     """What a page shows of a comparison."""
     from flexclear.pipeline.post.pages import Part
-    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    tables = "".join(as_html(from_markdown(made.text(name))) for name in TABLES)
     return [
-        Part("differences", "Differences and errors", tables),
+        Part("differences", "Differences and errors", tables(made, *TABLES)),
         Part("runs", "Side by side", pictures(made, PICTURES)),
     ]
 

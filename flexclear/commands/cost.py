@@ -16,7 +16,6 @@ from pydantic import Strict, ValidationError, model_validator
 
 from flexclear.commands import cost_design, scenes
 from flexclear.commands.export import as_json
-from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.solver import of_run
@@ -118,6 +117,8 @@ class Study:
     undone: list[cost_design.Design] = field(default_factory=list)
     spent: float = 0.0
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
+    #: by integrator, the loosest tolerance at which a point used up its evaluations
+    used_up: dict[str, float] = field(default_factory=dict)
     own: float = 0.0
     seconds_each: float = 0.0
     _complete: bool = False
@@ -219,10 +220,15 @@ class Study:
         for design in designs:
             seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
             compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
-            if self.spent + seconds + compiling > self.seconds:
+            if self.spent + seconds + compiling > self.seconds or self._crawls(design):
                 self.undone.append(design)
             else:
                 self._made(design)
+
+    def _crawls(self, design: cost_design.Design) -> bool:
+        """Whether its method used up its evaluations at a tolerance that is no tighter."""
+        solver = design.scene.solver
+        return solver.step is None and solver.rtol <= self.used_up.get(solver.integrator, 0.0)
 
     def _made(self, design: cost_design.Design) -> xr.Dataset:
         """One point, brought up to date."""
@@ -237,10 +243,11 @@ class Study:
         self.runs[design.key] = task
         self.points.append(design)
         solver = design.scene.solver
-        if "refused" in record.attrs:
-            self.spent += POINT + (
-                self._most() * self.seconds_each if "evaluations" in record.attrs["refused"] else 0.0
-            )
+        if "evaluations" in record.attrs.get("refused", ""):
+            self.spent += POINT + self._most() * self.seconds_each
+            self.used_up[solver.integrator] = max(solver.rtol, self.used_up.get(solver.integrator, 0.0))
+        elif "refused" in record.attrs:
+            self.spent += POINT
         else:
             self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
             if solver.step is None and design.group in ("tolerance", "sampling"):
@@ -249,9 +256,11 @@ class Study:
         return record
 
     def _most(self) -> int:
-        """Evaluations that a point may take: a power of ten, so that its key does not change with each budget."""
+        """Evaluations that a point may take: 1, 2 or 5 times a power of ten, so that its key does not change with each
+        budget."""
         affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
-        return int(10.0 ** math.ceil(math.log10(affordable)))
+        below = 10 ** math.floor(math.log10(affordable))
+        return next(factor * below for factor in (1, 2, 5, 10) if factor * below >= affordable)
 
     def _kernels(self, design: cost_design.Design) -> Task:
         shared = kernels.shared(design.scene)
@@ -328,15 +337,12 @@ def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> No
     """
     from flexclear.pipeline.post.cost.answer import markdown
 
-    sections = []
-    with disk_limits(page.parent):
-        (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
-        for name, made in studies.items():
-            said, pictures = figures_and_tables(name, made, page.stem)
-            sections.append(said)
-            for path, file in pictures.items():
-                publish(page.parent / path, made.read(file))
-        publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
+    sections, files = list[Studied](), dict[str, bytes]()
+    for name, made in studies.items():
+        said, pictures = figures_and_tables(name, made, page.stem)
+        sections.append(said)
+        files |= {Path(path).name: made.read(file) for path, file in pictures.items()}
+    scenes.write_page(page, markdown(tuple(sections), f"{page.as_posix()}{options}"), files)
 
 
 def _listed(keys: Sequence[str]) -> str:

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import export, new, reproduction, scenes
+from flexclear.commands import new, reproduction, scenes
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.system import machine
@@ -110,8 +110,7 @@ def command(options: argparse.Namespace) -> None:
             raise InputError(
                 f"--out {options.out}", "is where --bundle writes, which is not given", "add --bundle SCENE"
             )
-        export.check_format(options.out, (".zip",))
-        scenes.check_target(options.out)
+        scenes.check_out(options.out, (options.bundle,), endings=(".zip",))
     if options.bundle is not None:
         path, left_out = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
         print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from flexclear.commands.export import as_json
-from flexclear.commands.scenes import graphs, print_files, scene_arguments
+from flexclear.commands.scenes import graphs, pictures, print_files, scene_arguments, tables
 from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.system.errors import InputError
@@ -35,17 +35,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Bring the tables up to date, print them and say where they are."""
     workplace = open_workplace(options)
-    tables: dict[str, xr.Dataset] = {}
+    datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
         made = bring(graph.scene, workplace, options.members)
         if options.json:
-            tables[graph.scene.name] = made.dataset()
+            datasets[graph.scene.name] = made.dataset()
             continue
         print(made.text("effects.md"))
         files = {"index.html": "the page", "effects.nc": "all effect sizes", "effects.png": "the chart"}
         print_files(made.folder, files)
     if options.json:
-        print(as_json(tables))
+        print(as_json(datasets))
 
 
 def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.MEMBERS) -> Made:
@@ -54,6 +54,7 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
     Raises InputError for a scene without effects, or that watches nothing.
     """
     from flexclear.pipeline.post.answers.effect_sizes import variants as requested
+    from flexclear.pipeline.post.pages import Part, page
 
     if members < 2:
         raise InputError(
@@ -72,6 +73,10 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
     scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(there)}
     tasks = {gone: watched_quantities.task(variant, chosen, members) for gone, variant in scenes.items()}
     (made,) = workplace.made(effect_study.task(scene, there, chosen, scenes, tasks, members))
-    page = effect_study.page(scene, made.text("effects.md"), made.read("effects.png"))
-    publish(made.folder / "index.html", page)
+    parts = [
+        Part("chart", "Chart", pictures(made, {"effects.png": ("Each effect alone",)})),
+        Part("table", "Table", tables(made, "effects.md")),
+    ]
+    lead = "Every effect of the scene taken away and put in, alone and in pairs."
+    publish(made.folder / "index.html", page(f"Effects: {scene.title}", lead, parts))
     return made

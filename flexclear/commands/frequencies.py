@@ -77,8 +77,7 @@ def _targets(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]
     """The files of `--out`, checked before the work; pictures: endings besides those of datasets."""
     targets: list[Path] = options.out or []
     for target in targets:
-        export.check_format(target, (*export.NEEDS, *pictures))
-        scenes.check_target(target)
+        scenes.check_out(target, (options.scene,), endings=(*export.NEEDS, *pictures))
     return targets
 
 

@@ -43,11 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Plan scenes, print the decisions and say where the planned scenes are; with `--verify` their true errors."""
-    if options.out is not None:
-        if len(options.scenes) > 1:
-            raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
-        export.check_format(options.out, (".toml",))
-        scenes.check_target(options.out)
+    scenes.check_out(options.out, options.scenes, endings=(".toml",))
     workplace = open_workplace(options)
     missed, plans = list[str](), dict[str, object]()
     budget = seconds(options.budget, "--budget")
@@ -111,11 +107,11 @@ def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene
     """
     from flexclear.pipeline.post.answers.answered import answered
     from flexclear.pipeline.post.answers.plan import verified, words
-    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+    from flexclear.pipeline.post.plotting.table import as_html
 
     workplace = open_workplace()
     planned = bring(scene if scene.accuracy is not None else asking(scene, level), workplace)
-    result, table = planned.made.dataset(), as_html(from_markdown(planned.made.text("plan.md")))
+    result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))
         result = result.assign(
@@ -214,15 +210,14 @@ def page(planned: Planned) -> bytes:
     import html
 
     from flexclear.pipeline.post.answers.plan import words
-    from flexclear.pipeline.post.pages import Part, media
+    from flexclear.pipeline.post.pages import Part
     from flexclear.pipeline.post.pages import page as made
-    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    picture = media("plan.png", planned.made.read("plan.png"), "Estimated size of each effect, at most")
+    picture = scenes.pictures(planned.made, {"plan.png": ("Estimated size of each effect, at most",)})
     text = html.escape(planned.file(planned.target).decode())
     parts = [
         Part("chart", "Effect sizes", picture),
-        Part("decisions", "Decisions", as_html(from_markdown(planned.made.text("plan.md")))),
+        Part("decisions", "Decisions", scenes.tables(planned.made, "plan.md")),
         Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
     ]
     return made(f"Plan: {planned.scene.title}", words(planned.made.dataset()), parts)

@@ -12,9 +12,6 @@ from flexclear.stages.graph import Graph
 from flexclear.stages.rendering import FORMATS
 from flexclear.stages.workplace import check, open_workplace, relative
 
-#: what is made where nothing is asked for
-USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "html"))
-
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
@@ -42,9 +39,8 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--at", "belongs to --what vibrations")
     time = scenes.moment(options.at)
     graphs, workplace = scenes.graphs(options.scenes, options.set), open_workplace(options)
-    tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
-    made = [task for group in tasks.values() for task in group]
-    if len(graphs) > 1 and requested == [("modes", "html")]:
+    made = [task for graph in graphs for task in _tasks(graph, requested, time)]
+    if len(graphs) > 1 and requested == ("modes", "html"):
         made.append(_mode_sets(graphs))
     outcome = workplace.bring(made)
     there, files = workplace.artifacts(outcome), dict[str, list[str]]()
@@ -59,26 +55,22 @@ def command(options: argparse.Namespace) -> None:
     check(outcome)
 
 
-def _requested(what: str | None, kind: str | None) -> list[tuple[str, str]]:
-    """What is to be made.  Raises InputError for what cannot be shown so."""
+def _requested(what: str | None, kind: str | None) -> tuple[str, str] | None:
+    """What is to be made, None for what is usual.  Raises InputError for what cannot be shown so."""
     if what is None and kind is None:
-        return list(USUAL)
-    if what is None:
-        what = "motion"
-    if kind is None:
-        return [(what, next(k for k in ("mp4", "html", "png") if k in FORMATS[what]))]
+        return None
+    what = what or "motion"
+    kind = kind or next(k for k in ("mp4", "html", "png") if k in FORMATS[what])
     if kind not in FORMATS[what]:
         raise InputError(
             f"--what {what} --format {kind}", f"{what} cannot be shown so", f"as {', '.join(FORMATS[what])}"
         )
-    return [(what, kind)]
+    return what, kind
 
 
-def _tasks(graph: Graph, requested: list[tuple[str, str]], asked: bool, time: float | None) -> list:
-    """One task for each; of what is usual, modes only where there are some."""
-    there = [pair for pair in requested if asked or pair[0] != "modes" or graph.scene.flexible()]
+def _tasks(graph: Graph, requested: tuple[str, str] | None, time: float | None) -> list[Task]:
     with scenes.in_file(graph.scene.path):
-        return [graph.picture(what, kind, time) for what, kind in there]
+        return list(graph.render.values()) if requested is None else [graph.picture(*requested, time)]
 
 
 def _mode_sets(graphs: list[Graph]) -> Task:

@@ -67,8 +67,6 @@ COST = {
     "rejected_steps": "steps made again, shorter, since their error was too large",
     "jacobians": "Jacobians of the equations",
     "projections": "times the closed loops were put together again",
-}
-STABILITY = {
     "switched": "another integrator continued",
     "stiff_share": "fraction of the steps that stability made shorter than accuracy would have",
     "redundant_closure_rows": "conditions of closed loops that follow from the others",
@@ -91,7 +89,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
     )
     parser.add_argument(
-        "--answers", choices=("all", "none"), default="all", help="none leaves the three answers out (default all)"
+        "--answers",
+        choices=("all", "none"),
+        default="all",
+        help="none leaves those out that take further runs (default all)",
     )
     add_options(parser, "usual", "budget", "json")
 
@@ -146,7 +147,7 @@ def of_scene(
     from flexclear.commands.answers import Answers
 
     scene = graph.scene
-    compared, answering = None, Answers(scene, workplace, budget)
+    compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
             compared = compare.bring([scene], workplace, "both", list(answering.kernels.values()) if answers else ())
@@ -159,7 +160,7 @@ def of_scene(
         workplace.monitor.say(f"not in the report: {failure.message}")
     made = workplace.artifacts(outcome)
     run = made[graph.simulate].dataset() if graph.simulate in made else None
-    result = _answers(answering, workplace) if answers and run is not None else {}
+    result = _answers(answering, workplace) if run is not None else {}
     text = _page(graph, made, compared, run, result)
     return publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
 
@@ -180,7 +181,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
 def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
     """Those of the three answers that can be given, by name; why one cannot is said."""
     result = {}
-    for name in ("accuracy", "stability", "matters"):
+    for name in ("accuracy", "stability", "matters") if answers.questions else ("stability",):
         try:
             answer = getattr(answers, name)
         except (InputError, SolverError, FailedTasksError) as error:
@@ -213,7 +214,7 @@ def _page(
 ) -> bytes:
     from flexclear.pipeline.post.answers.matters import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
-    from flexclear.pipeline.post.pages import Part, downloads, listed, page
+    from flexclear.pipeline.post.pages import Part, downloads, page, prose
     from flexclear.pipeline.post.single_run.series import parameters
 
     scene = graph.scene
@@ -226,20 +227,19 @@ def _page(
         Part("run", "The run", pictures(made.get(graph.overview), FIGURES)),
         *_answered(scene, answers),
         *(compare.parts(compared) if compared is not None else []),
-        Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
-        Part("assumptions", "Assumptions, the most influential first", listed(assumptions, ("value", "assumption"))),
+        Part("doubts", "Warnings", prose(("no.", "warning"), [(f"{k + 1}", text) for k, text in enumerate(doubts)])),
+        Part(
+            "assumptions",
+            "Assumptions, the most influential first",
+            prose(("value", "assumption"), assumptions.items()),
+        ),
         Part(
             "effects",
             "Effects present and absent",
-            listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
+            prose(("effect", "in the scene"), effects(parameters(run)).items()) if run is not None else "",
         ),
-        Part("cost", "Computing cost", listed(_rows(attributes, COST), ("figure", "value"))),
-        Part(
-            "stability",
-            "Stability and constraints",
-            "" if "stability" in answers else listed(_stability(run, members), ("figure", "value")),
-        ),
-        Part("provenance", "Provenance", listed(_provenance(graph, made), ("item", "value"))),
+        Part("cost", "How it was computed", prose(("figure", "value"), _rows(attributes, COST).items())),
+        Part("provenance", "Provenance", prose(("item", "value"), _provenance(graph, made).items())),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
     ]
     dataset = None if compared is None else compared.dataset()
@@ -269,23 +269,6 @@ def _members(graph: Graph, made: Mapping[Task, Made]) -> float | None:
     if graph.ensemble is None or graph.post not in made:
         return None
     return float(made[graph.post].dataset()["ensemble_horizon"])
-
-
-def _stability(run: xr.Dataset | None, members: float | None) -> dict[str, str]:
-    from flexclear.pipeline.post.single_run.series import sentence
-
-    if run is None:
-        return {}
-    rows = _rows(run.attrs, STABILITY)
-    if "horizon" in run:
-        rows["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]), members)
-    for name, label, unit in (
-        ("energy_error", "largest error of the energy balance", "J"),
-        ("constraint_error", "largest error of a closed loop", "m"),
-    ):
-        if name in run:
-            rows[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
-    return rows
 
 
 def _provenance(graph: Graph, made: Mapping[Task, Made]) -> dict[str, str]:

@@ -61,6 +61,13 @@ def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
     return "".join(media(name, made.read(name), *text) for name, text in captions.items() if made and name in files)
 
 
+def tables(made: Made, *names: str) -> str:
+    """Tables of an artifact, which it has as Markdown, as HTML."""
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+
+    return "".join(as_html(from_markdown(made.text(name))) for name in names)
+
+
 def joined(names: Sequence[str]) -> str:
     """The name of the folder of what is made of several scenes."""
     return "+".join(name.replace("/", "_").replace(" ", "_") for name in names)
@@ -173,29 +180,17 @@ def deficits(graph: Graph, workplace: Workplace) -> str:
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
-def linear(
-    scene: Scene,
-    time: float | None = None,
-    drives: Mapping[str, float] | None = None,
-    *,
-    moving: bool = False,
-    vibrations: bool = True,
-    speeds: Sequence[float] | None = None,
-    drive: str | None = None,
-    workplace: Workplace | None = None,
-) -> xr.Dataset:
-    """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
+def linear(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
+    """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is.
+
+    pose: as of `Graph.linear`.
+    """
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
-    workplace = workplace or open_workplace()
-    graph = Graph(scene, shown=as_in_its_file(scene))
-    if speeds is None:
-        task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
-    else:
-        task = graph.campbell(speeds, drive, time, drives)
-    return workplace.datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
+    task = Graph(scene, shown=as_in_its_file(scene)).linear(time, **pose)
+    return (workplace or open_workplace()).datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
@@ -288,9 +283,16 @@ def in_file(path: Path | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if path is None or not error.place.startswith("["):
-            raise
-        raise InputError(f"{path} {error.place}", error.problem, error.remedy) from None
+        raise placed(error, path) from None
+
+
+def placed(error: InputError, path: Path | None) -> InputError:
+    """An error with the file before its place, where that is only a part of the file."""
+    if isinstance(error, InputErrors):
+        return InputErrors([placed(one, path) for one in error.errors])
+    if path is None or not error.place.startswith("["):
+        return error
+    return InputError(f"{path} {error.place}", error.problem, error.remedy)
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
@@ -355,6 +357,16 @@ def moment(text: str | None) -> float | None:
         return None if text is None else quantity(text, "time")
     except ValueError as error:
         raise InputError(f"--at {text}", str(error), "give seconds, or a number with a unit of time") from None
+
+
+def write_page(page: Path, text: str, files: Mapping[str, bytes]) -> None:
+    """A page in Markdown, with files by their names in a folder of its name next to it."""
+    folder = page.parent / page.stem
+    with disk_limits(page.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            publish(folder / name, content)
+        publish(page, text.encode())
 
 
 def check_target(target: Path, option: str = "--out") -> None:

@@ -7,39 +7,26 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flexclear.commands import scenes
 from flexclear.commands.export import as_json
-from flexclear.commands.scenes import check_target, graphs, scene_arguments
-from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-#: options and the keys of `[sections]` that they replace
-COUNTS = {"periods": "recorded periods", "transient": "periods before them that are not"}
-
-
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    scene_arguments(parser, "json")
-    for name, text in COUNTS.items():
-        parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
-    parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
+    scenes.scene_arguments(parser, "json")
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the verdict on each scene."""
-    asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
-        check_target(options.page, "--page")
+        scenes.check_target(options.page, "--page")
     workplace = open_workplace(options)
-    changes = {f"sections.{key}": value for key, value in asked.items()}
-    scenes = [edited(graph.scene, changes) if asked else graph.scene for graph in graphs(options.scenes, options.set)]
-    tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
+    tasks = {graph.scene.name: graph for graph in scenes.graphs(options.scenes, options.set)}
     judged = dict(zip(tasks, workplace.made(*(graph.verdict for graph in tasks.values())), strict=True))
     verdicts = {name: made.dataset() for name, made in judged.items()}
     print(as_json(verdicts) if options.json else "\n\n".join(text(*one) for one in verdicts.items()))
@@ -54,13 +41,9 @@ def write_page(
     """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name next to it."""
     from flexclear.pipeline.post.sections.verdict_page import csv_text, markdown
 
-    folder = page.parent / page.stem
-    with disk_limits(page.parent):
-        folder.mkdir(exist_ok=True)
-        for name, picture in pictures.items():
-            publish(folder / f"{name.replace('/', '_')}.png", picture)
-        publish(folder / "verdicts.csv", csv_text(verdicts).encode())
-        publish(page, markdown(verdicts, sections, page.as_posix(), page.stem).encode())
+    files = {f"{name.replace('/', '_')}.png": picture for name, picture in pictures.items()}
+    files["verdicts.csv"] = csv_text(verdicts).encode()
+    scenes.write_page(page, markdown(verdicts, sections, page.as_posix(), page.stem), files)
 
 
 def text(scene: str, verdict: xr.Dataset) -> str:

@@ -56,9 +56,7 @@ def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> t
         print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
     for gap in seen.gaps:
         print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.said}", file=sys.stderr)
-    if refused is not None and scene.path is not None and refused.place.startswith("["):
-        refused = InputError(f"{scene.path} {refused.place}", refused.problem, refused.remedy)
-    return files, refused
+    return files, None if refused is None else scenes.placed(refused, scene.path)
 
 
 @dataclass(frozen=True)
@@ -141,10 +139,10 @@ def _page(scene: Scene, seen: StartView) -> bytes:
 def _body(recipe: Path) -> xr.Dataset:
     """What is rigid of a mesh, and what is drawn of it."""
     from flexclear.pipeline.structure.kinds import kind
-    from flexclear.pipeline.structure.modes import rigid
+    from flexclear.pipeline.structure.modes import bundle
 
     table: dict[str, Any] = meshing.params(recipe)["recipe"]
-    return rigid.drawn(kind.build(table, recipe.parent))
+    return bundle.drawn(kind.build(table, recipe.parent))
 
 
 def _unplaced(scene: Scene) -> list[str]:

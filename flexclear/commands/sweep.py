@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import pickle
 import shutil
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages.sweeps import sweep_large, sweep_plan
-from flexclear.stages.sweeps.sweep_engine import Engine, Job, engine, now
+from flexclear.stages.sweeps.sweep_engine import Engine, Job, engine
 from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ OFTEN, FRACTION = 2.0, 0.01
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
-    add_options(parser, "usual", "json", jobs={"also": ("--workers",)})
+    add_options(parser, "usual", "json")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help=f"copy the dataset here (one sweep): {export.KNOWN}, .zarr"
@@ -114,8 +115,8 @@ class _Desk:
     waiting: list[tuple[Job, Point]] = field(default_factory=list)
     here: bool = True  #: whether this machine computes them
     large: bool = False  #: values are left out of `done`: they are in the store, and memory does not hold them
-    begun: float = field(default_factory=now)
-    stored: float = field(default_factory=now)
+    begun: float = field(default_factory=time.monotonic)
+    stored: float = field(default_factory=time.monotonic)
     fresh: int = 0
     refused: int = 0
 
@@ -128,8 +129,8 @@ class _Desk:
         self.done |= {job.key: sweep_large.stripped(point) if self.large else point for job, point in finished}
         self.fresh += len(finished)
         self.refused += sum(bool(point.refused) for _, point in finished)
-        since = now() - self.begun
-        if now() - self.stored > max(OFTEN, FRACTION * since):
+        since = time.monotonic() - self.begun
+        if time.monotonic() - self.stored > max(OFTEN, FRACTION * since):
             self.store()
         text = f", {self.refused} refused" if self.refused else ""
         rate = self.fresh / since if since > 0.0 else 0.0
@@ -137,7 +138,7 @@ class _Desk:
 
     def store(self) -> None:
         """Put what waits into the cache, family by family."""
-        self.stored = now()
+        self.stored = time.monotonic()
         for family in self.plan.families:
             mine = {job.key: point for job, point in self.waiting if job.family == family.key}
             if mine:

@@ -17,6 +17,9 @@ from flexclear.papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLA
 from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, common_times
 from flexclear.pipeline.core.numerics.rotations import angle_about_y, rotation_between
 
+#: what is compared of two runs
+COMPARED = ("quaternion", "position", "velocity")
+
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
@@ -43,7 +46,7 @@ def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: floa
     i, j = i[inside], j[inside]
     if i.size == 0:
         raise ValueError("the two runs have no output time in common")
-    return _compare(_motion(run, body), i, _motion(reference, body), j, run.time.values)
+    return _compare(run, i, reference, j, body)
 
 
 def velocity_at_events(run: xr.Dataset, smooth: xr.Dataset, body: str, until: float = np.inf) -> tuple[float, float]:
@@ -64,31 +67,19 @@ def velocity_at_events(run: xr.Dataset, smooth: xr.Dataset, body: str, until: fl
 def ensemble_deviations(ensemble: xr.Dataset, reference: xr.Dataset, body: str) -> list[Deviation]:
     """`max_deviation` of every member over the whole run; members in order."""
     i, j = common_times(ensemble.time.values, reference.time.values)
-    other = _motion(reference, body)
-    members = (ensemble.isel(member=k) for k in range(ensemble.sizes["member"]))
-    return [_compare(_motion(member, body), i, other, j, ensemble.time.values) for member in members]
+    members = (ensemble[list(COMPARED)].isel(member=k) for k in range(ensemble.sizes["member"]))
+    return [_compare(member, i, reference, j, body) for member in members]
 
 
-@dataclass(frozen=True, slots=True)
-class _Motion:
-    quaternion: np.ndarray
-    z: np.ndarray
-    vz: np.ndarray
-
-
-def _motion(run: xr.Dataset, body: str) -> _Motion:
-    one = run.sel(body=body)
-    return _Motion(one.quaternion.values, one.position.values[:, 2], one.velocity.values[:, 2])
-
-
-def _compare(a: _Motion, i: np.ndarray, b: _Motion, j: np.ndarray, time: np.ndarray) -> Deviation:
-    qa, qb = a.quaternion[i], b.quaternion[j]
+def _compare(run: xr.Dataset, i: np.ndarray, reference: xr.Dataset, j: np.ndarray, body: str) -> Deviation:
+    a, b = (one[list(COMPARED)].sel(body=body).isel(time=k) for one, k in ((run, i), (reference, j)))
+    qa, qb = a.quaternion.values, b.quaternion.values
     return Deviation(
         angle=_largest(angle_about_y(qa) - angle_about_y(qb)),
         rotation=_largest(rotation_between(qa, qb)),
-        displacement=_largest(a.z[i] - b.z[j]),
-        velocity=_largest(a.vz[i] - b.vz[j]),
-        until=float(time[i].max()),
+        displacement=_largest(a.position.values[:, 2] - b.position.values[:, 2]),
+        velocity=_largest(a.velocity.values[:, 2] - b.velocity.values[:, 2]),
+        until=float(a.time.max()),
     )
 
 
@@ -174,8 +165,3 @@ def differ(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether the means of two ensembles' members do, by `SLIGHT` and by `APART`."""
     gap, spread = abs(a.mean() - b.mean()), max(a.std(ddof=1), b.std(ddof=1))
     return bool(gap > SLIGHT * abs(b.mean()) and gap > SEPARATION * spread)
-
-
-def mode_set(model: Model) -> str:
-    """The name of a model's modes, such as `free-free`; empty where its rod is rigid."""
-    return model.label.partition(", ")[2].split(" ")[0]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+
+from flexclear.pipeline.core.artifacts.quantities import common_times
 
 PLATFORM = "platform"
 JOINT = "A1"
@@ -47,11 +49,17 @@ def references(models: Sequence[Model], *artifacts: str) -> tuple[str, ...]:
     return tuple(f"{model.scene}:{artifact}" for model in models for artifact in artifacts)
 
 
+def mode_set(model: Model) -> str:
+    """The name of a model's modes, such as `free-free`; empty where its rod is rigid."""
+    return model.label.partition(", ")[2].split(" ")[0]
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
     """The six quantities of figures 11-13 for one run, in the paper's units."""
 
     model: Model
+    post: xr.Dataset  #: what follows from the run
     time: np.ndarray  #: [s]
     angle: np.ndarray  #: about y0 [rad]
     displacement: np.ndarray  #: z [mm]
@@ -63,12 +71,44 @@ class Motion:
     impacts: np.ndarray  #: middle [s] and largest normal force [N] of each impact, shape (impact, 2)
 
 
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What figures show over time. `jumps`: impacts drive it far out of the ideal model's range."""
+
+    title: str
+    unit: str
+    values: Callable[[Motion], np.ndarray]
+    ensemble: tuple[str, float]  #: variable of the post artifact, factor to the unit
+    jumps: bool = False
+
+    @property
+    def label(self) -> str:
+        """Title and unit, for an axis."""
+        return f"{self.title} ({self.unit})"
+
+
+ANGLE = Quantity("angle about y0", "rad", lambda m: m.angle, ("rotation_y", 1.0))
+DISPLACEMENT = Quantity("displacement along z0", "mm", lambda m: m.displacement, ("displacement", 1e3))
+VELOCITY = Quantity("velocity along z0", "mm/s", lambda m: m.velocity, ("velocity", 1e3))
+ACCELERATION = Quantity(
+    "acceleration along z0", "10³ mm/s²", lambda m: 1e-3 * m.acceleration, ("acceleration", 1.0), jumps=True
+)
+REACTION = Quantity("reaction force at A1", "N", lambda m: m.reaction, ("normal_force", 1.0), jumps=True)
+
+
+def minus(motion: Motion, reference: Motion, values: Callable[[Motion], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Times that both motions have, and values of the first minus those of the reference there."""
+    i, j = common_times(motion.time, reference.time)
+    return motion.time[i], values(motion)[i] - values(reference)[j]
+
+
 def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
     """The paper's quantities of one model out of its run and post artifacts."""
     run, post = data[f"{model.scene}:run"], data[f"{model.scene}:post"]
     platform = run.sel(body=PLATFORM)
     return Motion(
         model=model,
+        post=post,
         time=run.time.values,
         angle=post.rotation_y.sel(body=PLATFORM).values,
         displacement=1e3 * post.displacement.sel(body=PLATFORM, axis="z").values,

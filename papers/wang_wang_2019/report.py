@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019 import figures
+from flexclear.papers.wang_wang_2019 import DOCUMENTS, figures
 from flexclear.papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.pages import Part, downloads, figures_of, media, page, prose
@@ -23,28 +23,8 @@ from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, from_
 if TYPE_CHECKING:
     from flexclear.pipeline.core.system.progress import Progress
 
-#: what the page shows of the project's own pages: heading, file, sections, endings of the pictures
-DOCUMENTS: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...]]] = {
-    "accuracy": (
-        "Accuracy against time",
-        "accuracy.md",
-        ("What to choose", "sps4/csj", "sps4/far_csj_cb"),
-        ("work_precision.png",),
-    ),
-    "stability": (
-        "Stability: hard cases, and what became of each",
-        "stability.md",
-        ("", "One parameter at a time"),
-        ("sweeps.png",),
-    ),
-    "chaos": ("Periodic or chaotic", "chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
-    "conditions": (
-        "Reference conditions of the modes",
-        "reference-conditions.md",
-        ("In short", "What holds of the paper's statements"),
-        (),
-    ),
-}
+#: place, text and scenes
+Assumption = tuple[str, str, tuple[str, ...]]
 #: of a run's attributes, those that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
 
@@ -93,7 +73,7 @@ def collect(
 
 
 def _documents(docs: Path) -> dict[str, str]:
-    return {key: section(docs / file, heads, endings) for key, (_, file, heads, endings) in DOCUMENTS.items()}
+    return {name: section(docs / f"{name}.md", heads, endings) for name, (_, heads, endings) in DOCUMENTS.items()}
 
 
 def _variants(folder: Path) -> list[tuple[str, str]]:
@@ -114,17 +94,13 @@ def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
     return by_scene
 
 
-def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Each assumption once, with the scenes that make it; paths in alphabetical order."""
+def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> list[Assumption]:
+    """Each assumption once, with the scenes that make it; places in alphabetical order."""
     scenes: dict[tuple[str, str], list[str]] = {}
     for scene, facts in attributes.items():
         for where, text in json.loads(str(facts.get("assumptions", "{}"))).items():
             scenes.setdefault((where, text), []).append(scene)
-    result: dict[str, tuple[str, tuple[str, ...]]] = {}
-    for (where, text), names in sorted(scenes.items()):
-        key = where if where not in result else f"{where} ({', '.join(names)})"
-        result[key] = (text, tuple(names))
-    return result
+    return [(where, text, tuple(names)) for (where, text), names in sorted(scenes.items())]
 
 
 def paper_markdown(content: Content) -> str:
@@ -133,9 +109,8 @@ def paper_markdown(content: Content) -> str:
         "# The paper, reproduced\n",
         f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
         "commands next to it.\n",
-        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear "
-        "report` draws every figure and table "
-        "into `results/figures` and `results/tables`.\n",
+        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear report` "
+        "draws every figure and table into `results/figures` and `results/tables`.\n",
         "## Figures and tables\n",
         _index(),
         "## Tables\n",
@@ -159,9 +134,9 @@ def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
     """
     total = len(content.facts)
     grouped: dict[tuple[str, str], list[str]] = {}
-    for path, (text, scenes) in sorted(content.assumptions.items(), key=lambda item: weight(item[0])):
+    for path, text, scenes in sorted(content.assumptions, key=lambda assumption: weight(assumption[0])):
         where = "all" if len(scenes) == total else ", ".join(scene.partition("/")[2] or scene for scene in scenes)
-        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(path.partition(" (")[0])
+        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(path)
     return [(", ".join(f"`{path}`" for path in places), text, where) for (text, where), places in grouped.items()]
 
 
@@ -267,7 +242,7 @@ class Content:
     """All that the page shows."""
 
     tables: Mapping[str, Table]
-    assumptions: Mapping[str, tuple[str, tuple[str, ...]]]  #: place -> (text, scenes)
+    assumptions: Sequence[Assumption]
     images: Mapping[str, bytes]  #: PNG of each figure, by name
     film: tuple[str, bytes] | None  #: file name and content
     still: bytes | None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from flexclear.papers.wang_wang_2019 import figures, timing
+from flexclear.papers.wang_wang_2019 import DOCUMENTS, figures, timing
 from flexclear.pipeline.core.artifacts.paths import DATA, TREE
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.scene.load import load_scene
@@ -21,7 +21,6 @@ from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, check
 
 #: files that the page shows parts of, below the folder of the sources: pages, their pictures, variants of scenes
-DOCUMENTS = ("accuracy", "chaos", "reference-conditions", "stability")
 PAGES = [pattern for name in DOCUMENTS for pattern in (f"docs/{name}.md", f"docs/{name}/*.png")]
 PAGES += ["scenes/sps4/variants/*.toml"]
 #: the scene whose film and pictures the page shows: the paper's full model

@@ -232,7 +232,7 @@ def _quiet(library: str) -> Iterator[None]:
 
 def _on_cluster(client: Any, where: str) -> Engine:
     """The engine of a cluster; points that are lost with a worker are run by another one, as its scheduler sees to."""
-    executor, seen = client.get_executor(), [now(), _threads(client, where)]
+    executor, seen = client.get_executor(), [time.monotonic(), _threads(client, where)]
     held: dict[str, Any] = {}
 
     def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
@@ -244,8 +244,8 @@ def _on_cluster(client: Any, where: str) -> Engine:
 
     def width() -> int:
         """Workers may come and go."""
-        if now() - seen[0] > LOOK:
-            seen[:] = now(), sum(client.nthreads().values())
+        if time.monotonic() - seen[0] > LOOK:
+            seen[:] = time.monotonic(), sum(client.nthreads().values())
         return max(1, int(seen[1]))
 
     return Engine(submit, width, here=False)
@@ -271,9 +271,9 @@ def _threads(client: Any, where: str) -> int:
         if not failed:
             break
         end = min(
-            end, now() + SCHEDULER_TIMEOUT
+            end, time.monotonic() + SCHEDULER_TIMEOUT
         )  # from the first failure on: the check itself may have waited for a worker
-        if now() > end:
+        if time.monotonic() > end:
             worker, error = next(iter(failed.items()))
             raise ResourceError(f"{where}: worker {worker} does not answer ({error}); is its memory full?")
         time.sleep(TICK)  # the scheduler removes workers that have died, and the others are asked again
@@ -281,8 +281,3 @@ def _threads(client: Any, where: str) -> int:
     if others:
         raise InputError(where, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
     return int(threads)
-
-
-def now() -> float:
-    """Clock for rates [s]."""
-    return time.monotonic()

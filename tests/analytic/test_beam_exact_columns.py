@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.structure.closed_form import comparison
+from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
@@ -32,7 +32,7 @@ def test_held_ends_have_their_exact_frequencies(reference: str, interfaces: tupl
     rod = build(**FINE, theory=theory)
     families = LOWEST[reference]
     found = solve(rod, reference, len(families), interfaces)["frequency"].values
-    expected = comparison.columns(rod, reference, families, interfaces)[THEORIES[theory]]
+    expected = closed_form.columns(rod, reference, families, interfaces)[THEORIES[theory]]
     # the third pair of bending with 24 elements: 3e-5
     np.testing.assert_allclose(found, expected, rtol=1e-4)
 
@@ -40,8 +40,8 @@ def test_held_ends_have_their_exact_frequencies(reference: str, interfaces: tupl
 def test_an_interface_inside_the_rod_has_no_closed_form() -> None:
     rod = build(frames={"bottom": {"x": 0.0}, "inside": {"x": 0.06}, "top": {"x": 0.24}})
     for reference in ("cantilever", "pinned-pinned"):
-        assert comparison.columns(rod, reference, ["bending_y"], ("inside", "top")) == {}
-    assert comparison.columns(rod, "craig-bampton", ["bending_y"], ("bottom", "top")) == {}
+        assert closed_form.columns(rod, reference, ["bending_y"], ("inside", "top")) == {}
+    assert closed_form.columns(rod, "craig-bampton", ["bending_y"], ("bottom", "top")) == {}
 
 
 @pytest.mark.parametrize(
@@ -63,12 +63,12 @@ def test_an_interface_inside_the_rod_has_no_closed_form() -> None:
     ids=["mass", "taper", "skew"],
 )
 def test_other_rods_have_none(changes: dict[str, Any]) -> None:
-    assert comparison.columns(build(**changes), "free-free", ["bending_y"]) == {}
+    assert closed_form.columns(build(**changes), "free-free", ["bending_y"]) == {}
 
 
 def test_a_section_without_kappa_has_no_timoshenko_column() -> None:
     section = {"type": "general", "area": 3e-4, "torsion": 1e-8, "second_y": 8e-9, "second_z": 5e-9}
-    assert set(comparison.columns(build(section=section), "free-free", ["bending_y"])) == {
+    assert set(closed_form.columns(build(section=section), "free-free", ["bending_y"])) == {
         "exact_euler_bernoulli",
         "exact_rayleigh",
     }

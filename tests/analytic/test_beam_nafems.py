@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.structure.closed_form import frequencies as closed_form
+from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind

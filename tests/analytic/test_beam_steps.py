@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.structure.closed_form import frequencies as closed_form
+from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.slices import slices
 from flexclear.pipeline.structure.kinds import kind
@@ -162,3 +162,15 @@ def test_closed_forms_miss_no_frequency(held: tuple[str, str], ends: str) -> Non
     expected = np.sort(np.concatenate([bending, *waves]))[:16]
     assert expected[-1] > math.sqrt(shear / (RHO * second)) / (2.0 * math.pi)
     np.testing.assert_allclose(frequencies([rod], [], held, 16, parts=8), expected, rtol=1e-8)
+
+
+def test_each_cell_is_drawn_with_its_own_section() -> None:
+    """Round cells stay round next to rectangular ones, and tubes have their outer radius."""
+    rod = kind.build(recipe((1, 1, 1), "rayleigh"))
+    outline = kind.of_mesh(rod).assemble(rod).drawn.outline
+    assert outline is not None
+    distance = np.linalg.norm(outline, axis=2)
+    # lengths follow from areas and second moments by square roots, which round by some eps
+    np.testing.assert_allclose(distance[0], 0.008, rtol=1e-13)
+    np.testing.assert_allclose(distance[1], 0.01, rtol=1e-13)
+    np.testing.assert_allclose(distance[2].max(), np.hypot(0.01, 0.006), rtol=1e-13)

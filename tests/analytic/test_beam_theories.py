@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from flexclear.pipeline.structure.closed_form import frequencies as closed_form
-from flexclear.pipeline.structure.closed_form.frequencies import Span
+from flexclear.pipeline.structure import closed_form
+from flexclear.pipeline.structure.closed_form import Span
 from flexclear.pipeline.structure.fe.section import tube_shear_coefficient
 from tests.analytic.beam_models import (
     BENDING,

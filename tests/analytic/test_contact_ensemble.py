@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation, speci
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engines
-from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.single_run.series import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import joint, rigid
 from tests.properties.mechanisms import scene as written

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.single_run.series import derive
 from tests.analytic.mechanism_runs import run
 
 DENSER = 50

@@ -14,8 +14,8 @@ from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.modes import compliance, eigen
-from flexclear.pipeline.structure.modes.select import ModeRequest
+from flexclear.pipeline.structure.modes import deficits, eigen
+from flexclear.pipeline.structure.modes.basis import ModeRequest
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
@@ -54,7 +54,7 @@ def test_complete_sets_span_the_same_space(rod: xr.Dataset, body: Flexibility, c
     assert vectors.shape == (78, 72)
     together = np.hstack([model.rigid, vectors])
     assert np.linalg.matrix_rank(together / np.linalg.norm(together, axis=0)) == 78
-    fraction = compliance.of_basis(body, model.interfaces, vectors) / compliance.full(body, model.interfaces)
+    fraction = deficits.of_basis(body, model.interfaces, vectors) / deficits.full(body, model.interfaces)
     # the eigenvalues of the basis span 1e9; what is left of rounding in a static answer is about its root
     np.testing.assert_allclose(fraction, 1.0, rtol=0.0, atol=1e-7)
     values, _ = eigen.rediagonalise(model.stiffness, model.mass, body.relieved(vectors))
@@ -88,13 +88,13 @@ def test_pinned_rods_have_the_frequencies_of_theory(rod: xr.Dataset) -> None:
 
 def test_attachment_modes_have_the_free_rods_answer_to_an_end_load(rod: xr.Dataset, body: Flexibility) -> None:
     """A force on the end of a free rod, balanced by its inertia, moves that end by F L / 3 E A from the mean."""
-    whole = compliance.full(body, body.model.interfaces)
+    whole = deficits.full(body, body.model.interfaces)
     axial = whole[3, 3, 2]  # frame `top` against nothing, z of the frame runs along the rod
     # 12 linear elements: constant strain where the true one is linear loses 1 / 4 n^2 of the energy
     assert axial == pytest.approx(L / (3.0 * E * A) * (1.0 - 0.25 / 144), rel=1e-9)
     for condition in ("craig-chang", "residual-flexibility"):
         found = solve(rod, condition, 19)["vector"].values
-        fraction = compliance.of_basis(body, body.model.interfaces, found) / whole
+        fraction = deficits.of_basis(body, body.model.interfaces, found) / whole
         # both frames are loaded: all their compliance is there, held or free
         np.testing.assert_allclose(fraction[np.ix_([0, 3], [0, 3])], 1.0, rtol=0.0, atol=1e-9)
 
@@ -142,9 +142,9 @@ def test_modes_up_to_a_share_of_the_compliance(rod: xr.Dataset, body: Flexibilit
     ends = (body.model.interfaces[0], body.model.interfaces[3])
     found = solve(rod, "free-free", requested=ModeRequest(compliance=0.9))
     n = found.sizes["mode"]
-    assert compliance.least(body, ends, found["vector"].values)[0] >= 0.9
+    assert deficits.least(body, ends, found["vector"].values)[0] >= 0.9
     # the next smaller whole basis would not do
-    assert compliance.least(body, ends, found["vector"].values[:, : n - 2])[0] < 0.9
+    assert deficits.least(body, ends, found["vector"].values[:, : n - 2])[0] < 0.9
     assert solve(rod, "craig-bampton", requested=ModeRequest(compliance=1.0 - 1e-9)).sizes["mode"] == 6
 
 

@@ -94,7 +94,7 @@ def test_what_cannot_be_looked_at_is_refused(pendulum: Scene, change: dict[str, 
 
 
 def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sections", "scenes/checks/pendulum.toml", "--transient", "0", "--periods", "20"]) == 2
+    assert main(["sections", "scenes/checks/pendulum.toml", "--set", "sections.periods=20"]) == 2
     assert "no drive and no load has a law of time" in capsys.readouterr().err
 
 

@@ -162,6 +162,12 @@ def test_files_that_do_not_fit_together_are_refused(tmp_path: Path, solid: xr.Da
     with pytest.raises(InputError, match=r"\[shape.units\]: is missing"):
         build(bare, tmp_path)
     lines = (tmp_path / "unknowns.csv").read_text().splitlines()
+    # two nodes of one number
+    (tmp_path / "unknowns.csv").write_text(
+        "\n".join("1," + line[2:] if line.startswith("2,") else line for line in lines)
+    )
+    with pytest.raises(InputError, match="node 1 has 2 unknowns ux"):
+        build(recipe(THREE, frames | {"bottom": {"nodes": [1, 3, 4]}}), tmp_path)
     (tmp_path / "unknowns.csv").write_text("\n".join(lines[:-1]))
     with pytest.raises(InputError, match=r"'stiffness.mtx' has the shape .* lines"):
         build(recipe(THREE, frames), tmp_path)

@@ -14,8 +14,7 @@ from flexclear.pipeline.dynamics.record.stress import peak_stresses, section_for
 from flexclear.pipeline.structure.fe import section as sections
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.pipeline.structure.stress.beam import recover
-from flexclear.pipeline.structure.stress.outline import Outline, outline
+from flexclear.pipeline.structure.stress.beam import Outline, outline, recover
 from flexclear.stages.graph import Graph
 from tests.analytic.beam_models import build
 
@@ -116,7 +115,7 @@ def test_round_outlines_carry_no_shear_across_themselves(
 @pytest.mark.parametrize("hole", [0.0, HOLE])
 def test_shear_of_a_round_section_sums_to_its_force(hole: float) -> None:
     """Midpoint rule on rings made of the maps of thin tubes would hide the hole; so fibres of the solution itself."""
-    from flexclear.pipeline.structure.stress.outline import _flexure
+    from flexclear.pipeline.structure.stress.beam import _flexure
 
     n = 200
     r = hole + (np.arange(n) + 0.5) / n * (R - hole)

@@ -7,8 +7,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.schema import RUN
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.single_run.series import PIECES, spread_over_surface
+from flexclear.pipeline.post.single_run.series import PIECES, derive, spread_over_surface
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import Table, joint, scene, simulate
 

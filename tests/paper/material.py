@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.single_run.series import derive
 from tests.paper import synthetic
 
 #: deviations of the made-up runs from the made-up ideal one: wobble of z [m]

@@ -63,6 +63,7 @@ def run(name: str = "sps4/ideal", *, clearance: bool = False, modes: int = 0, no
         wave = [1e-5 / (k + 1) * np.sin(2 * np.pi * 40.0 * (k + 1) * time) for k in range(modes)]
         data["modal_coordinate"] = (("time", "mode"), np.stack(wave, axis=1))
         coords["mode"] = [f"rod1.{k + 1}" for k in range(modes)]
+        coords["mode_body"] = ("mode", ["rod1"] * modes)
     attrs = {
         "scene": name,
         "title": f"made-up {name}",

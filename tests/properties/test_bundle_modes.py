@@ -15,7 +15,7 @@ from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.modes import eigen, normal, reference, select
+from flexclear.pipeline.structure.modes import eigen, normal, reference
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 from tests.processes import printed
@@ -183,11 +183,11 @@ def gap(values: np.ndarray) -> tuple[int, float]:
 
 
 def test_rigid_modes_are_told_by_a_gap() -> None:
-    select.without_rigid(np.array([0.0, 1e-3, 1e-2, 9e7]), 3)
+    eigen.without_rigid(np.array([0.0, 1e-3, 1e-2, 9e7]), 3)
     with pytest.raises(SolverError, match="expected below a gap"):
-        select.without_rigid(np.array([0.0, 1e-3, 1e6, 9e7]), 3)  # a mechanism or a missing rigid mode
+        eigen.without_rigid(np.array([0.0, 1e-3, 1e6, 9e7]), 3)  # a mechanism or a missing rigid mode
     with pytest.raises(SolverError, match="expected below a gap"):
-        select.without_rigid(np.array([0.0, 1e-3, 1e-2, 1.1e-2, 9e7]), 3)
+        eigen.without_rigid(np.array([0.0, 1e-3, 1e-2, 1.1e-2, 9e7]), 3)
 
 
 def test_a_body_a_million_times_softer_keeps_its_modes() -> None:

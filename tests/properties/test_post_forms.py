@@ -23,7 +23,7 @@ from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, surface
 from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes.rigid import drawn
+from flexclear.pipeline.structure.modes.bundle import drawn
 from flexclear.stages import rendering, simulation
 from tests.paper import synthetic
 

@@ -7,16 +7,15 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.render import gl
 from flexclear.pipeline.post.render.forms import equivalent
 from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.shapes import body_shape
-from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, centre_line
-from flexclear.pipeline.post.shapes.body_shape import rod_scale_to as scale_to
+from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scale_to
 from flexclear.pipeline.post.shapes.body_shape import rod_surface as surface
+from flexclear.pipeline.post.single_run.series import derive
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)

@@ -16,8 +16,7 @@ from flexclear.pipeline.core.numerics.rotations import (
     rotation_vector_to_quaternion,
     turning,
 )
-from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.single_run.series import horizon, spread
+from flexclear.pipeline.post.single_run.series import derive, horizon, spread
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)

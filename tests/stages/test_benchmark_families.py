@@ -13,7 +13,7 @@ from matplotlib.image import imread
 
 from benchmarks import command_parts, families, log, page, plan_scenes
 from benchmarks.__main__ import main
-from benchmarks.families import commands, solids
+from benchmarks.families import solids
 from benchmarks.family import Case, Family
 from benchmarks.log import Session
 from flexclear.pipeline.core.system.errors import InputError
@@ -117,18 +117,6 @@ def test_the_parts_of_a_solid_s_work_add_up():
     assert idle == {"normal modes", "counting them, by another factorisation"}
     assert record["displacements"] == 3 * 7 * 4 * 4
     assert "336" in str(solids.FAMILY.show([{"case": "small", **record}]))
-
-
-def test_what_was_measured_before_commands_were_waited_for_is_shown_beside_what_is():
-    before = {"case": "check csj", "cpu": {"s": 0.25, "spread": 0.01}, "parts": {"imports": 0.2}}
-    now = before | {"wall": {"s": 0.5, "spread": 0.02}, "processors": 2}
-    assert "wall" not in str(commands.show([before]))
-    rows = [[cell.strip() for cell in line.split("|")[1:5]] for line in str(commands.show([before, now])).splitlines()]
-    assert rows[0] == ["command", "CPU [s]", "wall [s]", "processors"]
-    assert rows[2:4] == [
-        ["check csj", "0.25 ± 1.0 %", "", ""],
-        ["check csj", "0.25 ± 1.0 %", "0.50 ± 2.0 %", "2"],
-    ]
 
 
 def test_parts_of_a_command_are_told_apart_in_each_of_its_threads(monkeypatch: pytest.MonkeyPatch):

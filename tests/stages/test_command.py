@@ -84,7 +84,7 @@ def test_scenes_are_named_by_file_or_by_name(command: Command, root: Path):
         (["fly"], "fly: there is no such command\n  hint: known: cache, check,"),
         (["a.toml"], "a.toml: is no command\n  hint: a command comes first, as in: flexclear check a.toml"),
         (["run", "checks/pendulum", "--jbos", "2"], "--jbos: there is no such option\n  hint: did you mean '--jobs'?"),
-        (["sweep", "a", "--workes=3"], "--workes: there is no such option\n  hint: did you mean '--workers'?"),
+        (["sweep", "a", "--jbos=3"], "--jbos: there is no such option\n  hint: did you mean '--jobs'?"),
     ],
 )
 def test_a_misspelt_command_or_option_gets_the_nearest_one(command: Command, arguments: list[str], said: str):

@@ -19,7 +19,7 @@ from flexclear.pipeline.post import pages
 from flexclear.pipeline.post.overview import comparison, curves, figures
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import rigid
+from flexclear.pipeline.structure.modes import bundle
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
@@ -34,7 +34,7 @@ def crank(tmp_path: Path) -> Path:
 def test_a_rigid_body_from_a_recipe_has_mass_and_inertia_of_the_bar(tmp_path: Path):
     """A uniform bar: m = rho A l, m l^2/12 across; about its length and through its depth as closed form."""
     _, recipe = write("slider-crank", tmp_path)
-    found = rigid.build(kind.build(read_recipe(recipe)))
+    found = bundle.rigid(kind.build(read_recipe(recipe)))
     length, b, h, density = 0.2, 0.012, 0.008, 7850.0
     mass = density * b * h * length
     # integrals over a beam of constant section are exact but for rounding, some 1e-15
@@ -55,7 +55,7 @@ def test_no_modes_make_a_rigid_body_and_so_does_the_recipe_alone(crank: Path):
         assert not graph.modes
     pose = {"position": [0.05, 0, 0]}
     table = {"rod": {"type": "rigid", "mesh": "rod.toml", "pose": pose}}
-    data = rigid.build(kind.build(read_recipe(crank.parent / "rod.toml")))
+    data = bundle.rigid(kind.build(read_recipe(crank.parent / "rod.toml")))
     filled = simulation.filled(table, {"rigid/rod": data})["rod"]
     assert filled["mass"] == float(data["mass"])
     assert set(filled["frames"]) == {"big_end", "middle", "small_end"}

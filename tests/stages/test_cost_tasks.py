@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from flexclear.commands import cost, cost_design, scenes
 from flexclear.commands.cost_design import Setting
@@ -161,6 +162,19 @@ def test_points_keep_the_limits_of_the_scene(csj: Scene):
     limited = edited(csj, {"solver": {"rtol": 1e-7, "evaluations": 1234}})
     designs = [*cost_design.neighbours(limited, OWN), *cost_design.wide(limited)]
     assert {design.scene.solver.evaluations for design in designs} == {1234}
+
+
+def test_a_method_that_used_up_its_evaluations_is_run_at_no_tighter_tolerance(
+    swing: Scene, place: Workplace, monkeypatch: pytest.MonkeyPatch
+):
+    refused = xr.Dataset(attrs={"refused": "the limit of 100000 evaluations is used up ([solver.evaluations])"})
+    refused.attrs["compile_seconds"] = 1.0
+    monkeypatch.setattr(Workplace, "datasets", lambda _, *tasks: [refused] * len(tasks))
+    study = cost.Study(swing, place, seconds=1e9, own=1e4, seconds_each=1e-6)
+    first, *tighter = [design for design in cost_design.wide(swing, ("radau",)) if design.group == "tolerance"]
+    study._queue([first, *tighter])
+    assert [design.key for design in study.points] == [first.key]
+    assert study.undone == tighter
 
 
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, command: Command):

@@ -24,7 +24,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import simulate
-from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.single_run.series import derive
 
 #: symbols of UDUNITS-2 that datasets use; a product of them, each with an integer exponent, is a unit
 SYMBOLS = ("kg", "m", "s", "N", "Pa", "J", "W", "Hz", "rad")

@@ -27,8 +27,8 @@ from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import pieces, trajectory
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.overview import comparison
+from flexclear.pipeline.post.single_run.series import derive
 from tests.analytic.integrator_scenes import double_pendulum, engine_with
 
 #: evaluations between two looks, so few that a short run has many

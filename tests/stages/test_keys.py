@@ -259,7 +259,7 @@ def test_content_of_the_recipe_counts(root: Path, copy: Path, sources: Sources):
         ("pipeline/dynamics/contact/friction/modified_coulomb.py", {"sps4/csj"}),
         ("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", {"sps4/csj"}),
         ("pipeline/dynamics/joints/turn_and_slide.py", {"sps4/ideal", "sps4/csj", "sps4/far_cb"}),
-        ("pipeline/structure/modes/reference/craig_bampton.py", {"sps4/far_cb"}),
+        ("pipeline/structure/modes/reference/held.py", {"sps4/far_cb"}),
         ("pipeline/dynamics/loads/gravity.py", set()),
         ("papers/wang_wang_2019/figures/panels.py", set()),
     ],

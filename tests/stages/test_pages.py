@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.post.pages import Part, downloads, listed, media, page, viewer
+from flexclear.pipeline.post.pages import Part, downloads, media, page, prose, viewer
 from flexclear.pipeline.post.plotting.table import Table, as_html
 from flexclear.pipeline.post.render import film_speed, player
 from flexclear.pipeline.post.render.mechanism import mechanism
@@ -43,7 +43,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
             viewer(player.motion(mechanism(run, {"rod1": bundle}), 24), "Motion")
             + viewer(player.modes(bundle), "Modes", play=True),
         ),
-        Part("tables", "Tables", as_html(table) + listed({"body.rod1.modes": "assumed: " + "long " * 60}, ("v", "a"))),
+        Part("tables", "Tables", as_html(table) + prose(("v", "a"), [("body.rod1.modes", "assumed: " + "long " * 60)])),
         Part("downloads", "Files", downloads({"scene.toml": b"title = 'x'"})),
     ]
     path = tmp_path_factory.mktemp("page") / "report.html"
@@ -51,21 +51,106 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def opened(window: Browser, path: Path, size: tuple[int, int] = DESK) -> Browser:
+def opened(window: Browser, path: Path, size: tuple[int, int]) -> Browser:
     window.size(*size)
     window.open(path)
     window.wait("return document.readyState === 'complete'")
     return window
 
 
-def test_a_page_has_no_errors_asks_for_nothing_and_all_of_it_loads(window: Browser, report: Path):
-    opened(window, report)
-    window.wait("return [...document.querySelectorAll('.viewer')].every((v) => v.viewer)")
-    assert window.run("return [...document.images].filter((i) => !i.complete || !i.naturalWidth).length") == 0
-    errors, asked = window.logs()
+@pytest.fixture(scope="module")
+def desk(window: Browser, report: Path) -> Browser:
+    """The page in a large window with its views drawn, loaded once: each test looks at or moves another part of it."""
+    opened(window, report, DESK).wait("return [...document.querySelectorAll('.viewer')].every((v) => v.viewer)")
+    return window
+
+
+def test_a_page_has_no_errors_asks_for_nothing_and_all_of_it_loads(desk: Browser):
+    assert desk.run("return [...document.images].filter((i) => !i.complete || !i.naturalWidth).length") == 0
+    errors, asked = desk.logs()
     assert errors == []
     assert asked == []
-    assert window.run("return document.title") == "A report"
+    assert desk.run("return document.title") == "A report"
+
+
+def test_tables_sort_by_size_whatever_the_unit(desk: Browser):
+    read = (
+        "return [...document.querySelector('table.sorts').tBodies[0].rows].map((r) => r.cells[0].textContent).join('')"
+    )
+    click = "document.querySelector('table.sorts').tHead.rows[0].cells[arguments[0]].querySelector('button').click()"
+    desk.run(click, 1)
+    assert desk.run(read) == "abc"  # 900 µm, 2.5 mm, 1.2 m
+    desk.run(click, 1)
+    assert desk.run(read) == "cba"
+    desk.run(click, 2)
+    assert desk.run(read) == "abc"  # 9, 10, nothing
+    head = "return document.querySelector('table.sorts').tHead.rows[0].cells[2].getAttribute('aria-sort')"
+    assert desk.run(head) == "ascending"
+
+
+def test_a_film_plays(desk: Browser):
+    if not desk.run("return !!document.createElement('video').canPlayType('video/mp4; codecs=\"avc1.42E01E\"')"):
+        pytest.skip("this browser has no H.264")
+    desk.wait("return document.querySelector('video').readyState >= 2")
+    desk.run("const v = document.querySelector('video'); v.muted = true; v.play();")
+    assert desk.wait("return document.querySelector('video').currentTime > 0.1")
+
+
+PIXELS = (
+    "const c = document.querySelectorAll('.viewer canvas')[arguments[0]]; const d = document.createElement('canvas');"
+    "d.width = 120; d.height = 80; const x = d.getContext('2d'); x.drawImage(c, 0, 0, 120, 80);"
+    "return Array.from(x.getImageData(0, 0, 120, 80).data)"
+)
+
+
+def test_a_view_turns_by_mouse_and_keys_and_comes_back(desk: Browser):
+    first = np.array(desk.run(PIXELS, 0))
+    assert np.ptp(first.reshape(-1, 4), axis=0).max() > 50  # something is drawn
+    press = (
+        "const c = document.querySelectorAll('.viewer canvas')[0]; for (let k = 0; k < 5; k++)"
+        "c.dispatchEvent(new KeyboardEvent('keydown', { key: arguments[0] }))"
+    )
+    desk.run(press, "ArrowLeft")
+    turned = np.array(desk.run(PIXELS, 0))
+    assert np.abs(turned - first).max() > 50
+    desk.run("document.querySelectorAll('[data-part=home]')[0].click()")
+    np.testing.assert_allclose(desk.run(PIXELS, 0), first, atol=2)  # of 255: the canvas is drawn anew
+    drag = (
+        "const c = document.querySelectorAll('.viewer canvas')[0]; c.setPointerCapture = () => {};"
+        "for (const [kind, x] of [['down', 200], ['move', 260], ['up', 260]])"
+        "c.dispatchEvent(new PointerEvent('pointer' + kind, { pointerId: 1, clientX: x, clientY: 100 }))"
+    )
+    desk.run(drag)
+    assert np.abs(np.array(desk.run(PIXELS, 0)) - first).max() > 50
+
+
+def test_a_motion_runs_and_every_mode_can_be_chosen(desk: Browser):
+    state = "return document.querySelectorAll('.viewer-state')[arguments[0]].textContent"
+    assert desk.run(state, 0).startswith("t = 0.00 ms")
+    desk.run("document.querySelectorAll('[data-part=play]')[0].click()")
+    desk.wait("return !document.querySelectorAll('.viewer-state')[0].textContent.startsWith('t = 0.00 ms')")
+    assert desk.run("return document.querySelector('[data-part=shape]').options.length") == 7
+    desk.run("const s = document.querySelector('[data-part=shape]'); s.value = 6; s.dispatchEvent(new Event('change'))")
+    assert desk.run(state, 1).startswith("mode 7")
+    assert desk.logs()[0] == []
+
+
+def test_a_page_is_told_to_who_does_not_see_it(desk: Browser):
+    assert desk.run("return [...document.images].filter((i) => !i.alt).length") == 0
+    assert desk.run("return [...document.querySelectorAll('video, canvas')].filter((e) => !e.ariaLabel).length") == 0
+    assert desk.run("return [...document.querySelectorAll('h1, h2')].map((h) => h.tagName).join('')") == "H1" + 5 * "H2"
+    unnamed = "return [...document.querySelectorAll('input, select')].filter((e) => !e.closest('label')).length"
+    assert desk.run(unnamed) == 0
+    assert desk.run("return document.documentElement.lang") == "en"
+
+
+def test_a_page_prints(desk: Browser):
+    assert desk.printed().startswith(b"%PDF")
+    rule = (
+        "return [...document.styleSheets].flatMap((s) => [...s.cssRules]).filter((r) => r.media && "
+        "r.media.mediaText === 'print').some((r) => r.cssText.includes('break-inside: avoid'))"
+    )
+    assert desk.run(rule)
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -81,95 +166,3 @@ def test_a_page_fits_a_phone_and_can_be_read_in_the_dark(window: Browser, report
     # WCAG 2.2, 1.4.3: 4.5 to 1 at least
     assert (max(ink, back) + 0.05) / (min(ink, back) + 0.05) > 4.5
     assert (ink > back) == dark
-
-
-def test_tables_sort_by_size_whatever_the_unit(window: Browser, report: Path):
-    opened(window, report)
-    read = (
-        "return [...document.querySelector('table.sorts').tBodies[0].rows].map((r) => r.cells[0].textContent).join('')"
-    )
-    click = "document.querySelector('table.sorts').tHead.rows[0].cells[arguments[0]].querySelector('button').click()"
-    window.run(click, 1)
-    assert window.run(read) == "abc"  # 900 µm, 2.5 mm, 1.2 m
-    window.run(click, 1)
-    assert window.run(read) == "cba"
-    window.run(click, 2)
-    assert window.run(read) == "abc"  # 9, 10, nothing
-    head = "return document.querySelector('table.sorts').tHead.rows[0].cells[2].getAttribute('aria-sort')"
-    assert window.run(head) == "ascending"
-
-
-def test_a_film_plays(window: Browser, report: Path):
-    opened(window, report)
-    if not window.run("return !!document.createElement('video').canPlayType('video/mp4; codecs=\"avc1.42E01E\"')"):
-        pytest.skip("this browser has no H.264")
-    window.wait("return document.querySelector('video').readyState >= 2")
-    window.run("const v = document.querySelector('video'); v.muted = true; v.play();")
-    assert window.wait("return document.querySelector('video').currentTime > 0.1")
-
-
-PIXELS = (
-    "const c = document.querySelectorAll('.viewer canvas')[arguments[0]]; const d = document.createElement('canvas');"
-    "d.width = 120; d.height = 80; const x = d.getContext('2d'); x.drawImage(c, 0, 0, 120, 80);"
-    "return Array.from(x.getImageData(0, 0, 120, 80).data)"
-)
-
-
-def test_a_view_turns_by_mouse_and_keys_and_comes_back(window: Browser, report: Path):
-    opened(window, report)
-    window.wait("return document.querySelectorAll('.viewer')[0].viewer")
-    first = np.array(window.run(PIXELS, 0))
-    assert np.ptp(first.reshape(-1, 4), axis=0).max() > 50  # something is drawn
-    press = (
-        "const c = document.querySelectorAll('.viewer canvas')[0]; for (let k = 0; k < 5; k++)"
-        "c.dispatchEvent(new KeyboardEvent('keydown', { key: arguments[0] }))"
-    )
-    window.run(press, "ArrowLeft")
-    turned = np.array(window.run(PIXELS, 0))
-    assert np.abs(turned - first).max() > 50
-    window.run("document.querySelectorAll('[data-part=home]')[0].click()")
-    np.testing.assert_allclose(window.run(PIXELS, 0), first, atol=2)  # of 255: the canvas is drawn anew
-    drag = (
-        "const c = document.querySelectorAll('.viewer canvas')[0]; c.setPointerCapture = () => {};"
-        "for (const [kind, x] of [['down', 200], ['move', 260], ['up', 260]])"
-        "c.dispatchEvent(new PointerEvent('pointer' + kind, { pointerId: 1, clientX: x, clientY: 100 }))"
-    )
-    window.run(drag)
-    assert np.abs(np.array(window.run(PIXELS, 0)) - first).max() > 50
-
-
-def test_a_motion_runs_and_every_mode_can_be_chosen(window: Browser, report: Path):
-    opened(window, report)
-    window.wait("return [...document.querySelectorAll('.viewer')].every((v) => v.viewer)")
-    state = "return document.querySelectorAll('.viewer-state')[arguments[0]].textContent"
-    assert window.run(state, 0).startswith("t = 0.00 ms")
-    window.run("document.querySelectorAll('[data-part=play]')[0].click()")
-    window.wait("return !document.querySelectorAll('.viewer-state')[0].textContent.startsWith('t = 0.00 ms')")
-    assert window.run("return document.querySelector('[data-part=shape]').options.length") == 7
-    window.run(
-        "const s = document.querySelector('[data-part=shape]'); s.value = 6; s.dispatchEvent(new Event('change'))"
-    )
-    assert window.run(state, 1).startswith("mode 7")
-    assert window.logs()[0] == []
-
-
-def test_a_page_is_told_to_who_does_not_see_it(window: Browser, report: Path):
-    opened(window, report)
-    assert window.run("return [...document.images].filter((i) => !i.alt).length") == 0
-    assert window.run("return [...document.querySelectorAll('video, canvas')].filter((e) => !e.ariaLabel).length") == 0
-    assert (
-        window.run("return [...document.querySelectorAll('h1, h2')].map((h) => h.tagName).join('')") == "H1" + 5 * "H2"
-    )
-    unnamed = "return [...document.querySelectorAll('input, select')].filter((e) => !e.closest('label')).length"
-    assert window.run(unnamed) == 0
-    assert window.run("return document.documentElement.lang") == "en"
-
-
-def test_a_page_prints(window: Browser, report: Path):
-    opened(window, report)
-    assert window.printed().startswith(b"%PDF")
-    rule = (
-        "return [...document.styleSheets].flatMap((s) => [...s.cssRules]).filter((r) => r.media && "
-        "r.media.mediaText === 'print').some((r) => r.cssText.includes('break-inside: avoid'))"
-    )
-    assert window.run(rule)

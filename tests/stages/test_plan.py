@@ -304,7 +304,7 @@ def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Pa
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
 
 
-def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path):
+def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path, command: Command):
     """Let go without gravity it stays where it is; with it, it swings: the influence is the way it swings."""
     path = write("pendulum", tmp_path)[0]
     scene = edited(load_scene(path), {"time.end": 0.1})
@@ -319,10 +319,6 @@ def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path):
     if np.linalg.norm(fc.run(scene)["velocity"].sel(body=body).values[0]) < 1e-12:
         # runs of one tolerance, the same integration but for the size of the load: 1e-8 of the way
         assert float(alone.sel(quantity=name)) == pytest.approx(way, rel=1e-6)
-
-
-def test_the_command_prints_effects(tmp_path: Path, command: Command):
-    path = write("pendulum", tmp_path)[0]
     assert "load.gravity" in command("effects", path, "--set", "time.end=0.1", "--json", "-q").out
 
 

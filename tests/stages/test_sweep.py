@@ -182,7 +182,7 @@ def test_a_sweep_of_refusals_only_is_no_success(tmp_path: Path, fresh: Path, cap
     shown = fresh / "sweeps" / "none"
     shown.mkdir(parents=True)
     (shown / "sweep.png").write_bytes(b"of an earlier state")
-    assert main(["sweep", str(path), "--workers=1"]) == 3
+    assert main(["sweep", str(path), "--jobs=1"]) == 3
     assert "2 refused" in capsys.readouterr().out
     with xr.open_dataset(shown / "sweep.nc") as found:
         assert found["bob.velocity.final"].dims == ("solver.evaluations", "axis")

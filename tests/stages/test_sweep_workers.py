@@ -33,7 +33,7 @@ def test_bytes_are_the_same_whoever_runs_the_points(root: Path, tmp_path: Path):
         done = flexclear(
             "sweep",
             str(pendulum(tmp_path, 30)),
-            f"--workers={count}",
+            f"--jobs={count}",
             f"--out={target}",
             cwd=root,
             results=tmp_path / f"results{count}",
@@ -47,18 +47,18 @@ def test_bytes_are_the_same_whoever_runs_the_points(root: Path, tmp_path: Path):
 
 def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path, fresh: Path, asked: list[str]):
     path = pendulum(tmp_path, 400)
-    process = flexclear("sweep", str(path), "--workers=1", cwd=root, results=fresh)
+    process = flexclear("sweep", str(path), "--jobs=1", cwd=root, results=fresh)
     begun(process, fresh)
     process.send_signal(signal.SIGKILL)
     process.communicate()
     plan = sweep_plan.prepare(sweep_plan.plan(*sweep.read(path), str(path)), open_workplace())
     stored = {key for family in plan.families for key in family.find(open_workplace().store, plan.recorded)}
-    assert main(["sweep", str(path), "--workers=1"]) == 0
+    assert main(["sweep", str(path), "--jobs=1"]) == 0
     assert stored
     assert set(asked) == {job.key for job in plan.jobs} - stored
     assert len(asked) < 400
     asked.clear()
-    assert main(["sweep", str(path), "--workers=1"]) == 0
+    assert main(["sweep", str(path), "--jobs=1"]) == 0
     assert asked == []
 
 
@@ -66,7 +66,7 @@ def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path,
 def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path, number: signal.Signals):
     """SIGTERM too, as of a cluster's scheduler: it used to end the command with leaked semaphores of its workers."""
     results = tmp_path / "results"
-    process = flexclear("sweep", str(pendulum(tmp_path, 20_000)), "--workers=2", cwd=root, results=results)
+    process = flexclear("sweep", str(pendulum(tmp_path, 20_000)), "--jobs=2", cwd=root, results=results)
     begun(process, results)
     process.send_signal(number)
     _, err = process.communicate(timeout=PATIENCE)
@@ -230,7 +230,7 @@ def test_a_cluster_of_which_a_worker_is_killed_gives_the_same_bytes(root: Path, 
         for other in others:
             other.kill()
             other.wait()
-    alone = flexclear("sweep", str(path), "--workers=2", f"--out={local}", cwd=root, results=tmp_path / "local")
+    alone = flexclear("sweep", str(path), "--jobs=2", f"--out={local}", cwd=root, results=tmp_path / "local")
     _, err = alone.communicate(timeout=PATIENCE)
     assert alone.returncode == 0, err
     assert target.read_bytes() == local.read_bytes()
@@ -264,7 +264,7 @@ vary."solver.evaluations" = [100000, 100, 100001, 100002, 100003]
 
 def _dataset(path: Path, limits: str, combine: str, *arguments: str) -> int:
     path.write_text(SWEEP.replace("LIMITS", f", {limits}" if limits else "").replace("COMBINE", combine))
-    return main(["sweep", str(path), "--workers=1", *arguments])
+    return main(["sweep", str(path), "--jobs=1", *arguments])
 
 
 @pytest.mark.parametrize("combine", ["grid", "list"])

@@ -45,6 +45,8 @@ NAMES = {
     "table10": "table10:TABLE",
     "table_verdicts": "table_verdicts:TABLE",
 }
+#: in tables, what is not there
+ABSENT = "–"
 #: artifacts by reference, such as ``sps4/csj:run``
 Data = dict[str, "xr.Dataset"]
 

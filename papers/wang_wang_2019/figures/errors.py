@@ -14,7 +14,7 @@ from flexclear.papers.wang_wang_2019.deviations import (
     max_deviation,
     velocity_at_events,
 )
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
 from flexclear.papers.wang_wang_2019.published import TABLE7, TABLE8, TABLE9, MaximumError
 from flexclear.pipeline.post.plotting.table import Table
 from flexclear.pipeline.post.single_run.series import parameters
@@ -26,7 +26,6 @@ ROWS: tuple[tuple[str, str, float, str | None], ...] = (
     ("displacement z0 (mm)", "displacement", 1e3, "displacement"),
     ("velocity z0 (mm/s)", "velocity", 1e3, "velocity"),
 )
-ABSENT = "–"
 #: deviations below this fraction of the printed ones are called zero: the paper prints four digits
 NOTHING = 1e-4
 #: values below this are rounding of the runs and differ between machines (positions of 0.1 m to 16 digits, in mm)
@@ -46,20 +45,18 @@ def paper_column(head: str, values: MaximumError) -> Column:
 
 def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
     """The column of one run, +- what it changes when the run is made at a tighter tolerance."""
-    cells = []
-    for _, name, factor, _ in ROWS:
-        value, other = factor * getattr(deviation, name), factor * getattr(tighter, name)
-        cells.append(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}")
-    return head, *cells
+    pairs = zip(_values(deviation), _values(tighter), strict=True)
+    return head, *(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}" for value, other in pairs)
 
 
 def several(head: str, deviations: Sequence[Deviation]) -> Column:
     """Mean +- standard deviation over an ensemble's members."""
-    cells = []
-    for _, name, factor, _ in ROWS:
-        values = factor * np.array([getattr(deviation, name) for deviation in deviations])
-        cells.append(f"{number(values.mean())} ± {values.std(ddof=1):.1e}")
-    return head, *cells
+    by_row = np.array([_values(deviation) for deviation in deviations]).T
+    return head, *(f"{number(values.mean())} ± {values.std(ddof=1):.1e}" for values in by_row)
+
+
+def _values(deviation: Deviation) -> list[float]:
+    return [factor * getattr(deviation, name) for _, name, factor, _ in ROWS]
 
 
 def _table(title: str, columns: Sequence[Column], notes: Sequence[str]) -> Table:
@@ -128,17 +125,15 @@ def _of_rods(data: Data) -> Table:
     ]
     if max(ratios(fixed, TABLE7["fixed-fixed"]).values()) < NOTHING:
         notes.append(
-            "Fixed-fixed normal modes vanish at both ends of the rod. With the joints at the end nodes the rod "
-            "then cannot lengthen between "
-            "its joints and the platform moves exactly as with a rigid rod, however many such modes are retained; "
-            "the paper's non-zero errors need "
-            "a joint elsewhere on the rod, which it does not place, or other sources of error."
+            "Fixed-fixed normal modes vanish at both ends of the rod. With the joints at the end nodes the rod then "
+            "cannot lengthen between its joints and the platform moves exactly as with a rigid rod, however many such "
+            "modes are retained; the paper's non-zero errors need a joint elsewhere on the rod, which it does not "
+            "place, or other sources of error."
         )
     notes.append(
-        "Free-free modes lack part of the rod's static compliance between its joints; Craig-Bampton modes have "
-        "all of it, so that column "
-        "is the reference. Errors this small depend on joint coordinates that the paper does not print and on the "
-        "absent structural damping."
+        "Free-free modes lack part of the rod's static compliance between its joints; Craig-Bampton modes have all of "
+        "it, so that column is the reference. Errors this small depend on joint coordinates that the paper does not "
+        "print and on the absent structural damping."
     )
     notes.append(_contradiction(both))
     return _table("Table 7: largest errors, ideal model and FAR model", columns, notes)
@@ -172,9 +167,8 @@ def _of_clearance(data: Data) -> Table:
     count, peak = int(post.impact_count.sel(contact=paper.JOINT)), float(post.peak_force.sel(contact=paper.JOINT))
     notes = (
         comparison("CSJ model", ours, TABLE8),
-        f"The run has {count} impacts{_unfinished(post)}; the largest contact force is {peak:.0f} N, the "
-        "platform's largest "
-        f"vertical acceleration {float(post.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} m/s².",
+        f"The run has {count} impacts{_unfinished(post)}; the largest contact force is {peak:.0f} N, the platform's "
+        f"largest vertical acceleration {float(post.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} m/s².",
         _restitution(data[f"{paper.CSJ.scene}:run"], post),
         "Angle and displacement are fitted, not predicted: once the ball rests against the socket, leg 1 is "
         f"effectively {clearance:g} mm longer or shorter, and these errors are that length times the platform's "
@@ -225,10 +219,8 @@ def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
     shown = shown[np.isfinite(shown)]
     return (
         f"Restitution: {asked:g} is assumed, the contact law gives a free impact {delivered:.3f}; in the run "
-        "separation "
-        f"over approach speed has the median {np.median(shown):.3f} (from {shown.min():.2f} to {shown.max():.2f}: "
-        "drives "
-        "and friction act meanwhile)."
+        f"separation over approach speed has the median {np.median(shown):.3f} (from {shown.min():.2f} to "
+        f"{shown.max():.2f}: drives and friction act meanwhile)."
     )
 
 
@@ -239,11 +231,10 @@ def _of_all(data: Data) -> Table:
         columns += [paper_column(f"paper, {name}", TABLE9[name]), *_ours(name, model, data)]
     columns += _ours("Craig-Bampton (added)", paper.FAR_CSJ_CB, data)
     notes = (
-        "A single run means something point by point only up to its horizon (the time in the column's head): "
-        "there the members of an ensemble, "
-        "which differ by a tiny offset of the ball at the start, begin to differ visibly. Over the whole "
-        "stroke the table gives mean ± "
-        "standard deviation, over the members, of each member's largest error.",
+        "A single run means something point by point only up to its horizon (the time in the column's head): there "
+        "the members of an ensemble, which differ by a tiny offset of the ball at the start, begin to differ visibly. "
+        "Over the whole stroke the table gives mean ± standard deviation, over the members, of each member's largest "
+        "error.",
         _against_paper(data),
         f"Largest contact forces: {_largest(data, 'peak_force', {'contact': paper.JOINT}, 'N')}. What softens an "
         "impact is how far the mode set lets the rod be compressed between its joints; the three sets differ in just "
@@ -287,7 +278,7 @@ def _largest(data: Data, what: str, which: dict[str, str], unit: str) -> str:
     texts = [f"CSJ {rigid:.0f} {unit}"]
     for model in paper.FAR_CSJ:
         peak = data[f"{model.scene}:ensemble"][what].sel(which).values
-        texts.append(f"{model.label.removeprefix('FAR-paper.CSJ, ')} {peak.mean():.0f} ± {peak.std(ddof=1):.0f} {unit}")
+        texts.append(f"{paper.mode_set(model)} {peak.mean():.0f} ± {peak.std(ddof=1):.0f} {unit}")
     return "; ".join(texts)
 
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import brentq
 
 from flexclear.papers.wang_wang_2019 import published
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
 from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
 from flexclear.papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
 from flexclear.pipeline.post.plotting.table import Table
 from flexclear.pipeline.post.single_run.series import parameters
+from flexclear.pipeline.structure import closed_form
 
 COLUMNS = (
     "mode",
@@ -28,7 +28,6 @@ COLUMNS = (
     "exact Rayleigh beam (Hz)",
     "exact Timoshenko beam (Hz)",
 )
-ABSENT = "–"
 LEAST = 1e-3  # the last digit printed [Hz]
 MEANING = "± of ours: how much the frequency changes on a mesh of four times as many elements."
 
@@ -68,14 +67,9 @@ def _with_error(hertz: float, fine: xr.Dataset, i: int) -> str:
 
 
 def euler_bernoulli_ratio() -> float:
-    """Third over second frequency of a uniform Euler-Bernoulli beam with both ends alike (clamped or free).
-
-    Roots of cos x cosh x = 1; the frequencies go with the squares of the roots.
-    """
-    second, third = (
-        brentq(lambda x: np.cos(x) - 1.0 / np.cosh(x), c - 0.5, c + 0.5) for c in (2.5 * np.pi, 3.5 * np.pi)
-    )
-    return float((third / second) ** 2)
+    """Third over second frequency of a uniform Euler-Bernoulli beam with both ends alike (clamped or free)."""
+    _, second, third = closed_form.bending(closed_form.Span(1.0, 1.0, 1.0), "free-free", 3)
+    return float(third / second)
 
 
 def _rigid_row(number: int, modes: xr.Dataset, i: int) -> tuple[str, ...]:
@@ -97,22 +91,20 @@ def _about_section(agree: list[bool], square: xr.Dataset, circle: xr.Dataset) ->
     worst = int(np.argmax(change))
     verdict = "all" if all(agree) else f"{sum(agree)} of {count}"
     return (
-        "The column 'square inertia' takes the section's second moments in the mass matrix from the square of "
-        "equal area and those in "
-        f"the stiffness from the circle; so {verdict} of the paper's elastic values come out as printed. The "
-        "rod is round: 'circle' is the correct column, "
-        f"up to {100 * change[worst]:.1f} % away (mode {worst + 1} of those listed, {circle.kind.values[worst]})."
+        "The column 'square inertia' takes the section's second moments in the mass matrix from the square of equal "
+        f"area and those in the stiffness from the circle; so {verdict} of the paper's elastic values come out as "
+        f"printed. The rod is round: 'circle' is the correct column, up to {100 * change[worst]:.1f} % away (mode "
+        f"{worst + 1} of those listed, {circle.kind.values[worst]})."
     )
 
 
 def _about_ansys() -> str:
     ratio, bound = published.TABLE5_ANSYS[5] / published.TABLE5_ANSYS[2], euler_bernoulli_ratio()
     return (
-        "The ANSYS columns belong to no converged uniform rod: its torsional frequency is the same for "
-        "clamped and for free ends, yet they give "
-        f"{published.TABLE4_ANSYS[4]:.1f} and {published.TABLE5_ANSYS[4]:.1f} Hz; and the third free bending frequency "
-        "over the second is "
-        f"{ratio:.4f}, above the {bound:.4f} of an Euler-Bernoulli beam, which rotary inertia and shear can only lower."
+        "The ANSYS columns belong to no converged uniform rod: its torsional frequency is the same for clamped and "
+        f"for free ends, yet they give {published.TABLE4_ANSYS[4]:.1f} and {published.TABLE5_ANSYS[4]:.1f} Hz; and the "
+        f"third free bending frequency over the second is {ratio:.4f}, above the {bound:.4f} of an Euler-Bernoulli "
+        "beam, which rotary inertia and shear can only lower."
     )
 
 
@@ -156,7 +148,6 @@ BODIES = {
     "ball": "ball_A1",
     "moving platform": "platform",
 }
-ABSENT = "–"
 
 
 def _parts(data: Data) -> Table:
@@ -178,20 +169,23 @@ def _parts(data: Data) -> Table:
 def _part(member: str, bodies: dict[str, Any]) -> tuple[str, ...]:
     printed, name = TABLE1[member], BODIES.get(member)
     ours = bodies[name] if name else None
-    mass = f"{ours['mass']:.2f}" if ours else ABSENT
     return (
         member,
         name or ABSENT,
-        f"{printed.mass:.2f}" if printed.mass is not None else ABSENT,
-        mass,
-        f"{printed.length:g}" if printed.length is not None else ABSENT,
-        _moments(printed.inertia),
-        _moments(1e6 * np.diag(np.array(ours["inertia"]))) if ours else ABSENT,
+        _said(printed.mass, "{:.2f}"),
+        _said(ours and ours["mass"], "{:.2f}"),
+        _said(printed.length, "{:g}"),
+        _said(printed.inertia, MOMENTS),
+        _said(ours and 1e6 * np.diag(np.array(ours["inertia"])), MOMENTS),
     )
 
 
-def _moments(values: Any) -> str:
-    return ABSENT if values is None else ", ".join(f"{v:.3f}" for v in values)
+#: three of them
+MOMENTS = "{:.3f}, {:.3f}, {:.3f}"
+
+
+def _said(values: Any, form: str) -> str:
+    return ABSENT if values is None else form.format(*np.atleast_1d(values))
 
 
 MATERIAL = {
@@ -226,25 +220,21 @@ def _material(data: Data) -> Table:
 
 def _joint(data: Data) -> Table:
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
-    socket, ball = joint["socket_material"], joint["ball_material"]
+    ball, young = joint["ball_radius"], f"{1e-9 * TABLE3['youngs_modulus']:g}"
     rows = (
-        (
-            "socket radius (mm)",
-            f"{1e3 * TABLE3['socket_radius']:g}",
-            f"{1e3 * (joint['ball_radius'] + joint['clearance']):g}",
-        ),
-        ("ball radius (mm)", f"{1e3 * TABLE3['ball_radius']:g}", f"{1e3 * joint['ball_radius']:g}"),
+        ("socket radius (mm)", f"{1e3 * TABLE3['socket_radius']:g}", f"{1e3 * (ball + joint['clearance']):g}"),
+        ("ball radius (mm)", f"{1e3 * TABLE3['ball_radius']:g}", f"{1e3 * ball:g}"),
         ("clearance (mm)", "0.5, as follows", f"{1e3 * joint['clearance']:g}"),
-        ("Poisson's ratio, socket and ball", f"{TABLE3['poisson']:g}", f"{socket['poisson']:g}, {ball['poisson']:g}"),
-        (
-            "Young's modulus (GPa), socket and ball",
-            f"{1e-9 * TABLE3['youngs_modulus']:g}",
-            f"{1e-9 * socket['youngs_modulus']:g}, {1e-9 * ball['youngs_modulus']:g}",
-        ),
+        ("Poisson's ratio, socket and ball", f"{TABLE3['poisson']:g}", _both(joint, "poisson", 1.0)),
+        ("Young's modulus (GPa), socket and ball", young, _both(joint, "youngs_modulus", 1e-9)),
         ("density (kg/m³)", f"{TABLE3['density']:g}", "not used: masses are those of Table 1"),
         ("coefficient of restitution", "not printed", f"{joint['normal']['restitution']:g}, assumed"),
     )
     return Table("Table 3: the joint with clearance", HEADS, rows, (_stiffness(joint),))
+
+
+def _both(joint: dict, name: str, factor: float) -> str:
+    return ", ".join(f"{factor * joint[material][name]:g}" for material in ("socket_material", "ball_material"))
 
 
 def _stiffness(joint: dict) -> str:

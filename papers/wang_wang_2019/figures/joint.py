@@ -8,12 +8,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures.phase import at_times
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, believed_until, references
+from flexclear.pipeline.dynamics.contact.friction import modified_coulomb
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import parameters
 
 #: drawn radii of socket and ball, and the angle at which the ball lies off the centre
 SOCKET, DRAWN_BALL, ANGLE = 1.0, 0.74, np.radians(-38.0)
+TURN = np.linspace(0.0, 2.0 * np.pi, 361)
+CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
 
 
 def _kinematics(data: Data) -> Drawing:
@@ -33,8 +37,7 @@ def _kinematics(data: Data) -> Drawing:
         figure,
         f"Figure 5: a ball of {ball:g} mm moves by {clearance:g} mm in its socket and enters the wall by "
         f"{deepest:.1f} µm at most",
-        f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), "
-        "B: of the ball (b1), "
+        f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), B: of the ball (b1), "
         f"p_SB: eccentricity (d); largest force of the {CSJ.label} run {peak:.0f} N",
     )
     return figure
@@ -45,11 +48,9 @@ def _joint(axes: Axes, eccentricity: float, *, touching: bool = False) -> None:
     n = np.array([np.cos(ANGLE), np.sin(ANGLE)])
     t = np.array([-n[1], n[0]])
     ball, q = eccentricity * n, eccentricity * n + DRAWN_BALL * n
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    circle = np.column_stack([np.cos(turn), np.sin(turn)])
-    axes.fill(*(1.2 * circle).T, color="#dfe5ec", zorder=0)
-    axes.fill(*(SOCKET * circle).T, color="white", ec=IDEAL.color, lw=1.2, zorder=1)
-    axes.fill(*(ball + DRAWN_BALL * circle).T, color=CSJ.color, alpha=0.55, ec=CSJ.color, lw=1.2, zorder=2)
+    axes.fill(*(1.2 * CIRCLE).T, color="#dfe5ec", zorder=0)
+    axes.fill(*(SOCKET * CIRCLE).T, color="white", ec=IDEAL.color, lw=1.2, zorder=1)
+    axes.fill(*(ball + DRAWN_BALL * CIRCLE).T, color=CSJ.color, alpha=0.55, ec=CSJ.color, lw=1.2, zorder=2)
     axes.plot(*np.array([np.zeros(2), q]).T, color=style.SOFT, lw=0.8, ls=":", zorder=3)
     for point, name, shift in ((np.zeros(2), "S", (-0.09, 0.06)), (ball, "B", (-0.11, -0.1)), (q, "Q", (-0.1, -0.05))):
         axes.plot(*point, "o", color=style.INK, ms=4, zorder=5)
@@ -113,15 +114,9 @@ def _friction(data: Data) -> Drawing:
 
 
 def coefficient(v: np.ndarray, v_static: float, v_dynamic: float, static: float, dynamic: float) -> np.ndarray:
-    """Signed friction coefficient at the tangential velocity v [m/s]; the force is against the velocity.
-
-    Rises as a cubic step from -v_static to v_static, falls to `dynamic` at v_dynamic.  Source: Wang &
-    Wang (2019), eqs. (28), (29), with the arguments of STEP in ascending order.
-    """
-    speed = np.abs(v)
-    rise = _step(v, -v_static, -static, v_static, static)
-    fall = np.sign(v) * _step(speed, v_static, static, v_dynamic, dynamic)
-    return np.where(speed < v_static, rise, fall)
+    """Signed friction coefficient at the tangential velocity v [m/s], as runs have it; the force is against it."""
+    law = getattr(modified_coulomb.coefficient, "py_func", modified_coulomb.coefficient)
+    return np.array([np.sign(one) * law(abs(one), (static, dynamic, v_static, v_dynamic)) for one in v])
 
 
 def observed(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -134,11 +129,6 @@ def observed(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     sliding = tangent > 1e-6 * normal[inside]
     speed = -run.contact_friction_power.values[inside][sliding] / tangent[sliding]
     return speed, tangent[sliding] / normal[inside][sliding]
-
-
-def _step(x: np.ndarray, x0: float, h0: float, x1: float, h1: float) -> np.ndarray:
-    s = np.clip((x - x0) / (x1 - x0), 0.0, 1.0)
-    return h0 + (h1 - h0) * s * s * (3.0 - 2.0 * s)
 
 
 def _law(axes: style.Axes, limits: tuple[float, ...], reach: float, *, marks: bool = True) -> None:
@@ -191,17 +181,15 @@ def _projection(axes: style.Axes, plane: tuple[str, str], model: Model, data: di
     offset = 1e3 * run.contact_offset.sel(contact=JOINT)
     x, y = (offset.sel(axis=name).values for name in plane)
     time, horizon = run.time.values, believed_until(post)
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    radius = 1e3 * float(post.clearance.sel(contact=JOINT))
-    axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", zorder=0)
-    axes.plot(radius * np.cos(turn), radius * np.sin(turn), color="#a8a8a8", lw=1.0, zorder=1)
+    circle = 1e3 * float(post.clearance.sel(contact=JOINT)) * CIRCLE
+    axes.fill(*circle.T, color="#f3f3f3", zorder=0)
+    axes.plot(*circle.T, color="#a8a8a8", lw=1.0, zorder=1)
     inside = time <= horizon
     axes.plot(x, y, color=model.color, lw=0.5, alpha=0.35)
     axes.plot(x[inside], y[inside], color=model.color, lw=0.8)
-    index = np.searchsorted(time, post.impact_time.values - 1e-9) if "impact_time" in post else np.empty(0, int)
-    index = index[index < time.size]
-    index = index[time[index] <= horizon]
-    axes.plot(x[index], y[index], "o", ms=2.6, color=style.INK)
+    if "impact_time" in post:
+        when, x, y = at_times(time, post.impact_time.values, time, x, y)
+        axes.plot(x[when <= horizon], y[when <= horizon], "o", ms=2.6, color=style.INK)
     axes.set_aspect("equal")
 
 

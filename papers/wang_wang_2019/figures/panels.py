@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from matplotlib.figure import Figure as Drawing
 
 from flexclear.papers.wang_wang_2019 import models as paper
 from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.models import Quantity
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
 
@@ -27,51 +27,36 @@ SEPARATION = 20.0
 ROUNDING = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """One panel over time. `jumps`: impacts drive it far out of the ideal model's range."""
-
-    title: str
-    unit: str
-    values: Callable[[paper.Motion], np.ndarray]
-    jumps: bool
-    ensemble: tuple[str, float] | None = None  #: variable of the post artifact, factor to the unit
-
-
-ANGLE = Quantity("angle about y0", "rad", lambda m: m.angle, False, ensemble=("rotation_y", 1.0))
-DISPLACEMENT = Quantity("displacement along z0", "mm", lambda m: m.displacement, False, ensemble=("displacement", 1e3))
-VELOCITY = Quantity("velocity along z0", "mm/s", lambda m: m.velocity, False, ensemble=("velocity", 1e3))
-ACCELERATION = Quantity(
-    "acceleration along z0", "10³ mm/s²", lambda m: 1e-3 * m.acceleration, True, ensemble=("acceleration", 1.0)
-)
-REACTION = Quantity("reaction force at A1", "N", lambda m: m.reaction, True, ensemble=("normal_force", 1.0))
-QUANTITIES = (ANGLE, DISPLACEMENT, VELOCITY, ACCELERATION, REACTION)
+QUANTITIES = (paper.ANGLE, paper.DISPLACEMENT, paper.VELOCITY, paper.ACCELERATION, paper.REACTION)
 LETTERS = "abcdef"
-#: title and text below it, out of the ideal motion, the others and their post artifacts
-Heading = Callable[[paper.Motion, Sequence[paper.Motion], Sequence[xr.Dataset]], tuple[str, str]]
+#: title and text below it, out of the ideal motion and the others
+Heading = Callable[[paper.Motion, Sequence[paper.Motion]], tuple[str, str]]
 
 
-def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], columns: int, ensembles: bool) -> Drawing:
+def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], columns: int) -> Drawing:
     """The paper's six panels, each with a slim one below.
 
-    models: those compared with the ideal one, drawn in this order.  ensembles: draw the quantiles of theirs as bands.
+    models: those compared with the ideal one, drawn in this order, with quantiles of their ensembles as bands.
     Where they have impacts, the slim panels of acceleration and reaction zoom to the ideal model's range; all others
     show the difference from the ideal model.  columns: of the legend.
     """
     reference, others = paper.motion(paper.IDEAL, data), [paper.motion(model, data) for model in models]
-    posts = [data[f"{model.scene}:post"] for model in models]
-    bands, loose = posts if ensembles else [], "contact" in posts[0].sizes
-    clearance = 1e3 * float(posts[0].clearance.sel(contact=paper.JOINT)) if loose else 0.0
+    loose = "contact" in others[0].post.sizes
+    clearance = 1e3 * float(others[0].post.clearance.sel(contact=paper.JOINT)) if loose else 0.0
     figure, axes = style.grid(6, 2, (11.0, 12.2), height_ratios=[3, 1.15] * 3, sharex=False)
     for k, quantity in enumerate(QUANTITIES):
         main, strip = axes[2 * (k // 2), k % 2], axes[2 * (k // 2) + 1, k % 2]
-        over_time(main, quantity, reference, others, bands)
+        for motion in others:
+            _band(main, quantity, motion)
+        over_time(main, quantity, reference, others)
         main.set_title(f"({LETTERS[k]}) {quantity.title}")
         main.tick_params(labelbottom=False)
         if loose and quantity.jumps:
-            zoomed(strip, quantity, reference, others)
+            over_time(strip, quantity, reference, others)
+            strip.set_ylim(*_range(quantity.values(reference)))
+            strip.set(xlabel="time (s)", ylabel=f"zoom\n{quantity.unit}")
         else:
-            difference(strip, quantity, reference, others, bands)
+            difference(strip, quantity, reference, others)
     for other in others:
         _peaks(axes[4, 0], other)
     ball_deviation(axes[4, 1], reference, others, clearance)
@@ -80,59 +65,32 @@ def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], col
     for panel in axes.flat:
         # the same position in every panel; aligning by the tick labels' sizes takes seconds
         panel.yaxis.set_label_coords(-0.105, 0.5)
-    style.heading(figure, *heading(reference, others, posts))
+    style.heading(figure, *heading(reference, others))
     style.shared_legend(figure, axes[0, 0], columns)
     return figure
 
 
-def over_time(
-    axes: Axes,
-    quantity: Quantity,
-    reference: paper.Motion,
-    others: Sequence[paper.Motion],
-    posts: Sequence[xr.Dataset] = (),
-) -> None:
-    """One quantity of all models over time; pale beyond the horizon, with the ensembles' bands."""
-    for motion, post in zip(others, posts, strict=bool(posts)):
-        _band(axes, quantity, motion, post)
+def over_time(axes: Axes, quantity: Quantity, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
+    """One quantity of all models over time, pale beyond the horizon."""
     for motion in others:
-        _curve(axes, motion, quantity.values(motion), _width(quantity))
-    axes.plot(
-        reference.time,
-        quantity.values(reference),
-        color=reference.model.color,
-        lw=1.1,
-        ls=(0, (5, 2)),
-        label=reference.model.label,
-        zorder=2.4,
-    )
+        _curve(axes, motion, motion.time, quantity.values(motion), 0.8 if quantity.jumps else 1.6)
+    look: dict[str, Any] = {"color": reference.model.color, "lw": 1.1, "ls": (0, (5, 2)), "zorder": 2.4}
+    axes.plot(reference.time, quantity.values(reference), label=reference.model.label, **look)
     axes.set(ylabel=quantity.unit, xlim=(reference.time[0], reference.time[-1]))
 
 
-def zoomed(axes: Axes, quantity: Quantity, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
-    """The slim panel with the same curves in the ideal model's range."""
-    over_time(axes, quantity, reference, others)
-    axes.set_ylim(*_range(quantity.values(reference)))
-    axes.set(xlabel="time (s)", ylabel=f"zoom\n{quantity.unit}")
-
-
-def difference(
-    axes: Axes,
-    quantity: Quantity,
-    reference: paper.Motion,
-    others: Sequence[paper.Motion],
-    posts: Sequence[xr.Dataset] = (),
-) -> None:
+def difference(axes: Axes, quantity: Quantity, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
     """The slim panel with what differs from the ideal model."""
     axes.margins(y=0.12)
-    for motion, post in zip(others, posts, strict=bool(posts)):
-        _band(axes, quantity, motion, post, reference)
-    differences = {motion.model.scene: deviation(quantity, motion, reference) for motion in others}
     for motion in others:
-        time, values = differences[motion.model.scene]
-        _curve(axes, motion, values, 0.9, time)
+        _band(axes, quantity, motion, reference)
+    sizes = []
+    for motion in others:
+        time, values = paper.minus(motion, reference, quantity.values)
+        _curve(axes, motion, time, values, 0.9)
+        sizes.append(float(np.abs(values).max()))
     axes.set(xlim=(reference.time[0], reference.time[-1]), xlabel="time (s)", ylabel=f"minus ideal\n{quantity.unit}")
-    _scale(axes, [float(np.abs(values).max()) for _, values in differences.values()])
+    _scale(axes, sizes)
 
 
 def _scale(axes: Axes, sizes: Sequence[float]) -> None:
@@ -151,19 +109,13 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     axes.text(0.995, 0.03, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
 
 
-def deviation(quantity: Quantity, motion: paper.Motion, reference: paper.Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Common times and the quantity minus the reference's there."""
-    i, j = common_times(motion.time, reference.time)
-    return motion.time[i], quantity.values(motion)[i] - quantity.values(reference)[j]
-
-
 def ball_deviation(axes: Axes, reference: paper.Motion, others: Sequence[paper.Motion], clearance: float = 0.0) -> None:
     """Where the ball's centre is relative to its position in the ideal model, x-z plane of the world, equal scales.
 
     The path itself is 60 mm long: nothing is seen on it.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
-    paths = {motion.model.scene: _ball_apart(motion, reference) for motion in others}
+    paths = {motion.model.scene: paper.minus(motion, reference, _ball) for motion in others}
     factor, unit = _short(clearance, paths.values())
     if clearance > 0.0:
         edge = factor * clearance
@@ -183,19 +135,17 @@ def ball_deviation(axes: Axes, reference: paper.Motion, others: Sequence[paper.M
 
 def ball_distance(axes: Axes, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
     """Distance of the ball's centre from where the ideal model has it, over time."""
-    paths = [_ball_apart(motion, reference) for motion in others]
+    paths = [paper.minus(motion, reference, _ball) for motion in others]
     factor, unit = _short(0.0, paths)
     for motion, (time, deviation_of_ball) in zip(others, paths, strict=True):
-        _curve(axes, motion, factor * np.linalg.norm(deviation_of_ball, axis=1), 0.9, time)
+        _curve(axes, motion, time, factor * np.linalg.norm(deviation_of_ball, axis=1), 0.9)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_ylim(bottom=0.0)
     axes.set(xlabel="time (s)", ylabel=f"from ideal\n{unit}")
 
 
-def _ball_apart(motion: paper.Motion, reference: paper.Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Common times, and where the ball's centre is minus where the reference has it [mm], (t, 3)."""
-    i, j = common_times(motion.time, reference.time)
-    return motion.time[i], motion.ball[i] - reference.ball[j]
+def _ball(motion: paper.Motion) -> np.ndarray:
+    return motion.ball
 
 
 def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[float, str]:
@@ -204,9 +154,8 @@ def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tupl
     return (1e3, "µm") if largest < 0.1 else (1.0, "mm")
 
 
-def _curve(axes: Axes, motion: paper.Motion, values: np.ndarray, width: float, time: np.ndarray | None = None) -> None:
+def _curve(axes: Axes, motion: paper.Motion, time: np.ndarray, values: np.ndarray, width: float) -> None:
     """Firm inside the horizon, pale beyond it; what the paper does not have lies below what it has."""
-    time = motion.time if time is None else time
     inside = time <= motion.horizon
     if motion.model.ours:
         _envelope(axes, motion, values, time)
@@ -237,14 +186,13 @@ def _peaks(axes: Axes, motion: paper.Motion) -> None:
     axes.plot(*motion.impacts[inside].T, "o", ms=2.2, color=motion.model.color)
 
 
-def _band(
-    axes: Axes, quantity: Quantity, motion: paper.Motion, post: xr.Dataset, reference: paper.Motion | None = None
-) -> None:
+def _band(axes: Axes, quantity: Quantity, motion: paper.Motion, reference: paper.Motion | None = None) -> None:
     """Middle nine tenths of the ensemble and its median, beyond the horizon only; less the reference where given.
 
     Quantiles, as forces are not negative and most of their values are zero: a mean minus a deviation would be.
     """
-    if quantity.ensemble is None or "ensemble_time" not in post.sizes:
+    post = motion.post
+    if "ensemble_time" not in post.sizes:
         return
     name, factor = quantity.ensemble
     low, middle, high = (_column(post[f"{name}_quantile"].sel(quantile=q)) * factor for q in (0.05, 0.5, 0.95))
@@ -266,18 +214,14 @@ def _column(variable: xr.DataArray) -> np.ndarray:
     return variable.values.reshape(variable.sizes["ensemble_time"], -1)[:, 0]
 
 
-def _width(quantity: Quantity) -> float:
-    return 0.8 if quantity.jumps else 1.6
-
-
 def _range(values: np.ndarray) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     margin = 0.35 * (high - low)
     return (low - margin, high + margin) if low < 0.0 else (-0.05 * (high - low), high + margin)
 
 
-def _of_rods(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
-    moved = {m.model.scene: 1e3 * np.abs(deviation(DISPLACEMENT, m, ideal)[1]).max() for m in others}
+def _of_rods(ideal: paper.Motion, others: Sequence[paper.Motion]) -> tuple[str, str]:
+    moved = {m.model.scene: 1e3 * np.abs(paper.minus(m, ideal, paper.DISPLACEMENT.values)[1]).max() for m in others}
     fixed = moved[paper.FAR_FIXED.scene]
     little = f"{fixed:.1g} µm" if fixed > 1e-6 else "nothing"  # next to rounding
     return (
@@ -287,28 +231,28 @@ def _of_rods(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequenc
     )
 
 
-def _of_clearance(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
-    (csj,), (post,) = others, posts
+def _of_clearance(ideal: paper.Motion, others: Sequence[paper.Motion]) -> tuple[str, str]:
+    (csj,) = others
+    count, peak = (csj.post[name].sel(contact=paper.JOINT) for name in ("impact_count", "peak_force"))
     return (
-        f"Figure 12: {int(post.impact_count.sel(contact=paper.JOINT))} impacts raise the largest force at A1 from "
-        f"{ideal.reaction.max():.0f} to {float(post.peak_force.sel(contact=paper.JOINT)):.0f} N, the acceleration from "
+        f"Figure 12: {int(count)} impacts raise the largest force at A1 from {ideal.reaction.max():.0f} to "
+        f"{float(peak):.0f} N, the acceleration from "
         f"{1e-3 * np.abs(ideal.acceleration).max():.0f} to {1e-3 * np.abs(csj.acceleration).max():.0f} m/s²",
         "slim panels (added): difference from the ideal model, or a zoom to its range; "
         "dots: largest normal force of each impact, as in the title",
     )
 
 
-def _of_both(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
-    rigid, *flexible = posts
-    peaks = [f"{float(rigid.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} (CSJ)"]
-    for model, post in zip(paper.FAR_CSJ, flexible, strict=True):
-        mean = float(post.peak_acceleration_mean.sel(ensemble_body=paper.PLATFORM, axis="z"))
-        peaks.append(f"{mean:.0f} ({model.label.removeprefix('FAR-paper.CSJ, ').split(' ')[0]})")
+def _of_both(ideal: paper.Motion, others: Sequence[paper.Motion]) -> tuple[str, str]:
+    rigid, *flexible = others
+    peaks = [f"{float(rigid.post.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} (CSJ)"]
+    for motion in flexible:
+        mean = float(motion.post.peak_acceleration_mean.sel(ensemble_body=paper.PLATFORM, axis="z"))
+        peaks.append(f"{mean:.0f} ({paper.mode_set(motion.model)})")
     return (
         "Figure 13: the mode set decides how far a flexible rod softens the impacts",
-        f"largest acceleration in m/s², of ensembles the mean: {', '.join(peaks)}. "
-        "Beyond its horizon a single run is pale, bands are the middle 90 % of "
-        "the ensembles (the added set's run is drawn as the band that it fills); "
+        f"largest acceleration in m/s², of ensembles the mean: {', '.join(peaks)}. Beyond its horizon a single run is "
+        "pale, bands are the middle 90 % of the ensembles (the added set's run is drawn as the band that it fills); "
         "dots: largest force of each impact",
     )
 
@@ -316,8 +260,7 @@ def _of_both(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequenc
 def _tilt(data: Data) -> Drawing:
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(1, 1, (6.4, 3.5))
-    axes[0, 0].plot(ideal.time, ideal.angle, color=paper.IDEAL.color, lw=1.8)
-    axes[0, 0].set(xlabel="time (s)", ylabel="angle about y0 (rad)", xlim=(ideal.time[0], ideal.time[-1]))
+    _alone(axes[0, 0], paper.ANGLE, ideal, 1.8)
     _mark_extreme(axes[0, 0], ideal.time, ideal.angle)
     tilt = float(np.degrees(np.abs(ideal.angle).max()))
     style.heading(
@@ -328,29 +271,27 @@ def _tilt(data: Data) -> Drawing:
     return figure
 
 
+def _alone(axes: style.Axes, quantity: Quantity, motion: paper.Motion, width: float) -> None:
+    axes.plot(motion.time, quantity.values(motion), color=motion.model.color, lw=width)
+    axes.set(xlabel="time (s)", ylabel=quantity.label, xlim=(motion.time[0], motion.time[-1]))
+
+
 def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None:
     """A dot and the value at the largest tilt."""
     i = int(np.argmax(np.abs(angle)))
     axes.plot(time[i], angle[i], "o", color=paper.IDEAL.color, ms=5)
     text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s".replace("-", "−")
-    below = angle[i] > 0.0
-    axes.annotate(
-        text,
-        (time[i], angle[i]),
-        xytext=(0, -110 if below else 110),
-        textcoords="offset points",
-        ha="center",
-        color=style.SOFT,
-    )
+    shift = (0, -110 if angle[i] > 0.0 else 110)
+    look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "color": style.SOFT}
+    axes.annotate(text, (time[i], angle[i]), xytext=shift, **look)
 
 
 def _response(data: Data) -> Drawing:
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(2, 2, (9.4, 5.8))
-    shown = (DISPLACEMENT, VELOCITY, ACCELERATION, REACTION)
+    shown = QUANTITIES[1:]
     for letter, panel, quantity in zip("abcd", axes.flat, shown, strict=True):
-        panel.plot(ideal.time, quantity.values(ideal), color=paper.IDEAL.color, lw=1.6)
-        panel.set(xlabel="time (s)", ylabel=f"{quantity.title} ({quantity.unit})", xlim=(ideal.time[0], ideal.time[-1]))
+        _alone(panel, quantity, ideal, 1.6)
         panel.set_title(f"({letter}) {quantity.title}")
     style.heading(
         figure,
@@ -361,28 +302,20 @@ def _response(data: Data) -> Drawing:
     return figure
 
 
-def _figure(
-    title: str, heading: Heading, models: Sequence[paper.Model], *, columns: int, ensembles: bool = False
-) -> Figure:
+def _figure(title: str, heading: Heading, models: Sequence[paper.Model], columns: int) -> Figure:
     needs = paper.references((paper.IDEAL, *models), "run", "post")
-    return Figure(title, needs, lambda data: _six_panels(heading, data, models, columns, ensembles))
+    return Figure(title, needs, lambda data: _six_panels(heading, data, models, columns))
 
 
-FIG11 = _figure(
-    "Figure 11: flexible actuated rod (FAR) against the ideal model, six panels", _of_rods, paper.FAR, columns=4
-)
+FIG11 = _figure("Figure 11: flexible actuated rod (FAR) against the ideal model, six panels", _of_rods, paper.FAR, 4)
 FIG12 = _figure(
-    "Figure 12: clearance spherical joint (CSJ) against the ideal model, six panels",
-    _of_clearance,
-    [paper.CSJ],
-    columns=2,
+    "Figure 12: clearance spherical joint (CSJ) against the ideal model, six panels", _of_clearance, [paper.CSJ], 2
 )
 FIG13 = _figure(
     "Figure 13: flexible rod and clearance (FAR-CSJ), CSJ and ideal models, six panels",
     _of_both,
     (paper.CSJ, *paper.FAR_CSJ),
-    columns=3,
-    ensembles=True,
+    3,
 )
 
 FIG08 = Figure(

@@ -2,41 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from flexclear.papers.wang_wang_2019.figures import Data, Figure
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion, references
-from flexclear.pipeline.core.artifacts.quantities import common_times
+from flexclear.papers.wang_wang_2019.models import (
+    ACCELERATION,
+    ANGLE,
+    CSJ,
+    DISPLACEMENT,
+    FAR_CSJ,
+    IDEAL,
+    VELOCITY,
+    Model,
+    Motion,
+    Quantity,
+    minus,
+    motion,
+    references,
+)
 from flexclear.pipeline.post.plotting import style
 
 MODELS = (IDEAL, CSJ, *FAR_CSJ)
-Values = Callable[[Motion], np.ndarray]
 #: of an axis that is logarithmic on both sides
 SPIKE_TICKS = [sign * size for size in (20.0, 50.0, 100.0, 200.0, 500.0) for sign in (-1.0, 1.0)] + [0.0]
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """The two quantities of a phase plane and their axis labels.
+    """The two quantities of a phase plane. What jumps is linear inside the ideal model's range, logarithmic outside.
 
     heading: what the figure shows; {x} and {y} in it are how far impacts take either off the ideal model's.
-    spikes: impacts drive y far out of the ideal model's range; it is then linear inside that range
-    and logarithmic outside.
     """
 
-    x: Values
-    y: Values
-    x_label: str
-    y_label: str
+    x: Quantity
+    y: Quantity
     heading: str
-    spikes: bool = False
 
 
 def _maps(plane: Plane, data: Data) -> Drawing:
@@ -46,50 +52,50 @@ def _maps(plane: Plane, data: Data) -> Drawing:
     for column, (model, run) in enumerate(zip(MODELS, motions, strict=True)):
         trajectory(axes[0, column], plane, run)
         axes[0, column].set_title(_short(model), fontsize=8.4)
-        at_impacts(axes[1, column], plane, run, motions[0], data[f"{model.scene}:post"])
-        axes[1, column].set_xlabel(plane.x_label)
+        at_impacts(axes[1, column], plane, run, motions[0])
+        axes[1, column].set_xlabel(plane.x.label)
     _say(axes[1, 0], "no impacts")
-    if plane.spikes:
-        reach = 1.3 * float(np.abs(plane.y(motions[0])).max())
+    if plane.y.jumps:
+        reach = 1.3 * float(np.abs(plane.y.values(motions[0])).max())
         for panel in axes.flat:
             panel.set_yscale("symlog", linthresh=reach, linscale=1.2)
             panel.yaxis.set_major_locator(FixedLocator(SPIKE_TICKS))
             panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             panel.yaxis.set_minor_locator(FixedLocator([]))
             panel.axhspan(-reach, reach, color="#f4f6f8", zorder=0, lw=0)
-    axes[0, 0].set_ylabel(f"phase plot\n{plane.y_label}")
-    axes[1, 0].set_ylabel(f"section\n{plane.y_label}")
-    scale = "; grey band: linear scale, logarithmic outside" if plane.spikes else ""
+    axes[0, 0].set_ylabel(f"phase plot\n{plane.y.label}")
+    axes[1, 0].set_ylabel(f"section\n{plane.y.label}")
+    scale = "; grey band: linear scale, logarithmic outside" if plane.y.jumps else ""
     style.heading(
         figure,
-        plane.heading.format(x=f"{off_ideal(plane.x, data):.1%}", y=f"{off_ideal(plane.y, data):.0%}"),
+        plane.heading.format(x=f"{off_ideal(plane.x, motions):.1%}", y=f"{off_ideal(plane.y, motions):.0%}"),
         "the paper calls these phase plots Poincaré maps; second row (added): states when an impact begins, hollow "
         f"beyond the horizon{scale}",
     )
     return figure
 
 
-def off_ideal(values: Values, data: Data) -> float:
+def off_ideal(quantity: Quantity, motions: Sequence[Motion]) -> float:
     """Largest difference of the model with clearance alone from the ideal one, over that one's largest value."""
-    clear, ideal = motion(CSJ, data), motion(IDEAL, data)
-    i, j = common_times(clear.time, ideal.time)
-    return float(np.abs(values(clear)[i] - values(ideal)[j]).max() / np.abs(values(ideal)).max())
+    ideal, clear, *_ = motions
+    return float(np.abs(minus(clear, ideal, quantity.values)[1]).max() / np.abs(quantity.values(ideal)).max())
 
 
 def trajectory(axes: Axes, plane: Plane, run: Motion) -> None:
     """The whole trajectory, pale beyond its horizon."""
     inside = run.time <= run.horizon
-    x, y = plane.x(run), plane.y(run)
+    x, y = plane.x.values(run), plane.y.values(run)
     axes.plot(x, y, color=run.model.color, lw=0.6, alpha=0.3)
     axes.plot(x[inside], y[inside], color=run.model.color, lw=1.0)
 
 
-def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion, post: xr.Dataset) -> None:
+def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion) -> None:
     """States at the instants at which an impact begins, over the ideal trajectory."""
-    axes.plot(plane.x(ideal), plane.y(ideal), color="#c9c9c9", lw=0.8, zorder=1)
-    if "impact_time" not in post or post.sizes.get("impact", 0) == 0:
+    axes.plot(plane.x.values(ideal), plane.y.values(ideal), color="#c9c9c9", lw=0.8, zorder=1)
+    if run.post.sizes.get("impact", 0) == 0:
         return
-    when, x, y = at_times(run.time, post.impact_time.values, run.time, plane.x(run), plane.y(run))
+    shown = run.time, plane.x.values(run), plane.y.values(run)
+    when, x, y = at_times(run.time, run.post.impact_time.values, *shown)
     inside = when <= run.horizon
     axes.scatter(x[inside], y[inside], s=11, color=run.model.color, zorder=3, lw=0)
     axes.scatter(x[~inside], y[~inside], s=11, facecolors="none", edgecolors=run.model.color, lw=0.7, zorder=3)
@@ -121,20 +127,16 @@ def _figure(title: str, plane: Plane) -> Figure:
 FIG14 = _figure(
     "Figure 14: phase plots of angle and velocity along z, all models",
     Plane(
-        lambda m: m.angle,
-        lambda m: m.velocity,
-        "angle about y0 (rad)",
-        "z velocity (mm/s)",
+        ANGLE,
+        VELOCITY,
         "Figure 14: impacts take the velocity up to {y} of its largest value off the ideal model's, the angle {x}",
     ),
 )
 FIG15 = _figure(
     "Figure 15: phase plots of displacement and velocity along z, all models",
     Plane(
-        lambda m: m.displacement,
-        lambda m: m.velocity,
-        "z displacement (mm)",
-        "z velocity (mm/s)",
+        DISPLACEMENT,
+        VELOCITY,
         "Figure 15: impacts take the velocity up to {y} of its largest value off the ideal model's, the displacement "
         "{x}",
     ),
@@ -142,11 +144,8 @@ FIG15 = _figure(
 FIG16 = _figure(
     "Figure 16: phase plots of velocity and acceleration along z, all models",
     Plane(
-        lambda m: m.velocity,
-        lambda m: 1e-3 * m.acceleration,
-        "z velocity (mm/s)",
-        "z acceleration (10³ mm/s²)",
+        VELOCITY,
+        ACCELERATION,
         "Figure 16: the acceleration shows every impact; in between the platform moves without leg 1",
-        spikes=True,
     ),
 )

@@ -17,8 +17,8 @@ from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CB, FAR_CSJ_CB, IDEA
 from flexclear.papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE5_NORMAL_MODE
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.drawing import View, shell, triad, tube, view
-from flexclear.pipeline.post.shapes.body_shape import rod_scale_to as scale_to
 from flexclear.pipeline.post.shapes.body_shape import rod_surface as surface
+from flexclear.pipeline.post.shapes.body_shape import scale_to
 from flexclear.pipeline.post.single_run.series import parameters
 
 LEGS = (1, 2, 3, 4)

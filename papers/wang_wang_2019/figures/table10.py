@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
 from flexclear.papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE6, TABLE10
 from flexclear.pipeline.post.overview.curves import rounded
 from flexclear.pipeline.post.plotting.table import Table
 
 REFERENCE = "sps4/ideal"
-ABSENT = "–"
 #: ways as the timing calls them, and in heads
 WAYS = {"equal": "equal error", "step": "paper's step", "tolerance": "paper's tolerance"}
 #: a ratio within this factor of the paper's is the same in magnitude
@@ -74,23 +73,23 @@ def made(repeats: xr.DataArray) -> np.ndarray:
 
 def _ratio(timing: xr.Dataset, way: str, name: str) -> str:
     """Ratio of the medians, +- half the range that the repeats of both leave it."""
-    own, base = (made(timing[f"{way}_integration_seconds"].sel(scene=scene)) for scene in (name, REFERENCE))
+    own, base = _repeats(timing, way, name), _repeats(timing, way, REFERENCE)
     if not own.size or not base.size:
         return ABSENT
-    ratio = np.median(own) / np.median(base)
     half = 0.0 if name == REFERENCE else 0.5 * (own.max() / base.min() - own.min() / base.max())
-    return f"{ratio:.3g} ± {rounded(half, 1)}"
+    return f"{np.median(own) / np.median(base):.3g} ± {rounded(half, 1)}"
+
+
+def _repeats(timing: xr.Dataset, way: str, name: str) -> np.ndarray:
+    """Times of the integration [s]; none of a scene that was not timed."""
+    return made(timing[f"{way}_integration_seconds"].sel(scene=timing.scene == name))
 
 
 def ratios(timing: xr.Dataset, way: str) -> dict[str, float]:
     """CPU time of the integration over the ideal model's, of the models that the paper's table has."""
-    base = made(timing[f"{way}_integration_seconds"].sel(scene=REFERENCE))
-    by_scene = {}
-    for scene in TABLE10:
-        own = made(timing[f"{way}_integration_seconds"].sel(scene=scene)) if scene in timing.scene.values else base[:0]
-        if scene != REFERENCE and own.size and base.size:
-            by_scene[scene] = float(np.median(own) / np.median(base))
-    return by_scene
+    base = _repeats(timing, way, REFERENCE)
+    times = {scene: _repeats(timing, way, scene) for scene in TABLE10 if scene != REFERENCE and base.size}
+    return {scene: float(np.median(own) / np.median(base)) for scene, own in times.items() if own.size}
 
 
 def _notes(timing: xr.Dataset) -> tuple[str, ...]:
@@ -100,15 +99,14 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
         "dataset) costs the same whatever the way, is in a column of its own and is in no ratio. Medians of warm "
         "repeats in one process, with other programs running, ± half their range; a ratio's "
         "± is half of what the ranges of both times leave it.",
-        f"Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
+        "Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
         f"{facts['equal_error']:g} at most over the first {100 * facts['share']:.0f} % of the stroke, where all models "
         "can be predicted point by point (the smooth ideal stroke has far less at any tolerance); one whose energy "
-        "ledger does not close at it, at the next decade at which it does. "
-        f"Paper's step: a predictor-corrector at Table 6's step of {facts['step']:g} s, contacts noticed at "
-        f"the ends of steps, whatever the error. Paper's tolerance: {facts['damped']}, a damped implicit method of "
-        f"variable step, at Table 6's integration tolerance of {1e3 * facts['tolerance']:g} mm as a fraction of the "
-        "drives' stroke "
-        f"(rtol {float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
+        "ledger does not close at it, at the next decade at which it does. Paper's step: a predictor-corrector at "
+        f"Table 6's step of {facts['step']:g} s, contacts noticed at the ends of steps, whatever the error. Paper's "
+        f"tolerance: {facts['damped']}, a damped implicit method of variable step, at Table 6's integration tolerance "
+        f"of {1e3 * facts['tolerance']:g} mm as a fraction of the drives' stroke (rtol "
+        f"{float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
         f"{float(timing.tolerance_energy_error.max()):.1g} J).",
         *(_verdict(timing, way) for way in WAYS),
         _which(timing),
@@ -153,9 +151,8 @@ def _verdict(timing: xr.Dataset, way: str) -> str:
         return f"{WAYS[way].capitalize()}: no model of the paper's table besides the ideal one could be timed."
     least, most = min(deviations, key=deviations.__getitem__), max(deviations, key=deviations.__getitem__)
     return (
-        f"{WAYS[way].capitalize()}: our ratios are "
-        f"{rounded(deviations[least], 2)} ({least}) to {rounded(deviations[most], 2)} ({most}) "
-        "times the paper's."
+        f"{WAYS[way].capitalize()}: our ratios are {rounded(deviations[least], 2)} ({least}) to "
+        f"{rounded(deviations[most], 2)} ({most}) times the paper's."
     )
 
 

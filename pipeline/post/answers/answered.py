@@ -16,14 +16,11 @@ class Answered(xr.Dataset):
 
 def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: str = "") -> Answered:
     """The dataset with an answer: text in words, a picture as PNG, a table as HTML."""
-    import base64
     import html
 
+    from flexclear.pipeline.post.pages import media
+
     result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
-    image = (
-        ""
-        if picture is None
-        else f"<img src='data:image/png;base64,{base64.b64encode(picture).decode()}' alt='' style='max-width:100%'>"
-    )
+    image = "" if picture is None else media("answer.png", picture, "")
     result._answer = f"<p>{html.escape(text)}</p>{image}{table}"
     return result

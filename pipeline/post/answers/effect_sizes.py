@@ -15,7 +15,7 @@ from flexclear.pipeline.core.artifacts.effect_size import Influence, influence
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.variants import Effect
-from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
+from flexclear.pipeline.post.overview.curves import in_unit, measured
 from flexclear.pipeline.post.plotting.table import Table
 
 Names = frozenset[str]
@@ -135,7 +135,7 @@ def table(dataset: xr.Dataset) -> Table:
     for k, quantity in enumerate(dataset["quantity"].values):
         unit = str(dataset["unit"].values[k])
         for i, effect in enumerate(dataset["effect"].values):
-            cells = [_cell(dataset, name, i, i, k, unit) for name in ("dropped", "added")]
+            cells = [cell(dataset, name, (i, i, k), unit) for name in ("dropped", "added")]
             rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
     notes = [
         "Dropped: largest change of the quantity over the run when the effect is taken from the full scene. Added: "
@@ -155,11 +155,12 @@ def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
     if not len(finite) or finite.max() < 0.0:
         return "–", "–"
     j = int(np.argmax(finite))
-    return _cell(dataset, "interaction", i, j, k, unit), str(dataset["effect"].values[j])
+    return cell(dataset, "interaction", (i, j, k), unit), str(dataset["effect"].values[j])
 
 
-def _cell(dataset: xr.Dataset, name: str, i: int, j: int, k: int, unit: str) -> str:
-    return written(float(dataset[name].values[i, j, k]), float(dataset[f"{name}_uncertainty"].values[i, j, k]), unit)
+def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...], unit: str) -> str:
+    """A value of a dataset with its uncertainty, in words."""
+    return written(float(dataset[name].values[at]), float(dataset[f"{name}_uncertainty"].values[at]), unit)
 
 
 def written(value: float, uncertainty: float, unit: str) -> str:
@@ -168,10 +169,7 @@ def written(value: float, uncertainty: float, unit: str) -> str:
         return "–"
     if np.isinf(value):
         return "not the same events"
-    if uncertainty > 0.0:
-        return measured(value, uncertainty, unit)
-    factor, shown = scaled(value, unit)
-    return f"{rounded(factor * value, 3)} {shown}"
+    return measured(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -188,6 +186,9 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
 
     from flexclear.pipeline.post.plotting import style
 
+    if "other" in dataset.dims:
+        alone = xr.DataArray(np.arange(dataset.sizes["effect"]), dims="effect")
+        dataset = dataset.isel(effect=alone, other=alone)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
     columns = min(2, len(chosen))
@@ -201,15 +202,11 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 panel.set_visible(False)
                 continue
             for n, kind in enumerate(kinds):
-                values = (
-                    np.diagonal(dataset[kind].values[:, :, k])
-                    if dataset[kind].ndim == 3
-                    else dataset[kind].values[:, k]
-                )
+                values = dataset[kind].values[:, k]
                 place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
-                if f"{kind}_uncertainty" in dataset and dataset[kind].ndim == 2:
+                if f"{kind}_uncertainty" in dataset:
                     doubt = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
                     below = np.minimum(doubt, WHISKER * shown)
                     drawn = np.isfinite(shown) & (doubt > 0.0)

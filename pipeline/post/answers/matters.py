@@ -17,7 +17,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.effect_size import Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.effect_sizes import listed, written
+from flexclear.pipeline.post.answers.effect_sizes import cell, listed
 from flexclear.pipeline.post.overview.curves import measured, rounded
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -29,6 +29,8 @@ SLIGHT = 0.01
 LEVELS = (0.1, 0.01, 0.001)
 #: members of which Student's t is that of any larger number
 MANY = 1000
+#: a change of so many times the quantity's size is not given in per cent of that
+LARGE = 100.0
 #: a change that both runs' rounding could make, as a fraction of the quantity's size
 NOTHING = 1e-6
 
@@ -76,18 +78,12 @@ def assemble(
     changes = [[compared(pairs[name], q) for q in chosen] for name in names]
     full = next(iter(pairs.values())).full
     scales = [size(full, q) if not full.refused else np.nan for q in chosen]
+    differences = np.array([[c.difference for c in row] for row in changes])
+    uncertainties = np.array([[c.uncertainty for c in row] for row in changes])
     dims = ("effect", "quantity")
     data = {
-        "dropped": (
-            dims,
-            np.array([[c.difference for c in row] for row in changes]),
-            {"long_name": "change without it"},
-        ),
-        "dropped_uncertainty": (
-            dims,
-            np.array([[c.uncertainty for c in row] for row in changes]),
-            {"long_name": "part of the change that may be chance"},
-        ),
+        "dropped": (dims, differences, {"long_name": "change without it"}),
+        "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be chance"}),
         "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
         "scatter": (
@@ -117,24 +113,27 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
             unit, members = str(result["unit"].values[k]), int(one["members"])
-            text = _change(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
+            text = in_words(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
             said.append(f"<b>{html.escape(name)}</b>: {text}.")
     return said
 
 
-def _change(change: Influence, scale: float, unit: str, members: int, spread: float) -> str:
-    """What is different from the ideal mechanism, whose runs do not scatter. spread: standard deviation of a run."""
+def in_words(change: Influence, scale: float, unit: str, members: int = 0, spread: float = 0.0) -> str:
+    """What is different from the ideal mechanism, whose runs do not scatter, as HTML.
+
+    members: of which these are the means, 0 where one run each is compared.  spread: standard deviation of a run.
+    """
     means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
     bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree to {bound}"
-    part = _percent(change.difference, scale) if scale > 0.0 else ""
+    part = _percent(change.difference, scale) if change.difference < LARGE * scale else ""
     if not decided(change, scale) and spread > SLIGHT * scale:
         value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and _percent(spread, scale)}"
         return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
     if not decided(change, scale):
-        more = needed(change, scale, members)
-        return f"changes by {bound} at most{part and _percent(change.most, scale)}{means}; about {more} would decide it"
+        more = f"; about {needed(change, scale, members)} would decide it" if members else ""
+        return f"changes by {bound} at most{part and _percent(change.most, scale)}{means}{more}"
     if change.difference > 0.0:
         slightly = "slightly, " if change.difference < SLIGHT * scale else ""
         value = measured(change.difference, change.uncertainty or np.nan, unit)
@@ -203,14 +202,7 @@ def table(result: xr.Dataset) -> Table:
     for i, words in enumerate(str(w) for w in result["words"].values):
         if not words:
             continue
-        cells = [
-            written(
-                float(result["dropped"][i, k]),
-                float(result["dropped_uncertainty"][i, k]),
-                str(result["unit"].values[k]),
-            )
-            for k in range(result.sizes["quantity"])
-        ]
+        cells = [cell(result, "dropped", (i, k), str(unit)) for k, unit in enumerate(result["unit"].values)]
         members = int(result["members"][i])
         rows.append((words, *cells, str(members) if members else "one run"))
     notes = ["Largest change of each quantity over the run without the effect; behind ±: what of it may be chance."]

@@ -14,6 +14,22 @@ from flexclear.pipeline.core.scene.plan_decisions import EVIDENCE, NOT_WORTH, Pl
 from flexclear.pipeline.post.answers.effect_sizes import listed, written
 from flexclear.pipeline.post.plotting.table import Table
 
+#: what a plan says of bodies' meshes: its name there, type, what it is
+OF_MESHES = {
+    "elements": ("given", np.int64, "finite elements of the body"),
+    "elements_called_for": ("called_for", np.int64, "finite elements that the requested accuracy calls for"),
+    "mesh_frequency_error": (
+        "frequency",
+        float,
+        "largest error of a retained frequency due to the mesh, as a fraction",
+    ),
+    "mesh_compliance_error": (
+        "compliance",
+        float,
+        "largest error of the frames' compliance due to the mesh, as a fraction",
+    ),
+}
+
 
 def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     """Influences over (effect, quantity), decisions and evidence over effects, what is requested over quantities; SI.
@@ -56,22 +72,10 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
             np.array([plan.integration.get(name, np.nan) for name in names]),
             "estimated error of the planned run's integration, and of the modes that it leaves out",
         ),
-        "elements": (("body",), np.array([m.given for m in meshes], dtype=np.int64), "finite elements of the body"),
-        "elements_called_for": (
-            ("body",),
-            np.array([m.called_for for m in meshes], dtype=np.int64),
-            "finite elements that the requested accuracy calls for",
-        ),
-        "mesh_frequency_error": (
-            ("body",),
-            np.array([m.frequency for m in meshes], dtype=float),
-            "largest error of a retained frequency due to the mesh, as a fraction",
-        ),
-        "mesh_compliance_error": (
-            ("body",),
-            np.array([m.compliance for m in meshes], dtype=float),
-            "largest error of the frames' compliance due to the mesh, as a fraction",
-        ),
+        **{
+            name: (("body",), np.array([getattr(m, of) for m in meshes], dtype=kind), text)
+            for name, (of, kind, text) in OF_MESHES.items()
+        },
         "mesh_error": (
             ("body", "quantity"),
             np.array([[m.error[name] for name in names] for m in meshes], dtype=float).reshape(-1, len(names)),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.post.cost.study import methods
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import sentence
 
@@ -59,26 +60,32 @@ def checks(
     return [*result, *_condition(run), *_predictable(run, members)]
 
 
-def largest_energy(run: xr.Dataset) -> float:
-    """Largest change of any of the energies from the start [J]."""
+def lost_energy(run: xr.Dataset) -> np.ndarray:
+    """What the energy balance misses, as a fraction of the largest change of any energy, shape (time,)."""
     changes = [np.abs(run[n].values - run[n].values[0]).max() for n in ENERGIES if n in run]
-    return max(map(float, changes), default=0.0)
+    largest, missed = max(map(float, changes), default=0.0), np.abs(run["energy_error"].values)
+    return np.asarray(missed / largest) if largest > 0.0 else np.zeros_like(missed)
+
+
+def _drift(run: xr.Dataset) -> np.ndarray | None:
+    """By how far loops are open, as a fraction of the mechanism's extent, shape (time,); None without loops."""
+    if "constraint_error" not in run or "condition" not in run:
+        return None
+    extent = float(np.linalg.norm(np.ptp(run["position"].values.reshape(-1, 3), axis=0))) or 1.0
+    return np.asarray(np.abs(run["constraint_error"].values) / extent)
 
 
 def _energy(run: xr.Dataset) -> Check:
-    largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
-    fraction = missed / largest if largest > 0.0 else 0.0
+    fraction = float(lost_energy(run).max())
     remedy = "a tighter tolerance: [solver] rtol" if "step" not in run.attrs else "shorter steps: [solver] step"
     return Check("energy balance", f"{fraction:.1e} of the largest energy", f"{ENERGY:g}", fraction < ENERGY, remedy)
 
 
 def _loops(run: xr.Dataset) -> list[Check]:
     """Only where there are loops."""
-    if "constraint_error" not in run or "condition" not in run:
+    if (drift := _drift(run)) is None:
         return []
-    places = run["position"].values.reshape(-1, 3)
-    extent = float(np.linalg.norm(np.ptp(places, axis=0))) or 1.0
-    fraction = float(np.abs(run["constraint_error"].values).max()) / extent
+    fraction = float(drift.max())
     value = f"{fraction:.1e} of the extent" if fraction > ROUNDING else "rounding"
     return [Check("drift of closed loops", value, f"{LOOPS:g}", fraction < LOOPS, "a tighter tolerance")]
 
@@ -86,26 +93,19 @@ def _loops(run: xr.Dataset) -> list[Check]:
 def _agreement(study: xr.Dataset) -> list[Check]:
     """With runs at half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
     result = []
-    for group, method, setting in (
-        ("tolerance", "adaptive_integrator", "rtol"),
-        ("step", "fixed_integrator", "step"),
-    ):
-        if f"distance_by_{group}" not in study:
-            continue
-        own, at = str(study.attrs["own_integrator"]), float(study.attrs[f"own_{setting}"])
-        for m in (str(name) for name in study[method].values):
-            values = study[f"distance_by_{group}"].sel({method: m}).max("quantity", skipna=False)
-            there = [float(s) for s in study[setting].values if np.isfinite(values.sel({setting: s}))]
-            if m == own:
-                shown = [s for s in there if 0.05 * at < s < 0.9 * at]
-            else:
-                shown = [min(there)] if there else []
-            for s in shown:
-                value = float(values.sel({setting: s}))
-                name = f"agreement with {m}, {setting} {s:g}{' s' if group == 'step' else ''}"
-                result.append(
-                    Check(name, f"{value:.1e} of a size", f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance")
-                )
+    for group, method, setting, one in methods(study):
+        values = one[f"distance_by_{group}"].max("quantity", skipna=False)
+        there = [float(s) for s in study[setting].values if np.isfinite(values.sel({setting: s}))]
+        if method == study.attrs["own_integrator"]:
+            at = float(study.attrs[f"own_{setting}"])
+            shown = [s for s in there if 0.05 * at < s < 0.9 * at]
+        else:
+            shown = [min(there)] if there else []
+        for s in shown:
+            value = float(values.sel({setting: s}))
+            name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
+            limit = f"{AGREEMENT:g}"
+            result.append(Check(name, f"{value:.1e} of a size", limit, value < AGREEMENT, "a tighter tolerance"))
     return result
 
 
@@ -170,12 +170,10 @@ def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -
 
 def figure(run: xr.Dataset) -> dict[str, bytes]:
     """``stability.png`` and ``.svg``: errors of energy and loops over time, with their limits, and the separation."""
-    panels = [("energy error", "fraction of the largest energy", run["time"].values, _relative_energy(run), ENERGY)]
-    if "condition" in run and "constraint_error" in run:
-        extent = float(np.linalg.norm(np.ptp(run["position"].values.reshape(-1, 3), axis=0))) or 1.0
-        values = np.abs(run["constraint_error"].values) / extent
-        if values.max(initial=0.0) > ROUNDING:
-            panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, values, LOOPS))
+    panels = [("energy error", "fraction of the largest energy", run["time"].values, lost_energy(run), ENERGY)]
+    drift = _drift(run)
+    if drift is not None and drift.max(initial=0.0) > ROUNDING:
+        panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, drift, LOOPS))
     if "separation" in run:
         from flexclear.pipeline.core.artifacts.quantities import SEPARATED
 
@@ -192,8 +190,3 @@ def figure(run: xr.Dataset) -> dict[str, bytes]:
             axis.set_ylim(max(low, 1e-18) * 0.5, None)
         axes.ravel()[0].legend(fontsize=8)
         return style.files("stability", figure)
-
-
-def _relative_energy(run: xr.Dataset) -> np.ndarray:
-    largest = largest_energy(run)
-    return np.asarray(np.abs(run["energy_error"].values) / (largest or 1.0))

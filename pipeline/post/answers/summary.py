@@ -10,17 +10,13 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.stability import ENERGY, largest_energy
-from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
+from flexclear.pipeline.post.answers.matters import in_words
+from flexclear.pipeline.post.answers.stability import ENERGY, lost_energy
+from flexclear.pipeline.post.overview.curves import impacts, measured
 from flexclear.pipeline.post.single_run.series import parameters, sentence
 
-#: a difference is reported from none where it is so many times larger than both runs' own errors
-DISTINGUISHED = 2.0
-#: below this fraction of the largest value an effect is called slight
-SLIGHT = 0.01
-#: below this fraction, both runs' own errors included, there is none, as of a body that a drive leads
-NOTHING = 1e-6
 NEITHER = "The scene has neither clearance nor flexible bodies"
 
 
@@ -52,34 +48,15 @@ def answer(
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
-    """A sentence for each quantity: the difference from the ideal mechanism, and whether it exceeds the error."""
-    sentences = []
-    last = compared.sizes["run"] - 1
+    """A sentence for each quantity: the difference from the ideal mechanism, next to the errors of both runs."""
+    first, last, said = compared.isel(run=0), compared.isel(run=-1), []
     for j, name in enumerate(str(q) for q in compared["quantity"].values):
-        unit = str(compared["unit"].values[j])
-        difference = float(compared["difference"][last, j])
-        if not np.isfinite(difference):
-            continue
-        errors = [float(compared["error"][i, j]) for i in (0, last)]
-        error = sum(errors) if np.isfinite(errors).all() else np.nan
-        size = float(compared["largest"][0, j])
-        fraction = difference / size if size > 0.0 else np.nan
-        value = measured(difference, error, unit)
-        known = np.isfinite(fraction) and fraction < 100.0
-        part = f", which is {rounded(100.0 * fraction, 2)} % of its largest value in the ideal run" if known else ""
-        if np.isfinite(error) and difference + error < NOTHING * size:
-            text = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
-        elif np.isfinite(error) and difference < DISTINGUISHED * error:
-            text = (
-                f"the runs are not exact enough to show an effect: their difference ({value}) is less "
-                f"than {DISTINGUISHED:g} times their errors together"
-            )
-        elif np.isfinite(fraction) and fraction < SLIGHT:
-            text = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
-        else:
-            text = f"changes by up to <b class='n'>{value}</b>{part}"
-        sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
-    return sentences
+        difference, error = float(last["difference"][j]), float(first["error"][j]) + float(last["error"][j])
+        if np.isfinite(difference):
+            change = Influence(difference, error if np.isfinite(error) else 0.0)
+            text = in_words(change, float(first["largest"][j]), str(compared["unit"].values[j]))
+            said.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return said
 
 
 def _impacts(run: xr.Dataset) -> list[str]:
@@ -109,8 +86,7 @@ def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
 
 
 def _trust(run: xr.Dataset) -> list[str]:
-    largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
-    fraction = missed / largest if largest > 0.0 else 0.0
+    fraction = float(lost_energy(run).max())
     word = "<span class='good'>closes</span>" if fraction < ENERGY else "<span class='bad'>does not close</span>"
     return [
         f"The energy balance {word}: <span class='n'>{fraction:.1e}</span> of the largest energy is unaccounted for."

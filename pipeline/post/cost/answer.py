@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.cost.causes import CAUSES, dominant
-from flexclear.pipeline.post.cost.study import GROUPS, recording, resolved
+from flexclear.pipeline.post.cost.study import methods, recording, resolved
 from flexclear.pipeline.post.plotting.table import Table
 
 #: a setting that is as accurate as the scene's own is named where it costs less than this fraction
@@ -211,8 +211,6 @@ def _limits(study: xr.Dataset) -> str:
 
 
 TARGETS = (1e-3, 1e-6, 1e-9)
-#: groups that say how a run is integrated, and the factor that is a setting
-INTEGRATION = {"tolerance": "rtol", "step": "step"}
 #: a best error of so many times the reference's uncertainty, which it contains, is rounding
 ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
@@ -293,20 +291,16 @@ def choices(study: xr.Dataset) -> list[Choice]:
     """All ways to integrate whose error is known."""
     choices = []
     unsure = study["reference_uncertainty"].fillna(0.0)
-    for group, word in INTEGRATION.items():
-        if f"error_by_{group}" not in study:
-            continue
-        method, setting = GROUPS[group]
-        for m in study[method].values:
-            for s in study[setting].values:
-                one = study.sel({method: m, setting: s})
-                error = one[f"error_by_{group}"] + unsure
-                if not np.isfinite(error).all():
-                    continue
-                worst = str(study["quantity"].values[int(np.argmax(error.values))])
-                evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
-                unit = " s" if word == "step" else ""
-                choices.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
+    for group, method, setting, mine in methods(study):
+        for s in study[setting].values:
+            one = mine.sel({setting: s})
+            error = one[f"error_by_{group}"] + unsure
+            if not np.isfinite(error).all():
+                continue
+            worst = str(study["quantity"].values[int(np.argmax(error.values))])
+            evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
+            unit = " s" if setting == "step" else ""
+            choices.append(Choice(f"{method}, {setting} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
     return choices
 
 
@@ -325,7 +319,7 @@ def _notes(study: xr.Dataset) -> list[str]:
     missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
     if missing:
         notes.append(f"{' and '.join(missing)} {_absent(study)}: {_why_not(study)}.")
-    hidden = sum(int((~resolved(study, g) & np.isfinite(study[f"error_by_{g}"])).sum()) for g in _present(study))
+    hidden = sum(int((~resolved(one, g) & np.isfinite(one[f"error_by_{g}"])).sum()) for g, _, _, one in methods(study))
     if hidden:
         notes.append(
             f"{hidden} errors are less than 10 times the reference's own uncertainty and are not drawn; "
@@ -365,7 +359,3 @@ def _why_not(study: xr.Dataset) -> str:
             return f"{agree}; a larger budget allows tighter ones"
         return f"{agree}; rounding errors, which the motion itself magnifies, decide there, and no method helps"
     return f"the best setting that was tried reaches {best.error:.1e} ({best.worst})"
-
-
-def _present(study: xr.Dataset) -> list[str]:
-    return [group for group in INTEGRATION if f"error_by_{group}" in study]

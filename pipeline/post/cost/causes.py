@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from textwrap import fill
 
 import numpy as np
@@ -132,12 +132,10 @@ def causes_of(
             return np.nan
         return relative(quantities.error(a, b, quantity, until), size)
 
-    model = [p for p in there if p.group == "model"]
-    base = _model(model, runs, _own)
+    models = _models([p for p in there if p.group == "model"])
+    model = {cause: runs[point.key] for cause, point in models.items() if point is not None}
     return {
-        "mesh": between(base, _model(model, runs, _finest_mesh)),
-        "beam theory": between(base, _model(model, runs, _other_theory)),
-        "modal truncation": between(base, _model(model, runs, _most_modes)),
+        **{of: between(model.get("own"), model.get(of)) for of in ("mesh", "beam theory", "modal truncation")},
         "time integration": between(asis, reference),
         "event location": _location(quantity, reference, located, size, growth),
         "sampling of the output": _sampling(quantity, asis, there, runs, size),
@@ -145,41 +143,25 @@ def causes_of(
     }
 
 
-Choice = Callable[[Sequence[Point]], Point | None]
+def _models(points: Sequence[Point]) -> dict[str, Point | None]:
+    """Runs of one model each: the scene's own, and by cause the one that differs from it in that; None without one.
 
-
-def _model(points: Sequence[Point], runs: Mapping[str, xr.Dataset], choice: Choice) -> xr.Dataset | None:
-    chosen = choice(points) if points else None
-    return None if chosen is None else runs[chosen.key]
-
-
-def _own(points: Sequence[Point]) -> Point | None:
-    """The scene's own mode set, modes, mesh and theory."""
-    return next((p for p in points if p.factors.get("own")), None)
-
-
-def _most_modes(points: Sequence[Point]) -> Point | None:
-    """The most modes of a statically complete set, on the scene's own mesh and with its theory."""
-    own = _own(points)
+    Of modes the most of a statically complete set, of meshes the finest, of theories shear-flexible beams, which assume
+    the least.
+    """
+    own = next((p for p in points if p.factors.get("own")), None)
     if own is None:
-        return None
+        return {}
     same = [p for p in points if all(p.factors[f] == own.factors[f] for f in ("theory", "elements"))]
     complete = [p for p in same if p.factors["mode_set"] == "craig-bampton"] or same
-    return max(complete, key=lambda p: p.factors["modes"])
-
-
-def _finest_mesh(points: Sequence[Point]) -> Point | None:
-    own = _own(points)
-    finer = [p for p in points if own is not None and p.factors["elements"] > own.factors["elements"]]
-    return max(finer, key=lambda p: p.factors["elements"], default=None)
-
-
-def _other_theory(points: Sequence[Point]) -> Point | None:
-    """Shear-flexible beams, the theory with the fewest assumptions."""
-    own = _own(points)
-    if own is None or own.factors["theory"] == "timoshenko":
-        return None
-    return next((p for p in points if p.factors["theory"] == "timoshenko"), None)
+    finer = [p for p in points if p.factors["elements"] > own.factors["elements"]]
+    sheared = [p for p in points if p.factors["theory"] == "timoshenko" != own.factors["theory"]]
+    return {
+        "own": own,
+        "mesh": max(finer, key=lambda p: p.factors["elements"], default=None),
+        "beam theory": next(iter(sheared), None),
+        "modal truncation": max(complete, key=lambda p: p.factors["modes"]),
+    }
 
 
 def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: float, growth: float) -> float:

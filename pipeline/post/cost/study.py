@@ -6,7 +6,7 @@ Errors are pointwise up to the horizon of the scene's run; beyond it only statis
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -26,6 +26,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "model": ("theory", "mode_set", "modes", "elements"),
     "sampling": ("interval",),
 }
+#: of these, the groups that say how a run is integrated, each by a method and a setting of it
+INTEGRATION = ("tolerance", "step")
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
 LONG_NAMES = {
@@ -142,6 +144,14 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     return result
 
 
+def methods(study: xr.Dataset) -> Iterator[tuple[str, str, str, xr.Dataset]]:
+    """Group, integrator, name of its setting, and the study of it alone, of each integrator that a study compares."""
+    for group in INTEGRATION:
+        method, setting = GROUPS[group]
+        for name in study[method].values if f"error_by_{group}" in study else ():
+            yield group, str(name), setting, study.sel({method: name})
+
+
 def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
     return study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
@@ -180,7 +190,7 @@ def cost(run: xr.Dataset, name: str) -> float:
 
 def recording(study: xr.Dataset) -> float:
     """Processor time of the record of one run [s]: of as many rows whatever the integration took, so one median."""
-    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
+    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in INTEGRATION
              if f"recording_seconds_by_{group}" in study]  # fmt: skip
     values = np.concatenate([*times, [np.nan]])
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
+from flexclear.pipeline.post.cost.study import MARGIN, methods, recording, resolved
 from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, heading, panels, plain, scale_of, style
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
@@ -65,17 +65,10 @@ def make(
 
 def curves(study: xr.Dataset) -> list[Curve]:
     """All integrators of a study, those with a tolerance and those with a step."""
-    lines = []
-    for group in ("tolerance", "step"):
-        if f"error_by_{group}" not in study:
-            continue
-        method = GROUPS[group][0]
-        shown = resolved(study, group)
-        for m in study[method].values:
-            seconds = study[f"cpu_seconds_by_{group}"].sel({method: m}).values
-            error = study[f"error_by_{group}"].sel({method: m}).values
-            lines.append(Curve(str(m), seconds, error, shown.sel({method: m}).values))
-    return lines
+    return [
+        Curve(name, one[f"cpu_seconds_by_{group}"].values, one[f"error_by_{group}"].values, resolved(one, group).values)
+        for group, name, _, one in methods(study)
+    ]
 
 
 def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:

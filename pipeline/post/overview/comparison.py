@@ -18,7 +18,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, measured, rounded, scaled
+from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, in_unit, measured, scaled
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
@@ -76,7 +76,8 @@ def assemble(
         coords={
             "run": labels,
             "quantity": [quantity.name for quantity in chosen],
-            "unit": ("quantity", [_unit(runs, quantity) for quantity in chosen]),
+            # of the last run: the scene itself, of which the others may lack a joint with clearance or a drive
+            "unit": ("quantity", [quantities.unit(list(runs.values())[-1], quantity) for quantity in chosen]),
             "time": ("time", time, {"units": "s"}),
         },
         attrs={"Conventions": "CF-1.11", "reference": labels[0]},
@@ -93,11 +94,6 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
     if not quantity.over_time or quantity.of_place:
         return difference
     return max(difference, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
-
-
-def _unit(runs: Mapping[str, xr.Dataset], quantity: Quantity) -> str:
-    """As the last run has it: the scene itself, of which the others may lack a joint with clearance or a drive."""
-    return quantities.unit(list(runs.values())[-1], quantity)
 
 
 def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
@@ -159,7 +155,7 @@ def table(compared: xr.Dataset) -> Table:
                 continue
             error = float(part["error"])
             against = "reference" if i == 0 else _difference(compared, i, j, unit)
-            rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), against))
+            rows.append((str(name), label, in_unit(float(part["largest"]), unit), _own(error, unit), against))
     notes = [
         "Own error: the largest difference between this run and the same run at a hundred times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "
@@ -186,7 +182,7 @@ def costs(compared: xr.Dataset) -> Table:
         cells = [_whole(float(part[name])) for name in COSTS]
         cells += [_whole(float(value)) for value in part["impact_count"].values]
         cells += [
-            "–" if np.isnan(value) else _number(float(value), str(unit))
+            "–" if np.isnan(value) else in_unit(float(value), str(unit))
             for value, unit in zip(part["peak_force"].values, part["peak_force_unit"].values, strict=True)
         ]
         rows.append((str(label), *cells))
@@ -201,20 +197,14 @@ def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str
         return "other number of impacts"
     error = float(compared["error"][run, quantity]) + float(compared["error"][0, quantity])
     if np.isnan(error):  # of one of the two runs it is not known
-        factor, written = scaled(value, unit)
-        return f"{rounded(factor * value, 4)} ± ? {written}"
+        return in_unit(value, unit).replace(" ", " ± ? ", 1)
     return measured(value, error, unit)
 
 
 def _own(error: float, unit: str) -> str:
     if np.isnan(error):
         return "–"
-    return "other number of impacts" if np.isinf(error) else _number(error, unit, 2)
-
-
-def _number(value: float, unit: str, digits: int = 4) -> str:
-    factor, written = scaled(value, unit)
-    return f"{rounded(factor * value, digits)} {written}"
+    return "other number of impacts" if np.isinf(error) else in_unit(error, unit, 2)
 
 
 def _whole(value: float) -> str:

@@ -141,16 +141,22 @@ def rounded(value: float, digits: int) -> str:
     return f"{written:.0f}" if 10.0**digits <= abs(written) < 1e7 else f"{value:.{digits}g}"
 
 
+def in_unit(value: float, unit: str, digits: int = 4) -> str:
+    """A value [SI] in a unit that reads well, to so many significant digits."""
+    factor, written = scaled(value, unit)
+    return f"{rounded(factor * value, digits)} {written}"
+
+
 def measured(value: float, error: float, unit: str) -> str:
     """A value [SI] with its error, in a unit that reads well, to the second digit of the error.
 
     The error is left out where it is nan; where it is far below the value's fourth digit, it does not set the
     digits.
     """
+    if np.isnan(error):
+        return in_unit(value, unit)
     factor, written = scaled(max(value, error) if np.isfinite(error) else value, unit)
     value, error = factor * value, factor * error
-    if np.isnan(error):
-        return f"{rounded(value, 4)} {written}"
     if error <= 0.0 or np.isinf(error):
         return f"{rounded(value, 4)} ± {error:g} {written}"
     decimals = 1 - int(np.floor(np.log10(error)))

@@ -9,6 +9,7 @@ from pathlib import PurePath
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -90,11 +91,7 @@ def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
         there = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
         if there:
             away = [str(axis) for axis in sweep["axis"].values if axis not in there]
-            constant += (
-                [f"{' and '.join(away)} of {name} are 0" if len(away) > 1 else f"{away[0]} of {name} is 0"]
-                if away
-                else []
-            )
+            constant += [f"{' and '.join(away)} of {name} {'are' if len(away) > 1 else 'is'} 0"] if away else []
     return constant
 
 
@@ -129,25 +126,18 @@ def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     if "section" in sweep[name].dims:
         every = sweep[name].transpose(..., "section").values
         ax.plot(np.repeat(x, every.shape[-1]), every.ravel(), ".", color=LINE, ms=1.6, mew=0.0)
-        _refusals_and_scale(ax, sweep, x)
-        _label(ax, sweep, parameter, name)
-        return
-    spread = next((sweep[f"{name}{end}"].values for end in (".deviation", ".error") if f"{name}{end}" in sweep), None)
-    if spread is not None:
-        ax.fill_between(x, y - spread, y + spread, color=LINE, alpha=0.22, lw=0.0)
-    ax.plot(x, y, color=LINE, marker="o", ms=3.0)
+    else:
+        for spread in [sweep[f"{name}{end}"].values for end in BANDS if f"{name}{end}" in sweep][:1]:
+            ax.fill_between(x, y - spread, y + spread, color=LINE, alpha=0.22, lw=0.0)
+        ax.plot(x, y, color=LINE, marker="o", ms=3.0)
     if name.endswith(".count"):
         ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    _refusals_and_scale(ax, sweep, x)
-    _label(ax, sweep, parameter, name)
-
-
-def _refusals_and_scale(ax: Axes, sweep: xr.Dataset, x: np.ndarray) -> None:
     for value in x[sweep["status"].values == 1]:
         ax.axvline(value, color=REFUSED, lw=0.8, ls=":")
     if x.min() > 0.0 and x.max() > DECADE * x.min():
         ax.set_xscale("log")
         plain(ax.xaxis)
+    _label(ax, sweep, parameter, name)
 
 
 def _family(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
@@ -169,9 +159,7 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     rows, columns = (str(dim) for dim in sweep["status"].dims)
     x, y = (sweep[dim].values * _scale(sweep, dim)[0] for dim in (columns, rows))
     mesh = ax.pcolormesh(x, y, sweep[name].values, shading="nearest", cmap="viridis")
-    bar = figure.colorbar(mesh, ax=ax)
-    bar.set_label(_written(sweep[name].attrs["units"]), color=SOFT)
-    bar.outline.set_visible(False)
+    _color_bar(figure, ax, mesh, _written(sweep[name].attrs["units"]))
     ax.grid(False)
     refused = np.argwhere(sweep["status"].values == 1)
     ax.plot(x[refused[:, 1]], y[refused[:, 0]], "x", color=REFUSED, ms=4.0)
@@ -185,15 +173,19 @@ def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     points = ax.scatter(
         sweep[first].values * _scale(sweep, first)[0], y, c=sweep[second].values * scale, s=11.0, cmap="viridis"
     )
-    bar = figure.colorbar(points, ax=ax)
-    bar.set_label(_axis(sweep, second), color=SOFT)
-    bar.outline.set_visible(False)
+    _color_bar(figure, ax, points, _axis(sweep, second))
     known = y[np.isfinite(y)]
     if len(known):
         ax.axhline(known.mean(), color=INK, lw=0.9)
         for quantile in np.quantile(known, (0.05, 0.95)):
             ax.axhline(quantile, color=INK, lw=0.7, ls=(0, (4, 3)))
     _label(ax, sweep, first, name)
+
+
+def _color_bar(figure: Figure, ax: Axes, drawn: ScalarMappable, label: str) -> None:
+    bar = figure.colorbar(drawn, ax=ax)
+    bar.set_label(label, color=SOFT)
+    bar.outline.set_visible(False)
 
 
 def _label(ax: Axes, sweep: xr.Dataset, parameter: str, name: str) -> None:

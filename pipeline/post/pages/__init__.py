@@ -6,7 +6,7 @@ import base64
 import html
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -131,12 +131,7 @@ def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
     return f"<figure{look}><figcaption>{html.escape(caption)}</figcaption>{shown}</figure>\n"
 
 
-def listed(rows: Mapping[str, str], heads: tuple[str, str]) -> str:
-    """A table of two columns of text; empty without rows."""
-    return prose(heads, list(rows.items()))
-
-
-def prose(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def prose(heads: Sequence[str], rows: Collection[Sequence[str]]) -> str:
     """A table of sentences, with `backticks` as code; empty without rows."""
     if not rows:
         return ""

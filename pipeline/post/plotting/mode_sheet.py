@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 from matplotlib import pyplot as plt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
-from flexclear.pipeline.post.shapes.body_shape import AROUND, faces, is_rod, scale_to, surface
+from flexclear.pipeline.post.shapes.body_shape import AROUND, faces, hertz, is_rod, scale_to, surface
 
 #: modes next to each other, and drawn size of the largest displacement as a fraction of the body's length
 COLUMNS, FRACTION = 3, 0.14
@@ -51,13 +51,13 @@ def range_text(bundle: xr.Dataset) -> str:
 
 def _pixels(figure: Figure) -> np.ndarray:
     """A figure as a picture, and closed."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="rgba", dpi=80)
+    figure.set_dpi(80)
+    drawn = FigureCanvasAgg(figure)
+    drawn.draw()
     plt.close(figure)
-    width, height = (int(v) for v in figure.get_size_inches() * 80)
-    pixels = np.frombuffer(buffer.getvalue(), dtype=np.uint8).reshape(height, width, 4)
+    pixels = style.pixels(drawn)
     # films want even numbers of pixels
-    return pixels[: height - height % 2, : width - width % 2, :3].copy()
+    return pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2]
 
 
 def _sheet(body: str, bundle: xr.Dataset, seen: View, fraction: float) -> Figure:
@@ -109,6 +109,5 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     edge = 0.03 * float((high - low).max())
     panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     panel.set_axis_off()
-    frequency = float(bundle["frequency"].values[mode])
-    text = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
+    text = hertz(float(bundle["frequency"].values[mode]))
     panel.set_title(f"mode {mode + 1}: {text}, × {factor:.2g} √kg m", fontsize=8.8)

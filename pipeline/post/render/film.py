@@ -15,7 +15,6 @@ from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import film_speed, mechanism, ruler
-from flexclear.pipeline.post.render.film_speed import rate, write
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
@@ -47,32 +46,20 @@ def still(drawn: mechanism.Mechanism, step: int, size: tuple[int, int] = (1200, 
     return result
 
 
-def film(
+def frames(
     drawn: mechanism.Mechanism,
     post: xr.Dataset,
+    rate: int,
     watched: Sequence[str] = (),
-    progress: Progress = silent,
-    kind: str = "mp4",
     curves: Sequence[Quantity] = (),
-) -> tuple[str, bytes]:
-    """File suffix and content: MP4 where that is asked for and ffmpeg is there, else GIF; the whole run.
+    progress: Progress = silent,
+) -> Iterator[np.ndarray]:
+    """The whole run, so many pictures a second, of shape (height, width, 3).
 
     watched: names of bodies, joints and contacts, of which the first of each is shown next to the mechanism.  curves:
     quantities that are shown instead of them.
     Around the strongest impacts time is stretched, so that they are seen (`film_speed`).
     """
-    pictures = _frames(drawn, post, watched, curves, progress, rate(kind))
-    return write(pictures, rate(kind), kind)
-
-
-def _frames(
-    drawn: mechanism.Mechanism,
-    post: xr.Dataset,
-    watched: Sequence[str],
-    curves: Sequence[Quantity],
-    progress: Progress,
-    rate: int,
-) -> Iterator[np.ndarray]:
     shown = film_speed.frame_times(drawn.run, drawn.looks.duration, drawn.looks.impact_slowdown, rate)
     steps = shown.steps(drawn.run)
     scene = plotter((VIEW, HEIGHT))

@@ -61,10 +61,7 @@ def strongest(run: xr.Dataset) -> np.ndarray:
     all_impacts = impacts(run)
     if "impact_time" not in all_impacts:
         return np.empty(0)
-    times, force = (
-        np.asarray(all_impacts["impact_time"][1]),
-        np.nan_to_num(np.asarray(all_impacts["impact_peak_force"][1])),
-    )
+    times, force = all_impacts["impact_time"], np.nan_to_num(all_impacts["impact_peak_force"])
     chosen: list[float] = []
     least = 4.0 * AROUND * float(run["time"].values[-1] - run["time"].values[0])
     for k in np.argsort(-force, kind="stable"):

@@ -188,16 +188,9 @@ def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Sur
     width, axes = WIDTH * size, surfaces.along(seat.axes[:, 2])
     if not inner:
         return surfaces.moved(_disc(radius, width), seat.origin, axes)
-    turn, half = np.linspace(0.0, 2.0 * np.pi, 4 * surfaces.ROUND + 1), 0.5 * width
-    # a rectangle that is turned about z, inner side first
-    profile = np.array(
-        [[radius, -half], [radius, half], [radius + width, half], [radius + width, -half], [radius, -half]]
-    )
-    around = np.column_stack([np.cos(turn), np.sin(turn)])
-    points = np.concatenate(
-        [profile[None, :, :1] * around[:, None], np.broadcast_to(profile[:, 1:], (len(turn), len(profile), 1))], axis=2
-    )
-    ring = surfaces.shaded(points.reshape(-1, 3), surfaces.grid(len(turn), len(profile))[:, ::-1], sharp=True)
+    half, outer = 0.5 * width, radius + width
+    profile = np.array([[radius, -half], [outer, -half], [outer, half], [radius, half], [radius, -half]])
+    ring = surfaces.turned(profile, 4 * surfaces.ROUND)
     mark = surfaces.moved(surfaces.box((0.8 * width, 0.5 * width, 1.3 * width)), np.array([radius + half, 0.0, 0.0]))
     return surfaces.moved(surfaces.merged([ring, mark]), seat.origin, axes)
 

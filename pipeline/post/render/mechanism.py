@@ -367,14 +367,7 @@ def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
 
 
 def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
-    owners = (
-        run.mode_body.values
-        if "mode_body" in run.coords
-        else np.array([str(m).rpartition(".")[0] for m in run.mode.values])
-    )
-    columns = np.flatnonzero(owners == name)
-    if columns.size != bundle.sizes["mode"] and len(run.mode) == bundle.sizes["mode"]:
-        columns = np.arange(bundle.sizes["mode"])
+    columns = np.flatnonzero(run.mode_body.values == name)
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
     scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))

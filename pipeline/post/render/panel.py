@@ -1,8 +1,8 @@
-"""The plots that run next to a film: drawn once, then only the moving marks."""
+"""The plots that run next to a film, and a film of a joint: drawn once, then only the moving marks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,31 +17,49 @@ from flexclear.pipeline.post.overview.curves import Curve, by_unit, turned_by
 from flexclear.pipeline.post.overview.curves import curves as watched_curves
 from flexclear.pipeline.post.overview.figures import centre, orbit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render import joint_view
+from flexclear.pipeline.post.render import film_speed, joint_view
+from flexclear.pipeline.post.single_run.series import derive
 
 #: a body that turns by less does not turn [degrees]
 STILL = 1e-3
 #: next to titles [pixels]
 MARGIN = 6.0
+#: size of a picture of a joint [pixels], and length of its trail as a fraction of the run
+JOINT_SIZE, TRAIL = (960, 540), 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Cursor:
+    """What moves along a curve. begin: the output from which on it shows the curve; None for a dot."""
+
+    artist: Any
+    x: np.ndarray
+    y: np.ndarray
+    begin: np.ndarray | None = None
+
+    def draw(self, step: int) -> None:
+        """At one output."""
+        shown = slice(step if self.begin is None else self.begin[step], step + 1)
+        self.artist.set_data(self.x[shown], self.y[shown])
+        self.artist.axes.draw_artist(self.artist)
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A figure whose still part is stored as pixels; `cursors` are (dot, x, y) and `clock` shows the time."""
+    """A figure whose still part is stored as pixels, what moves in it, and the clock."""
 
     canvas: FigureCanvasAgg
     background: Any
-    cursors: tuple[tuple[Any, np.ndarray, np.ndarray], ...]
+    cursors: tuple[Cursor, ...]
     clock: Any
     time: np.ndarray  #: [s]
 
-    def frame(self, step: int) -> np.ndarray:
-        """Pixels at one output, shape (height, width, 3)."""
+    def frame(self, step: int, more: str = "", digits: int = 1) -> np.ndarray:
+        """Pixels at one output, shape (height, width, 3); more, digits: after the time, and after its point."""
         self.canvas.restore_region(self.background)
-        for dot, x, y in self.cursors:
-            dot.set_data([x[step]], [y[step]])
-            dot.axes.draw_artist(dot)
-        self.clock.set_text(f"t = {1e3 * self.time[step]:.1f} ms")
+        for cursor in self.cursors:
+            cursor.draw(step)
+        self.clock.set_text(f"t = {1e3 * self.time[step]:.{digits}f} ms{more}")
         self.canvas.figure.draw_artist(self.clock)
         return style.pixels(self.canvas)
 
@@ -74,17 +92,44 @@ def panel(
         number = list(run["contact"].values).index(loose[_first(loose, watch) or 0])
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
         axes[2].set_title(f"{run['contact'].values[number]} {centre(run, number).removeprefix('centre ')}")
-        cursors.append((_dot(axes[2], 7), x, y))
+        cursors.append(Cursor(_dot(axes[2], 7), x, y))
     titles = [panel.set_title(panel.get_title(loc="left"), loc="left", fontsize=8.2) for panel in axes]
-    figure.suptitle(" ", fontsize=13)  # reserves the area of the clock
-    clock = figure.text(
-        0.5, 0.972, "", ha="center", va="center", fontsize=13, fontweight="bold", color=style.INK, animated=True
-    )
-    canvas.draw()
+    clock = _clock(canvas, 13, 0.972, style.INK)
     for panel, title in zip(axes, titles, strict=True):
         _fit(title, panel, canvas)
     canvas.draw()
     return Panel(canvas, canvas.copy_from_bbox(figure.bbox), tuple(cursors), clock, run.time.values)
+
+
+def joint_frames(
+    run: xr.Dataset, contact: int, seconds: float | None, slower: float | None, rate: int
+) -> Iterator[np.ndarray]:
+    """A joint with clearance: where its ball or pin is, and its force; pictures of shape (540, 960, 3)."""
+    with style.style():
+        canvas = style.canvas(JOINT_SIZE, layout=ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12))
+        left, right = canvas.figure.subplots(1, 2, width_ratios=[1.1, 1.0])
+        name, time = str(run["contact"].values[contact]), run["time"].values
+        x, y = orbit(left, run, float(derive(run)["clearance"].values[contact]), contact)
+        left.set_title(f"{name}: {centre(run, contact)}")
+        right.set_title(f"{name}: normal force (N)")
+        (trail,) = left.plot([], [], color="#D55E00", lw=1.8, animated=True)
+        begin = np.searchsorted(time, time - TRAIL * (time[-1] - time[0]))
+        force = _curve(right, run, run["contact_normal_force"].values[:, contact], "#D55E00", 0.9)
+        cursors = Cursor(trail, x, y, begin), Cursor(_dot(left, 8), x, y), force
+        clock = _clock(canvas, 12, 0.965, "black")
+        plots = Panel(canvas, canvas.copy_from_bbox(canvas.figure.bbox), cursors, clock, time)
+        shown = film_speed.frame_times(run, seconds, slower, rate)
+        for step, slow in zip(shown.steps(run), shown.slower, strict=True):
+            yield plots.frame(int(step), f", {film_speed.speed_text(float(slow))}", 2)
+
+
+def _clock(canvas: FigureCanvasAgg, fontsize: float, height: float, color: str) -> Any:
+    """The text that is to show the time; the rest of the figure is drawn, with an area that is left for it."""
+    canvas.figure.suptitle(" ", fontsize=fontsize)
+    look: dict[str, Any] = {"fontsize": fontsize, "fontweight": "bold", "color": color, "animated": True}
+    clock = canvas.figure.text(0.5, height, "", ha="center", va="center", **look)
+    canvas.draw()
+    return clock
 
 
 def _fit(title: Any, axes: style.Axes, canvas: FigureCanvasAgg) -> None:
@@ -111,7 +156,7 @@ def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
     return int(np.argmax(way.max(axis=0)))
 
 
-def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> tuple[Any, np.ndarray, np.ndarray]:
+def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> Cursor:
     """How far the body has turned, or, where it does not turn, how far it has gone along the axis of its way."""
     turned, moved = turned_by(run, str(run.body.values[body])), post.displacement.values[:, body]
     angle = np.degrees(turned.angle)
@@ -123,9 +168,7 @@ def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> t
     return _curve(axes, run, 1e3 * moved[:, axis], "#0072B2")
 
 
-def _reaction(
-    axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequence[str]
-) -> tuple[Any, np.ndarray, np.ndarray]:
+def _reaction(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequence[str]) -> Cursor:
     contacts = [str(name) for name in run.contact.values] if "contact" in run.sizes else []
     joints = [str(name) for name in post.joint.values]
     name = next((name for name in watch if name in contacts or (name in joints and not contacts)), None)
@@ -138,28 +181,24 @@ def _reaction(
     return _curve(axes, run, post.reaction.sel(joint=name).values, "#D55E00", 0.8)
 
 
-def _watched(axes: style.Axes, run: xr.Dataset, line: Curve) -> tuple[Any, np.ndarray, np.ndarray]:
+def _watched(axes: style.Axes, run: xr.Dataset, line: Curve) -> Cursor:
     factor, unit = by_unit({"": line.values}, line.unit)
     axes.set_title(f"{line.title} ({unit})")
     return _curve(axes, run, factor * line.values, "#0072B2", 1.2)
 
 
-def _energy(
-    axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequence[str]
-) -> tuple[Any, np.ndarray, np.ndarray]:
+def _energy(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequence[str]) -> Cursor:
     """Instead of a reaction, where there is no joint."""
     axes.set_title("kinetic energy (J)")
     return _curve(axes, run, run.kinetic.values, "#0072B2")
 
 
-def _curve(
-    axes: style.Axes, run: xr.Dataset, values: np.ndarray, color: str, width: float = 1.6
-) -> tuple[Any, np.ndarray, np.ndarray]:
+def _curve(axes: style.Axes, run: xr.Dataset, values: np.ndarray, color: str, width: float = 1.6) -> Cursor:
     time = 1e3 * run.time.values
     axes.plot(time, values, color=color, lw=width)
     axes.set(xlabel="time (ms)", xlim=(time[0], time[-1]))
     axes.locator_params(axis="x", nbins=5)  # free, they change with the width that the layout leaves for their labels
-    return _dot(axes, 6), time, values
+    return Cursor(_dot(axes, 6), time, values)
 
 
 def _dot(axes: style.Axes, size: float) -> Any:

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.pages import media, viewer, viewer_page
 from flexclear.pipeline.post.plotting import mode_sheet
-from flexclear.pipeline.post.render import film_speed, gl, gltf, joint_view, paraview, player, vibrations
+from flexclear.pipeline.post.render import film_speed, gl, gltf, joint_view, panel, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
 from flexclear.pipeline.post.single_run.series import derive
 
@@ -29,7 +29,7 @@ class Shown:
     """What there is to be shown.
 
     run: schema RUN; linear: schema LINEAR; bundles: schema BUNDLE by name of the flexible body.  watched,
-    curves: as of `film.film`.  title: of pages.
+    curves: as of `film.frames`.  title: of pages.
     """
 
     run: xr.Dataset | None = None
@@ -89,8 +89,9 @@ def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes
     _must_draw()
     from flexclear.pipeline.post.render import film
 
-    drawn = shown.mechanism(stressed=stressed)
-    suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind, shown.curves)
+    drawn, rate = shown.mechanism(stressed=stressed), film_speed.rate(kind)
+    frames = film.frames(drawn, derive(drawn.run), rate, shown.watched, shown.curves, shown.progress)
+    suffix, content = film_speed.write(frames, rate, kind)
     return {f"{'stress' if stressed else 'film'}.{suffix}": content}
 
 
@@ -140,8 +141,6 @@ def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import film_speed
-
     files = {}
     for body, bundle in _bodies(shown).items():
         suffix, content = film_speed.write(mode_sheet.frames(body, bundle, *_side(bundle)), 12, kind)
@@ -200,11 +199,9 @@ def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import film_speed, joint_view
-
     files, rate = {}, film_speed.rate(kind)
     for k, name in _joints(shown).items():
-        pictures = joint_view.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
+        pictures = panel.joint_frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
         suffix, content = film_speed.write(pictures, rate, kind)
         files[f"joint_{name}.{suffix}"] = content
     return files

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
-from flexclear.pipeline.post.overview.curves import scaled
+from flexclear.pipeline.post.overview.curves import in_unit, scaled
 from flexclear.pipeline.post.render import film_speed, joint_view, mechanism, surfaces
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, axes_of, eye
@@ -56,12 +56,12 @@ def _largest_stress(drawn: mechanism.Mechanism, steps: np.ndarray) -> dict[str, 
     return {"label": "largest stress", "unit": unit, "values": [float(f"{v:.4g}") for v in values]}
 
 
-def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks, frames: int = FRAMES) -> dict[str, Any]:
+def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, Any]:
     """The centre of a ball or pin in its socket, for the viewer: where it may be, its path, and itself.
 
     contact: index of a joint with clearance, not of the end of a stop.
     """
-    steps, shown = _steps(run, looks, frames), joint_view.shown(run, contact)
+    steps, shown = _steps(run, looks, FRAMES), joint_view.shown(run, contact)
     centre = run["contact_offset"].values[steps, contact]
     unturned = np.tile([1.0, 0.0, 0.0, 0.0], (len(steps), 1))
     readings = [
@@ -164,8 +164,7 @@ def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[
         name = str(run["body"].values[body.index])
         levels = np.array([body_shape.stress_on_surface(run, bundle, name, int(step)) for step in steps]) / top
         data = np.round(255.0 * np.clip(levels, 0.0, 1.0)).astype(np.uint8)
-        factor, unit = scaled(top, "Pa")
-        content |= {"levels": base64.b64encode(data.tobytes()).decode(), "top": f"{factor * top:.3g} {unit}"}
+        content |= {"levels": base64.b64encode(data.tobytes()).decode(), "top": in_unit(top, "Pa", 3)}
     return content | ({"color": body.color, "plain": True} if body.color else {})
 
 

@@ -150,8 +150,7 @@ def _turning(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     angle = np.linspace(0.2, 1.5 * np.pi, 40)[:, None]
     ring = where + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
     way = ring[-1] - ring[-2]
-    tube = surfaces.tube(ring, 1.8 * THIN * size)
-    return surfaces.merged([replace(tube, triangles=tube.triangles[:, ::-1]), _head(ring[-1], way, size)])
+    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], way, size)])
 
 
 def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:

@@ -53,21 +53,13 @@ def along(direction: np.ndarray) -> np.ndarray:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def prism(outline: np.ndarray, thickness: float, *, smooth: bool = False) -> Surface:
-    """A convex outline, anticlockwise, shape (n, 2), extruded along z by `thickness`, the middle at z = 0.
-
-    smooth: whether its walls are shaded as round.
-    """
+def prism(outline: np.ndarray, thickness: float) -> Surface:
+    """A convex outline, anticlockwise, shape (n, 2), extruded along z by `thickness`, the middle at z = 0."""
     n, h = len(outline), 0.5 * thickness
     centre = outline.mean(axis=0)
     edge = np.roll(outline, -1, axis=0) - outline
     flat = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
-    if smooth:
-        corner = flat + np.roll(flat, 1, axis=0)
-        corner /= np.linalg.norm(corner, axis=1)[:, None]
-        pairs = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
-    else:
-        pairs = np.stack([flat, flat], axis=1)
+    pairs = np.stack([flat, flat], axis=1)
     ends = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
     wall = np.concatenate([_at(ends, -h), _at(ends, h)], axis=1).reshape(-1, 3)
     normal = np.concatenate([_at(pairs, 0.0), _at(pairs, 0.0)], axis=1).reshape(-1, 3)
@@ -84,9 +76,26 @@ def hull(places: np.ndarray, margin: float) -> np.ndarray:
     return spread[ConvexHull(spread).vertices]
 
 
+def turned(profile: np.ndarray, corners: int = ROUND) -> Surface:
+    """A surface of revolution about z, round there and with sharp edges along its profile.
+
+    profile: radius and height of points [m], shape (n, 2), from the lower end to the upper one along the outside.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)
+    across = np.column_stack([np.cos(turn), np.sin(turn)])[None] * np.ones((2, 1, 1))
+    bands = []
+    for ends in np.stack([profile[:-1], profile[1:]], axis=1):
+        radial, upwards = (ends[1] - ends[0]) @ [[0.0, -1.0], [1.0, 0.0]] / np.linalg.norm(ends[1] - ends[0])
+        points = np.concatenate([ends[:, None, :1] * across, np.repeat(ends[:, None, 1:], corners + 1, axis=1)], axis=2)
+        normals = np.insert(radial * across, 2, upwards, axis=2)
+        bands.append(Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(2, corners + 1)[:, ::-1]))
+    return merged(bands)
+
+
 def cylinder(radius: float, length: float) -> Surface:
     """About the origin, its axis along z."""
-    return prism(hull(np.zeros((1, 2)), radius), length, smooth=True)
+    half = 0.5 * length
+    return turned(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
 
 
 def box(size: Sequence[float]) -> Surface:
@@ -113,15 +122,8 @@ def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
 
 def cone(base: np.ndarray, tip: np.ndarray, radius: float) -> Surface:
     """A round cone, closed below."""
-    rim = hull(np.zeros((1, 2)), radius)
-    n = len(rim)
-    ring = np.arange(n)
-    after = np.roll(ring, -1)
-    points = np.vstack([_at(rim, 0.0), np.array([[0.0, 0.0, np.linalg.norm(tip - base)], np.zeros(3)])])
-    triangles = np.vstack(
-        [np.column_stack([ring, after, np.full(n, n)]), np.column_stack([after, ring, np.full(n, n + 1)])]
-    )
-    return moved(shaded(points, triangles, sharp=True), base, along(tip - base))
+    side = turned(np.array([[0.0, 0.0], [radius, 0.0], [0.0, np.linalg.norm(tip - base)]]))
+    return moved(side, base, along(tip - base))
 
 
 def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:

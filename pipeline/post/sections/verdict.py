@@ -121,21 +121,17 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
     verdict = judge(states, sections.growth.values, period, size)
     shown = verdict.principal
     lines = [chaos.spectrum(component) for component in shown.T]
-    data: dict[str, tuple[tuple[str, ...], np.ndarray]] = {
-        name: ((), np.array(value)) for name, value in verdict.numbers.items() if np.isfinite(value)
-    }
-    data["principal"] = (("section", "component"), shown)
-    data["power"] = (("frequency", "component"), np.stack([power for _, power in lines], axis=1))
+    arrays = {name: np.array(value) for name, value in verdict.numbers.items() if np.isfinite(value)}
+    arrays |= {"principal": shown, "power": np.stack([power for _, power in lines], axis=1)}
     coordinates = {"section": sections.section.values, "frequency": lines[0][0]}
     if "impact_phase" in sections:
         impacts = [first_impacts(sections, str(name)) for name in sections.contact.values]
-        data["impact_correlation"] = (
-            ("lag", "contact"),
-            np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in impacts], axis=1)),
-        )
+        correlations = np.stack([chaos.autocorrelation(phase) for phase in impacts], axis=1)
+        arrays["impact_correlation"] = np.nan_to_num(correlations)
         coordinates |= {"contact": sections.contact.values}
     attributes = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
     title = f"Verdict on the {str(sections.attrs.get('title', 'sections')).lower()}"
+    data = {name: (VERDICT[name].dims, values) for name, values in arrays.items()}
     return conform(xr.Dataset(data, coords=coordinates), VERDICT, title=title, **attributes)
 
 

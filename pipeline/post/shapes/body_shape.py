@@ -50,11 +50,17 @@ def faces(bundle: xr.Dataset) -> np.ndarray:
 
 
 def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
-    """Factor that makes the largest displacement `share` of the body's length; 1 for no displacement."""
+    """Factor that makes the largest displacement this fraction of the body's length; 1 for no displacement.
+
+    Where the centre line of a rod does not move (torsion), the largest section rotation is made 1 rad.
+    """
+    length, largest, rotation = float(box(bundle)[1][0]), float(surface(bundle, q)[1].max()), 0.0
     if is_rod(bundle):
-        return rod_scale_to(bundle, q, fraction)
-    largest = float(surface(bundle, q)[1].max())
-    return fraction * float(box(bundle)[1][0]) / largest if largest > 0.0 else 1.0
+        points, _, turn = centre_line(bundle, q)
+        length, rotation = float(np.linalg.norm(points[-1] - points[0])), float(np.linalg.norm(turn, axis=1).max())
+    if largest > 1e-3 * rotation * length:
+        return fraction * length / largest
+    return 1.0 / rotation if rotation > 0.0 else 1.0
 
 
 def box(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -168,20 +174,6 @@ def circle(axis: np.ndarray, around: int = AROUND) -> np.ndarray:
     side /= np.linalg.norm(side)
     phi = np.linspace(0.0, 2.0 * np.pi, around + 1)
     return np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
-
-
-def rod_scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
-    """Factor that makes the largest displacement `share` of the rod's length; 1 for no displacement.
-
-    Where the centre line does not move (torsion), the largest section rotation is made 1 rad.
-    """
-    points, displacement, turn = centre_line(bundle, q)
-    length = float(np.linalg.norm(points[-1] - points[0]))
-    largest = float(np.linalg.norm(displacement, axis=1).max())
-    rotation = float(np.linalg.norm(turn, axis=1).max())
-    if largest > 1e-3 * rotation * length:
-        return fraction * length / largest
-    return 1.0 / rotation if rotation > 0.0 else 1.0
 
 
 def _element(

@@ -7,44 +7,22 @@ contact that turns by more than a sector between two outputs is spread along the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
-from flexclear.pipeline.core.numerics.rotations import angle_about_y
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
-
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
-
-from typing import TYPE_CHECKING
-
-from flexclear.pipeline.core.artifacts.quantities import IMPACT
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
-
-import json
-from typing import TYPE_CHECKING
-
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
+from flexclear.pipeline.core.artifacts.quantities import IMPACT, LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
-from flexclear.pipeline.core.numerics.rotations import first_largest, rotation_between
+from flexclear.pipeline.core.numerics.rotations import angle_about_y, first_largest, rotation_between
 from flexclear.pipeline.post.single_run.schema import POST
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: variables of the artifact by name; their dimensions are those of the schema POST
+Arrays = dict[str, np.ndarray]
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
@@ -61,36 +39,36 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
     Raises InputError for what is left of a run that was stopped.
     """
     require_complete(run)
-    data: Variables = {**motion(run), **contacts(run), **impacts(run), **wear(run, parameters(run).get("joint", {}))}
-    data["reaction"] = (("time", "joint"), reactions(run))
-    data |= extremes(run, data["reaction"][1])
-    end = float(run["horizon"].values if "horizon" in run else run["time"].values[-1])
-    used = {dim for dims, _ in data.values() for dim in dims}
+    arrays: Arrays = {**motion(run), **contacts(run), **impacts(run), **wear(run, parameters(run).get("joint", {}))}
+    arrays["reaction"] = reactions(run)
+    arrays |= extremes(run, arrays["reaction"])
+    used = {dim for name in arrays for dim in POST[name].dims}
     coords: dict[str, object] = {
         name: array for name, array in run.variables.items() if name in run.coords and {*array.dims} <= used
     }
     if ensemble is not None:
-        data |= ensemble_statistics(ensemble)
-        data["ensemble_horizon"] = ((), np.array(horizon(ensemble["time"].values, ensemble["velocity"].values)))
+        arrays |= ensemble_statistics(ensemble)
+        arrays["ensemble_horizon"] = np.array(horizon(ensemble["time"].values, ensemble["velocity"].values))
         coords |= {"ensemble_time": ensemble["time"].values, "ensemble_body": ensemble["body"].values}
         coords["quantile"] = np.array(QUANTILES)
-    data["horizon"] = ((), np.array(end))
+    arrays["horizon"] = np.array(float(run["horizon"].values if "horizon" in run else run["time"].values[-1]))
     attributes = {
         "impact_threshold": f"{IMPACT:g} m/s",
         "horizon_criterion": f"ensemble, or run and perturbed run, stay separated by {SEPARATED:g} of the motion",
     }
     attributes["references"] = str(run.attrs.get("references", ""))
     title = f"What follows from: {run.attrs['title']}"
+    data = {name: (POST[name].dims, values) for name, values in arrays.items()}
     return conformed(labelled(data, coords), POST, title=title, **attributes)
 
 
-def motion(run: xr.Dataset | LabelledArrays) -> Variables:
+def motion(run: xr.Dataset | LabelledArrays) -> Arrays:
     """Angle about y, total rotation and displacement of every body."""
     q, position = run["quaternion"].values, run["position"].values
     return {
-        "rotation_y": (("time", "body"), angle_about_y(q)),
-        "rotation": (("time", "body"), rotation_between(q[:1], q)),
-        "displacement": (("time", "body", "axis"), position - position[:1]),
+        "rotation_y": angle_about_y(q),
+        "rotation": rotation_between(q[:1], q),
+        "displacement": position - position[:1],
     }
 
 
@@ -108,46 +86,43 @@ def reactions(run: xr.Dataset | LabelledArrays) -> np.ndarray:
     return force
 
 
-def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Variables:
+def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Arrays:
     """Largest magnitudes and their times, of all rows: regular outputs, events, deepest points of contacts.
 
     reaction: of every joint [N], shape (time, joint).
     """
-    series = {
-        "reaction": (("joint",), reaction),
-        "acceleration": (("body", "axis"), np.abs(run["acceleration"].values)),
-    }
+    series = {"reaction": reaction, "acceleration": np.abs(run["acceleration"].values)}
     if "drive_force" in run:
-        series["drive_force"] = (("drive",), np.abs(run["drive_force"].values))
+        series["drive_force"] = np.abs(run["drive_force"].values)
     if "contact_penetration" in run:
-        series["penetration"] = (("contact",), run["contact_penetration"].values)
-        series["force"] = (("contact",), run["contact_normal_force"].values)
-    variables: Variables = {}
-    for name, (dims, values) in series.items():
-        variables[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
-        variables[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
+        series["penetration"] = run["contact_penetration"].values
+        series["force"] = run["contact_normal_force"].values
+    arrays: Arrays = {}
+    for name, values in series.items():
+        arrays[f"peak_{name}"] = values.max(axis=0, initial=0.0)
+        arrays[f"peak_{name}_time"] = run["time"].values[first_largest(values, axis=0)]
     if "von_mises_stress" in run:
         at = first_largest(run["von_mises_stress"].values, axis=0)
         gauges = np.arange(len(at))
-        variables["peak_stress"] = (("gauge",), run["von_mises_stress"].values[at, gauges])
-        variables["peak_stress_time"] = (("gauge",), run["time"].values[at])
-        variables["peak_stress_position"] = (("gauge", "axis"), run["stress_position"].values[at, gauges])
+        arrays["peak_stress"] = run["von_mises_stress"].values[at, gauges]
+        arrays["peak_stress_time"] = run["time"].values[at]
+        arrays["peak_stress_position"] = run["stress_position"].values[at, gauges]
     if "event_peak_force" in run:
-        variables["peak_force"] = (("contact",), _peak_force(run))
-    return variables
+        arrays["peak_force"] = _peak_force(run)
+    return arrays
 
 
-def contacts(run: xr.Dataset | LabelledArrays) -> Variables:
+def contacts(run: xr.Dataset | LabelledArrays) -> Arrays:
     """Eccentricity, clearance and fraction of time in contact, per contact."""
     if "contact_offset" not in run:
         return {}
     distance = np.linalg.norm(run["contact_offset"].values, axis=-1)
     gap = run["contact_gap"].values
     return {
-        "eccentricity": (("time", "contact"), distance),
+        "eccentricity": distance,
         # gap = clearance - eccentricity at every time; the median is free of rounding at single times
-        "clearance": (("contact",), np.median(gap + distance, axis=0)),
-        "contact_time_share": (("contact",), _time_share(run)),
+        "clearance": np.median(gap + distance, axis=0),
+        "contact_time_share": _time_share(run),
     }
 
 
@@ -176,7 +151,7 @@ def parameters(run: xr.Dataset | LabelledArrays) -> dict:
     return json.loads(run.attrs.get("parameters", "{}"))
 
 
-def impacts(run: xr.Dataset | LabelledArrays) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def impacts(run: xr.Dataset | LabelledArrays) -> Arrays:
     """Variables ``impact_*`` of the post artifact; empty for a run without contacts.
 
     Listed and counted are the closings with an approach speed above IMPACT; the separation speed is
@@ -192,16 +167,13 @@ def impacts(run: xr.Dataset | LabelledArrays) -> dict[str, tuple[tuple[str, ...]
     opens = np.array([_next_opening(int(i), contact, openings) for i in strong], dtype=int)
     ended, begun = opens >= 0, run["event_time"].values[strong]
     return {
-        "impact_time": (("impact",), begun),
-        "impact_contact": (("impact",), contact[strong]),
-        "impact_approach_speed": (("impact",), speed[strong]),
-        "impact_separation_speed": (("impact",), np.where(ended, speed[opens], np.nan)),
-        "impact_peak_force": (("impact",), run["event_peak_force"].values[strong]),
-        "impact_duration": (("impact",), np.where(ended, run["event_time"].values[opens] - begun, np.nan)),
-        "impact_count": (
-            ("contact",),
-            np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
-        ),
+        "impact_time": begun,
+        "impact_contact": contact[strong],
+        "impact_approach_speed": speed[strong],
+        "impact_separation_speed": np.where(ended, speed[opens], np.nan),
+        "impact_peak_force": run["event_peak_force"].values[strong],
+        "impact_duration": np.where(ended, run["event_time"].values[opens] - begun, np.nan),
+        "impact_count": np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
         **_books(run, contact[strong], begun, np.where(ended, run["event_time"].values[opens], np.nan)),
     }
 
@@ -214,18 +186,16 @@ BOOKS = {
 }
 
 
-def _books(
-    run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
-) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def _books(run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray) -> Arrays:
     """Impulse and losses of each impact, NaN where it has not ended; there are rows at all events."""
-    time, booked = run["time"].values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
+    time, booked = run["time"].values, Arrays()
     for name, book in BOOKS.items():
         if book in run:
             values, fractions = run[book].values, np.full(len(contact), np.nan)
             names = list(run["contact"].values)
             for i, c in enumerate(names.index(name) for name in contact):
                 fractions[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
-            booked[name] = (("impact",), fractions)
+            booked[name] = fractions
     return booked
 
 
@@ -245,7 +215,7 @@ PIECES, BANDS = 16, 18
 SURFACES = ("outer", "inner")
 
 
-def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Variables:
+def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Arrays:
     """Variables ``wear_*`` of the post artifact; empty where nothing wears.
 
     joints: what the scene says of its joints.  Depths are those that a surface alone would have; both share the volume.
@@ -272,16 +242,14 @@ def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Variables:
             fractions = spread_over_surface(direction, np.stack([path[:, k], impulse[:, k]], axis=1), own, rows)
             maps[f"wear_depth_{side}"][k, :rows, :own] = per_path * fractions[..., 0] / area
             maps[f"wear_impulse_{side}"][k, :rows, :own] = fractions[..., 1]
-    totals: Variables = {
-        "wear_volume": (("worn",), volume),
-        "wear_distance": (("worn",), sliding[-1] - sliding[0]),
-        "wear_sectors": (("worn",), np.array([int(law["sectors"]) for law in laws], dtype=np.int32)),
+    totals: Arrays = {
+        "wear_volume": volume,
+        "wear_distance": sliding[-1] - sliding[0],
+        "wear_sectors": np.array([int(law["sectors"]) for law in laws], dtype=np.int32),
     }
     for side in SURFACES:
-        deepest = maps[f"wear_depth_{side}"].reshape(len(names), -1).max(axis=1)
-        totals[f"wear_deepest_{side}"] = (("worn",), deepest)
-    mapped: Variables = {name: (("worn", "band", "sector"), values) for name, values in maps.items()}
-    return totals | mapped
+        totals[f"wear_deepest_{side}"] = maps[f"wear_depth_{side}"].reshape(len(names), -1).max(axis=1)
+    return totals | maps
 
 
 def _area(joint: dict[str, Any], side: str) -> float:
@@ -318,8 +286,6 @@ def spread_over_surface(direction: np.ndarray, totals: np.ndarray, sectors: int,
 #: fractions of the members below the recorded quantiles: of so few, the middle and the bulk
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
-
 
 def spread(velocity: np.ndarray) -> np.ndarray:
     """Largest distance of a member's velocity from the mean [m/s], over members and bodies, shape (time,).
@@ -329,14 +295,14 @@ def spread(velocity: np.ndarray) -> np.ndarray:
     return np.linalg.norm(velocity - velocity.mean(axis=0), axis=-1).max(axis=(0, 2))
 
 
-def horizon(time: np.ndarray, velocity: np.ndarray, fraction: float = SEPARATED) -> float:
-    """Time from which on `spread` stays above `share` of the largest speed; the last time if it never does [s].
+def horizon(time: np.ndarray, velocity: np.ndarray) -> float:
+    """Time from which on `spread` stays above SEPARATED of the largest speed; the last time if it never does [s].
 
     Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a
     pointwise value is one draw out of many.
     """
     peak = float(np.linalg.norm(velocity, axis=-1).max())
-    first = lasting(time, spread(velocity) > fraction * peak, LASTING * float(time[-1] - time[0]))
+    first = lasting(time, spread(velocity) > SEPARATED * peak, LASTING * float(time[-1] - time[0]))
     return float(time[-1] if first is None else time[first])
 
 
@@ -357,26 +323,22 @@ def sentence(horizon: float, end: float, members: float | None = None) -> str:
     return f"{text} The members of its ensemble differ by {100.0 * SEPARATED:g} % from {1e3 * members:.4g} ms on."
 
 
-def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Variables:
+def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Arrays:
     """Mean, standard deviation (``ddof = 1``) and QUANTILES over the members, on the ensemble's own times.
 
     Quantiles are interpolated between members (numpy's default); of an angle, a vector's components, a contact.
     """
-    position, per_contact = ensemble["position"].values, ("contact",)
+    position, same = ensemble["position"].values, ("velocity", "acceleration", "peak_force", "contact_time_share")
     members = {
-        "rotation_y": (("ensemble_time", "ensemble_body"), angle_about_y(ensemble["quaternion"].values)),
-        "displacement": (("ensemble_time", "ensemble_body", "axis"), position - position[:, :1]),
-        "velocity": (("ensemble_time", "ensemble_body", "axis"), ensemble["velocity"].values),
-        "acceleration": (("ensemble_time", "ensemble_body", "axis"), ensemble["acceleration"].values),
-        "normal_force": (("ensemble_time", "contact"), ensemble["contact_normal_force"].values),
-        "impact_count": (per_contact, ensemble["impact_count"].values.astype(float)),
-        "peak_force": (per_contact, ensemble["peak_force"].values),
-        "contact_time_share": (per_contact, ensemble["contact_time_share"].values),
-        "peak_acceleration": (("ensemble_body", "axis"), ensemble["peak_acceleration"].values),
+        "rotation_y": angle_about_y(ensemble["quaternion"].values),
+        "displacement": position - position[:, :1],
+        "normal_force": ensemble["contact_normal_force"].values,
+        "impact_count": ensemble["impact_count"].values.astype(float),
+        **{name: ensemble[name].values for name in (*same, "peak_acceleration")},
     }
-    result: Variables = {"spread": (("ensemble_time",), spread(ensemble["velocity"].values))}
-    for name, (dims, values) in members.items():
-        result[f"{name}_mean"] = (dims, values.mean(axis=0))
-        result[f"{name}_std"] = (dims, values.std(axis=0, ddof=1))
-        result[f"{name}_quantile"] = (("quantile", *dims), np.quantile(values, QUANTILES, axis=0))
+    result: Arrays = {"spread": spread(ensemble["velocity"].values)}
+    for name, values in members.items():
+        result[f"{name}_mean"] = values.mean(axis=0)
+        result[f"{name}_std"] = values.std(axis=0, ddof=1)
+        result[f"{name}_quantile"] = np.quantile(values, QUANTILES, axis=0)
     return result

@@ -24,13 +24,11 @@ import scipy.sparse as sp
 import xarray as xr
 from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
-from flexclear.pipeline.core.numerics.rotations import skew
 from flexclear.pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
-from flexclear.pipeline.structure.fe.model import rigid_motions, symmetric
+from flexclear.pipeline.structure.fe.model import DOFS, carried, rigid_motions, selection, symmetric
 from flexclear.pipeline.structure.fe.section import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
-DOFS = ("ux", "uy", "uz", "rx", "ry", "rz")
 N_DOFS = len(DOFS)
 #: degree of the extension and of the twist in a cell by the recipe's word
 DEGREE = {"linear": 1, "quadratic": 2}
@@ -156,20 +154,20 @@ def _form(kinematics: Kinematics, density: Any) -> BilinearForm:
 
 
 def _strain_energy(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
-    a, b = kinematics.strains(trial), kinematics.strains(test)
+    a, b = kinematics.strains(*trial), kinematics.strains(*test)
     coupled = a["bend_v"] * b["bend_w"] + a["bend_w"] * b["bend_v"]
     return sum(p[name] * a[name] * b[name] for name in a) + p["bend_both"] * coupled
 
 
 def _kinetic_energy(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
-    (s, (t, v, w)), (ds, (dt, dv, dw)) = kinematics.section(trial), kinematics.section(test)
+    (s, (t, v, w)), (ds, (dt, dv, dw)) = kinematics.section(*trial), kinematics.section(*test)
     translation = p["line"] * sum(x * dx for x, dx in zip(s, ds, strict=True))
     slopes = p["slope_v"] * v * dv + p["slope_w"] * w * dw + p["slope_both"] * (v * dw + w * dv)
     return translation + p["twist"] * t * dt + slopes
 
 
 def _work_of_tension(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
-    (_, v, w), (_, dv, dw) = kinematics.section(trial)[0], kinematics.section(test)[0]
+    (_, v, w), (_, dv, dw) = kinematics.section(*trial)[0], kinematics.section(*test)[0]
     return p["force"] * (v.grad[0] * dv.grad[0] + w.grad[0] * dw.grad[0])
 
 
@@ -203,16 +201,13 @@ def _to_rod_axes(axes: np.ndarray, nodes: int, size: int) -> sp.csr_array:
 
 def _lumped(mesh: xr.Dataset, size: int) -> sp.csr_array:
     """Masses tied rigidly to nodes: with the offset r of the centre of mass, v = u + theta x r."""
-    entries: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = [(np.empty(0), np.empty(0, int), np.empty(0, int))]
-    for k in range(mesh.sizes.get("lump", 0)):
-        m, J, r = (mesh[f"lump_{name}"].values[k] for name in ("mass", "inertia", "offset"))
-        motion = np.hstack([np.eye(3), -skew(r)])
-        block = m * motion.T @ motion
-        block[3:, 3:] += J
-        dofs = node_dofs(mesh["lump_node"].values[[k]])
-        entries.append((block.ravel(), np.repeat(dofs, N_DOFS), np.tile(dofs, N_DOFS)))
-    values, rows, columns = (np.concatenate(part) for part in zip(*entries, strict=True))
-    return sp.csr_array((values, (rows, columns)), shape=(size, size))
+    if "lump_node" not in mesh:
+        return sp.csr_array((size, size))
+    motion, m = carried(mesh["lump_offset"].values), mesh["lump_mass"].values
+    blocks = m[:, None, None] * motion.transpose(0, 2, 1) @ motion
+    blocks[:, 3:, 3:] += mesh["lump_inertia"].values
+    nodes = selection(node_dofs(mesh["lump_node"].values), size)
+    return sp.csr_array(nodes.T @ sp.block_diag(list(blocks)) @ nodes)
 
 
 def _in_vector_order(matrix: Any, to_fields: sp.csr_array) -> sp.csr_array:

@@ -12,13 +12,7 @@ from flexclear.pipeline.core.artifacts.schema import MESH, conform
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import section_recipe
-from flexclear.pipeline.structure.fe.beam_recipe import (
-    SAME_PLACE,
-    Segment,
-    SegmentedBeamRecipe,
-    StraightBeamRecipe,
-    segments,
-)
+from flexclear.pipeline.structure.fe.beam_recipe import SAME_PLACE, BeamRecipe, Segment, segments
 from flexclear.pipeline.structure.fe.section import POINTS
 from flexclear.pipeline.structure.fe.vtu import vtu
 
@@ -26,11 +20,8 @@ from flexclear.pipeline.structure.fe.vtu import vtu
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
 
 
-def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, folder: Path, where: str) -> xr.Dataset:
-    """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest).
-
-    folder: not needed, nothing of a beam is in files.  where: name of the recipe in messages.
-    """
+def build(recipe: BeamRecipe, folder: Path, where: str) -> xr.Dataset:
+    """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest)."""
     parts = segments(recipe)
     x = _nodes(parts)
     R_MR = quaternion_to_matrix(recipe.pose.as_quaternion())
@@ -58,7 +49,7 @@ def _nodes(parts: tuple[Segment, ...]) -> np.ndarray:
     return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
 
 
-def _constants(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[Segment, ...]) -> dict[str, Any]:
+def _constants(recipe: BeamRecipe, parts: tuple[Segment, ...]) -> dict[str, Any]:
     """Material and section constants of the cells; at the middle of a tapered one, with profiles about it."""
     tapers = any(part.end_section is not None for part in parts)
     pieces = [_segment_constants(recipe, part, tapers) for part in parts]
@@ -74,9 +65,7 @@ def _constants(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[Se
     return {name: (dims[name], values) for name, values in joined.items()}
 
 
-def _segment_constants(
-    recipe: StraightBeamRecipe | SegmentedBeamRecipe, part: Segment, tapers: bool
-) -> dict[str, np.ndarray]:
+def _segment_constants(recipe: BeamRecipe, part: Segment, tapers: bool) -> dict[str, np.ndarray]:
     n, material = part.elements, part.material or recipe.material
     middle = _section(recipe, part, (np.arange(n) + 0.5) / n)
     values = middle | {
@@ -94,7 +83,7 @@ def _segment_constants(
     return values
 
 
-def _section(recipe: StraightBeamRecipe | SegmentedBeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.ndarray]:
+def _section(recipe: BeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.ndarray]:
     """Section constants at the shares s of a segment, each of shape (s,) or (s, 3)."""
     stiffness = section_recipe.constants(part.section, part.end_section, s)
     polar, about_y, about_z, product = section_recipe.inertia(part.section, part.end_section, part.inertia_section, s)
@@ -117,9 +106,7 @@ def _each(s: np.ndarray, *values: Any) -> np.ndarray:
     return columns if len(values) > 1 else columns[:, 0]
 
 
-def _lumps(
-    recipe: StraightBeamRecipe | SegmentedBeamRecipe, x: np.ndarray, R_MR: np.ndarray, where: str
-) -> dict[str, Any]:
+def _lumps(recipe: BeamRecipe, x: np.ndarray, R_MR: np.ndarray, where: str) -> dict[str, Any]:
     if not recipe.masses:
         return {}
     masses = recipe.masses
@@ -133,7 +120,7 @@ def _lumps(
     }
 
 
-def _attributes(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[Segment, ...]) -> dict[str, str]:
+def _attributes(recipe: BeamRecipe, parts: tuple[Segment, ...]) -> dict[str, str]:
     return {
         "title": recipe.title,
         "section": _types(part.section for part in parts),
@@ -156,12 +143,10 @@ def _node_at(x: np.ndarray, position: float, where: str) -> int:
         return nearest
     neighbours = sorted(np.argsort(np.abs(x - position))[:2])
     shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in neighbours)
-    raise InputError(
-        where,
-        f"{position * 1e3:.6g} mm lies on no node; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm "
-        f"have nodes at {shown}",
-        f"move the {'mass' if '[masses.' in where else 'frame'} to a node, or choose another number of elements",
-    )
+    there = f"{len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}"
+    moved = "mass" if "[masses." in where else "frame"
+    remedy = f"move the {moved} to a node, or choose another number of elements"
+    raise InputError(where, f"{position * 1e3:.6g} mm lies on no node; {there}", remedy)
 
 
 def as_vtu(mesh: xr.Dataset) -> bytes:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position
-from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
+from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, Positive
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, TurnedFrame
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
@@ -25,21 +25,39 @@ class StraightBeam(Part):
     """of the rod"""
 
 
-class Segment(Part):
+class Piece(Part):
+    """A rod of one section or taper, cut into equal elements."""
+
+    elements: Elements
+    """number of elements"""
+    section: StiffnessSection
+    """gives area and stiffness"""
+    end_section: StiffnessSection | None = None
+    """the one at the far end when it tapers linearly from `section`, of the same type"""
+    inertia_section: InertiaSection | None = None
+    """gives the second moments of the mass; default: `section`"""
+
+    @model_validator(mode="after")
+    def _can_taper(self) -> Piece:
+        start, end = self.section, self.end_section
+        if end is None:
+            return self
+        if start.type not in DIMENSIONS:
+            raise ValueError(f"a {start.type} section has no dimensions to taper; cut the rod into segments")
+        if end.type != start.type:
+            raise ValueError(f"a taper keeps the type of the section; it cannot go from {start.type} to {end.type}")
+        if end.shear_coefficient is not None:
+            raise ValueError("the shear coefficient of a taper is said once, in `section`")
+        return self
+
+
+class Segment(Piece):
     """A piece of a stepped rod, cut into equal elements."""
 
     start: Length
     """positions along the rod"""
     end: Length
     """positions along the rod"""
-    elements: Elements
-    """number of elements"""
-    section: StiffnessSection
-    """cross section"""
-    end_section: StiffnessSection | None = None
-    """the section at `end` when it tapers linearly from `section`, of the same type"""
-    inertia_section: InertiaSection | None = None
-    """gives the second moments of the mass; default: `section`"""
     material: Isotropic | None = None
     """where it differs from the recipe's"""
 
@@ -47,7 +65,6 @@ class Segment(Part):
     def _has_a_length(self) -> Segment:
         if not self.start < self.end:
             raise ValueError(f"a segment ends after it starts, not at {self.end:g} m after {self.start:g} m")
-        check_taper(self.section, self.end_section)
         return self
 
 
@@ -107,6 +124,8 @@ class NodeFrame(TurnedFrame):
 class BeamRecipe(BodyRecipe):
     """What all beams have."""
 
+    material: Isotropic
+    """elastic constants and density"""
     theory: Literal["euler-bernoulli", "rayleigh", "timoshenko"] = "rayleigh"
     """of bending; Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko has shear too"""
     torsion: Literal["linear", "quadratic"] = "linear"
@@ -120,28 +139,24 @@ class BeamRecipe(BodyRecipe):
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
     """named frames at nodes"""
 
+    @model_validator(mode="after")
+    def _shear_known(self) -> BeamRecipe:
+        for k, piece in enumerate(segments(self)):
+            section = piece.section
+            if self.theory == "timoshenko" and section.type == "general" and section.shear_coefficient is None:
+                where = f"shape.segments.{k}.section" if isinstance(self, SegmentedBeamRecipe) else "section"
+                raise ValueError(
+                    f"{where}: a Timoshenko beam needs the shear coefficient of a general section; "
+                    "give shear_coefficient, or choose the theory 'rayleigh'"
+                )
+        return self
 
-class StraightBeamRecipe(BeamRecipe):
+
+class StraightBeamRecipe(Piece, BeamRecipe):
     """A uniform or linearly tapered rod."""
 
-    elements: Elements
-    """number of elements"""
     shape: StraightBeam
     """the rod"""
-    material: Isotropic
-    """elastic constants and density"""
-    section: StiffnessSection
-    """gives area and stiffness"""
-    end_section: StiffnessSection | None = None
-    """the one at the far end of a linear taper, of the same type"""
-    inertia_section: InertiaSection | None = None
-    """gives the second moments of the mass; default: `section`"""
-
-    @model_validator(mode="after")
-    def _sections_fit(self) -> StraightBeamRecipe:
-        check_taper(self.section, self.end_section)
-        check_shear(self.theory, "section", self.section)
-        return self
 
 
 class SegmentedBeamRecipe(BeamRecipe):
@@ -149,47 +164,12 @@ class SegmentedBeamRecipe(BeamRecipe):
 
     shape: SegmentedBeam
     """the rod and its pieces"""
-    material: Isotropic
-    """elastic constants and density"""
-
-    @model_validator(mode="after")
-    def _shear_known(self) -> SegmentedBeamRecipe:
-        for k, segment in enumerate(self.shape.segments):
-            check_shear(self.theory, f"shape.segments.{k}.section", segment.section)
-        return self
 
 
-def segments(recipe: StraightBeamRecipe | SegmentedBeamRecipe) -> tuple[Segment, ...]:
+def segments(recipe: BeamRecipe) -> tuple[Segment, ...]:
     """The recipe's segments, one for a straight beam."""
     if isinstance(recipe, SegmentedBeamRecipe):
         return recipe.shape.segments
-    whole = Segment(
-        start=0.0,
-        end=recipe.shape.length,
-        elements=recipe.elements,
-        section=recipe.section,
-        end_section=recipe.end_section,
-        inertia_section=recipe.inertia_section,
-    )
-    return (whole,)
-
-
-def check_taper(start: Any, end: Any | None) -> None:
-    """ValueError unless `end` is None or a section that `start` can taper to."""
-    if end is None:
-        return
-    if start.type not in DIMENSIONS:
-        raise ValueError(f"a {start.type} section has no dimensions to taper; cut the rod into segments")
-    if end.type != start.type:
-        raise ValueError(f"a taper keeps the type of the section; it cannot go from {start.type} to {end.type}")
-    if end.shear_coefficient is not None:
-        raise ValueError("the shear coefficient of a taper is said once, in `section`")
-
-
-def check_shear(theory: str, where: str, section: Any) -> None:
-    """ValueError when a Timoshenko beam has a section without shear coefficient."""
-    if theory == "timoshenko" and section.type == "general" and section.shear_coefficient is None:
-        raise ValueError(
-            f"{where}: a Timoshenko beam needs the shear coefficient of a general section; "
-            "give shear_coefficient, or choose the theory 'rayleigh'"
-        )
+    assert isinstance(recipe, StraightBeamRecipe)
+    of_piece = {name: getattr(recipe, name) for name in Piece.model_fields}
+    return (Segment.model_construct(start=0.0, end=recipe.shape.length, **of_piece),)

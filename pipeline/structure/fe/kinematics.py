@@ -15,7 +15,7 @@ degrees); Przemieniecki (1968), ch. 5 and 11.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -108,43 +108,29 @@ class Kinematics:
 
     elements: Callable[[int, int], list[Element]]
     component: tuple[int, ...]
-    strains: Callable[[Sequence[Any]], dict[str, Any]]
-    section: Callable[[Sequence[Any]], tuple[tuple[Any, ...], tuple[Any, ...]]]
-
-
-def _bernoulli_strains(fields: Sequence[Any]) -> dict[str, Any]:
-    u, t, v, w = fields
-    return {"stretch": u.grad[0], "twist": t.grad[0], "bend_v": v.hess[0][0], "bend_w": w.hess[0][0]}
-
-
-def _bernoulli_section(fields: Sequence[Any]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    u, t, v, w = fields
-    return (u, v, w), (t, v.grad[0], w.grad[0])
-
-
-def _timoshenko_strains(fields: Sequence[Any]) -> dict[str, Any]:
-    u, t, v, a, w, b = fields
-    bending = {"bend_v": a.grad[0], "bend_w": b.grad[0]}
-    shear = {"shear_v": v.grad[0] - a, "shear_w": w.grad[0] - b}
-    return {"stretch": u.grad[0], "twist": t.grad[0]} | bending | shear
-
-
-def _timoshenko_section(fields: Sequence[Any]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    u, t, v, a, w, b = fields
-    return (u, v, w), (t, a, b)
+    strains: Callable[..., dict[str, Any]]
+    section: Callable[..., tuple[tuple[Any, ...], tuple[Any, ...]]]
 
 
 BERNOULLI = Kinematics(
-    lambda extension, twist: [Hierarchical(extension), Hierarchical(twist), LocalHermite(), LocalHermite()],
-    (0, 3, 1, 2),
-    _bernoulli_strains,
-    _bernoulli_section,
+    elements=lambda extension, twist: [Hierarchical(extension), Hierarchical(twist), LocalHermite(), LocalHermite()],
+    component=(0, 3, 1, 2),
+    strains=lambda u, t, v, w: _strains(u, t, v.hess[0][0], w.hess[0][0]),
+    section=lambda u, t, v, w: ((u, v, w), (t, v.grad[0], w.grad[0])),
 )
 TIMOSHENKO = Kinematics(
-    lambda extension, twist: [Hierarchical(degree) for degree in (extension, twist, 3, 2, 3, 2)],
-    (0, 3, 1, 5, 2, 4),
-    _timoshenko_strains,
-    _timoshenko_section,
+    elements=lambda extension, twist: [Hierarchical(degree) for degree in (extension, twist, 3, 2, 3, 2)],
+    component=(0, 3, 1, 5, 2, 4),
+    strains=lambda u, t, v, a, w, b: (
+        _strains(u, t, a.grad[0], b.grad[0]) | {"shear_v": v.grad[0] - a, "shear_w": w.grad[0] - b}
+    ),
+    section=lambda u, t, v, a, w, b: ((u, v, w), (t, a, b)),
 )
+
+
+def _strains(u: Any, t: Any, bend_v: Any, bend_w: Any) -> dict[str, Any]:
+    return {"stretch": u.grad[0], "twist": t.grad[0], "bend_v": bend_v, "bend_w": bend_w}
+
+
 #: by the recipe's name of the theory; Euler-Bernoulli and Rayleigh differ in the mass alone
 THEORIES = {"euler-bernoulli": BERNOULLI, "rayleigh": BERNOULLI, "timoshenko": TIMOSHENKO}

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import skew
 
 #: directions of a frame's motion, in the order of every six
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+#: the same of a node's unknowns
+DOFS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)
@@ -64,16 +67,20 @@ class Drawn:
     """What is drawn of the body: nodes, cells of one kind, and their motion.
 
     position: [m], shape (nodes, 3).  cell: shape (cells, corners).  radius: of line cells [m], else zero, (cells,).
-    translation, rotation: shape (3 nodes, ndof), node by node.
+    motion: of each node in turn along DIRECTIONS, shape (6 nodes, ndof).
     outline: of line cells that are not round: from the line to points around it [m], closed, (cells, points, 3).
     """
 
     position: np.ndarray
     cell: np.ndarray
     radius: np.ndarray
-    translation: sp.csr_array
-    rotation: sp.csr_array
+    motion: sp.csr_array
     outline: np.ndarray | None = None
+
+    def moved(self, vectors: np.ndarray) -> np.ndarray:
+        """Motion of the nodes along DIRECTIONS, shape (nodes, 6, n), for vectors of shape (ndof, n)."""
+        shapes: np.ndarray = (self.motion @ vectors).reshape(-1, 6, vectors.shape[1])
+        return shapes
 
     def at_rest(self) -> dict[str, np.ndarray]:
         """What is drawn of the body at rest, by names of schema BUNDLE."""
@@ -115,6 +122,41 @@ class Model:
         }
 
 
+def interfaces(mesh: xr.Dataset, motion: Callable[[int], sp.csr_array]) -> tuple[Interface, ...]:
+    """Every named frame of a mesh; motion: functionals of a frame by its number."""
+    rows = zip(*(mesh[name].values for name in ("frame", "frame_position", "frame_rotation")), strict=True)
+    return tuple(Interface(str(name), x, R, motion(k)) for k, (name, x, R) in enumerate(rows))
+
+
+def grouped(groups: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Members of all groups, one after the other, and the number of the group of each."""
+    members = [np.zeros(0, dtype=np.int64), *groups]
+    return np.concatenate(members), np.repeat(np.arange(-1, len(members) - 1), [len(group) for group in members])
+
+
+def selection(
+    unknowns: np.ndarray, size: int, rows: np.ndarray | None = None, count: int | None = None
+) -> sp.csr_array:
+    """Rows that are one unknown of a vector each, shape (count, size); rows: which of them are not empty."""
+    at = np.arange(len(unknowns)) if rows is None else rows
+    return sp.csr_array((np.ones(len(unknowns)), (at, unknowns)), shape=(len(at) if count is None else count, size))
+
+
+def node_motion(node: np.ndarray, component: np.ndarray, count: int) -> sp.csr_array:
+    """The six motions of `count` nodes in turn, shape (6 count, ndof), zero where a node has no such unknown.
+
+    node: index of that of each unknown.  component: index in DIRECTIONS, or more.
+    """
+    own = np.flatnonzero(component < 6)
+    return selection(own, len(node), 6 * node[own] + component[own], 6 * count)
+
+
+def carried(lever: np.ndarray) -> np.ndarray:
+    """Displacement of points that follow a frame per unit of its six motions; lever: from there [m], (..., 3)."""
+    unit = np.broadcast_to(np.eye(3), (*lever.shape[:-1], 3, 3))
+    return np.concatenate([unit, -skew(lever)], axis=-1)  # e x X = -X x e
+
+
 def rigid_motions(positions: np.ndarray, component: np.ndarray, about: np.ndarray) -> np.ndarray:
     """Three translations, three rotations about a point, shape (ndof, 6).
 
@@ -123,7 +165,7 @@ def rigid_motions(positions: np.ndarray, component: np.ndarray, about: np.ndarra
     """
     motion = np.zeros((len(positions), 7, 6))
     motion[:, range(6), range(6)] = 1.0
-    motion[:, :3, 3:] = -skew(positions - about)  # e x X = -X x e
+    motion[:, :3, :] = carried(positions - about)
     return motion[np.arange(len(positions)), np.minimum(component, 6)]
 
 

@@ -1,21 +1,74 @@
-"""Mesh recipes: what a file under meshes/ may say."""
+"""Mesh recipes: what a file under meshes/ may say, of bodies that another finite element code has assembled too."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
+from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.json_schema import identified
 from flexclear.pipeline.core.scene.load import RECIPE, read_toml, require_kind
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
-from flexclear.pipeline.structure.fe.exchange.recipe import MatricesRecipe
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, TurnedFrame
 from flexclear.pipeline.structure.fe.solid.recipe import SolidRecipe
+
+
+class Matrices(Part):
+    """Stiffness and mass of a free body, and a table of what their rows are.
+
+    Either `file`, an npz as `exchange.files.write_npz` makes it, or `stiffness` and `mass` (MatrixMarket) and
+    `unknowns` (CSV with the columns node, x, y, z, component, one line per row of the matrices).
+    """
+
+    type: Literal["matrices"]
+    units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms"]
+    """the consistent system of all numbers in the files; a file does not say. Paths are relative to the recipe"""
+    file: str | None = None
+    """npz with everything"""
+    stiffness: str | None = None
+    """MatrixMarket files"""
+    mass: str | None = None
+    """MatrixMarket files"""
+    unknowns: str | None = None
+    """CSV table of the rows"""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Matrices:
+        three = [name for name in ("stiffness", "mass", "unknowns") if getattr(self, name) is not None]
+        if (self.file is None) == (not three) or (three and len(three) < 3):
+            raise ValueError("give either `file`, or all of `stiffness`, `mass` and `unknowns`")
+        return self
+
+
+class TableFrame(TurnedFrame):
+    """A named frame at a node with six unknowns, or following the mean motion of several (RBE3, equal weights)."""
+
+    node: int | None = None
+    """number from the table of unknowns"""
+    nodes: tuple[int, ...] = ()
+    """numbers from the table of unknowns"""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> TableFrame:
+        if (self.node is None) == (not self.nodes):
+            raise ValueError("give either `node` or `nodes`")
+        return self
+
+
+class MatricesRecipe(BodyRecipe):
+    """A body given by its matrices."""
+
+    shape: Matrices
+    """files of the matrices"""
+    frames: Annotated[dict[str, TableFrame], Field(min_length=1)]
+    """named frames and their nodes"""
+
 
 #: every kind of recipe; `Recipe` is any of them
 Recipe = StraightBeamRecipe | SegmentedBeamRecipe | SolidRecipe | MatricesRecipe
@@ -60,17 +113,14 @@ def recipe_schema() -> dict[str, Any]:
     """The schema of a recipe file: which keys there are depends on `shape.type`."""
     adapter: TypeAdapter[Any] = TypeAdapter(Recipe)
     schema = adapter.json_schema(mode="validation")
-    branches = schema.pop("anyOf")
-    shapes = {
-        kind: next(b for b in branches if b["$ref"].endswith(f"/{model.__name__}")) for kind, model in MODELS.items()
-    }
+    del schema["anyOf"]
     # a choice by the shape, so that an editor reports what is wrong with this kind and not with all others
     chosen = [
         {
             "if": {"properties": {"shape": {"properties": {"type": {"const": kind}}, "required": ["type"]}}},
-            "then": branch,
+            "then": {"$ref": f"#/$defs/{model.__name__}"},
         }
-        for kind, branch in shapes.items()
+        for kind, model in MODELS.items()
     ]
     shape = {"type": "object", "required": ["type"], "properties": {"type": {"enum": list(MODELS)}}}
     whole = {"title": "Recipe", "type": "object", "required": ["shape"], "properties": {"shape": shape}}

@@ -8,10 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
-from flexclear.pipeline.core.scene.fields import Density, Direction, Number, Part, Pressure, given_once
+from flexclear.pipeline.core.scene.fields import Density, Direction, Number, Part, Positive, Pressure, given_once
 from flexclear.pipeline.core.scene.registry import suggestion
-
-Positive = Field(gt=0.0)
 
 
 class Isotropic(Part):

@@ -6,6 +6,7 @@ Every function takes floats, or arrays of one shape for a section that changes a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ _GAUSS = np.polynomial.legendre.leggauss(5)
 #: points on [0, 1] and weights, shape (points,)
 POINTS = 0.5 * (1.0 + _GAUSS[0])
 WEIGHTS = 0.5 * _GAUSS[1]
+#: a section is of a type when its second moments are those of the type
+SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,41 @@ def rectangle_torsion(width: Value, height: Value) -> Value:
     return torsion if np.ndim(torsion) else float(torsion)
 
 
+def shape(types: tuple[str, ...], given: Section) -> tuple[str, tuple[float, ...]]:
+    """Which of `types` a section with these constants is, and its lengths as this type takes them; empty for none."""
+    for name in types:
+        lengths = _LENGTHS[name](given) if name in _LENGTHS else ()
+        if lengths and (len(types) == 1 or _is(globals()[name](*lengths), given)):
+            return name, lengths
+    return "", ()
+
+
+def _is(made: Section, given: Section) -> bool:
+    a, b = (np.array([s.torsion, s.second_y, s.second_z], dtype=float) for s in (made, given))
+    return bool(np.all(np.abs(a - b) <= SAME * b))
+
+
+def _tube_lengths(given: Section) -> tuple[float, ...]:
+    # A = pi (R^2 - r^2) and I = A (R^2 + r^2) / 4
+    total, difference = float(4.0 * given.second_y / given.area), float(given.area / math.pi)
+    if difference >= total:
+        return ()
+    return math.sqrt(0.5 * (total + difference)), math.sqrt(0.5 * (total - difference))
+
+
+def _rectangle_lengths(given: Section) -> tuple[float, ...]:
+    ratio = math.sqrt(given.second_z / given.second_y)
+    return math.sqrt(given.area * ratio), math.sqrt(given.area / ratio)
+
+
+#: lengths of a section of a type with given constants, as the type takes them; empty where there is none
+_LENGTHS: dict[str, Callable[[Section], tuple[float, ...]]] = {
+    "circle": lambda given: (math.sqrt(given.area / math.pi),),
+    "tube": _tube_lengths,
+    "rectangle": _rectangle_lengths,
+}
+
+
 def tube_shear_coefficient(poisson: float, ratio: Value) -> Value:
     """Shear coefficient of a tube with the inner over the outer radius m = `ratio`, which is 0 for a full circle.
 
@@ -87,12 +125,8 @@ def tube_shear_coefficient(poisson: float, ratio: Value) -> Value:
     Source: Cowper (1966), J. Appl. Mech. 33, 335-340.
     """
     square_of_sum = (1.0 + ratio**2) ** 2
-    return (
-        6.0
-        * (1.0 + poisson)
-        * square_of_sum
-        / ((7.0 + 6.0 * poisson) * square_of_sum + (20.0 + 12.0 * poisson) * ratio**2)
-    )
+    whole = (7.0 + 6.0 * poisson) * square_of_sum + (20.0 + 12.0 * poisson) * ratio**2
+    return 6.0 * (1.0 + poisson) * square_of_sum / whole
 
 
 def rectangle_shear_coefficient(poisson: float) -> float:

@@ -7,11 +7,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Area, Length, Number, Part, SecondMoment
+from flexclear.pipeline.core.scene.fields import Area, Length, Number, Part, Positive, SecondMoment
 from flexclear.pipeline.structure.fe import section as sections
 from flexclear.pipeline.structure.fe.section import Section, Value
-
-Positive = Field(gt=0.0)
 
 
 def _pair(value: Any) -> Any:
@@ -111,12 +109,9 @@ class EqualAreaSquare(Part):
     type: Literal["equal-area-square"]
 
 
-StiffnessSection = Annotated[
-    CircleSection | TubeSection | RectangleSection | GeneralSection, Field(discriminator="type")
-]
-InertiaSection = Annotated[
-    CircleSection | TubeSection | RectangleSection | GeneralSection | EqualAreaSquare, Field(discriminator="type")
-]
+AnySection = CircleSection | TubeSection | RectangleSection | GeneralSection
+StiffnessSection = Annotated[AnySection, Field(discriminator="type")]
+InertiaSection = Annotated[AnySection | EqualAreaSquare, Field(discriminator="type")]
 
 #: lengths that a linear taper changes
 DIMENSIONS: dict[str, tuple[str, ...]] = {

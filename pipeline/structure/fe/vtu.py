@@ -34,9 +34,8 @@ def vtu(
 def of_modes(modes: xr.Dataset) -> bytes:
     """What is drawn of the body, with each shape as a vector at the nodes: ``mode_001_1563.71_Hz``, largest one 1."""
     points = {}
-    for k, (hertz, shape) in enumerate(
-        zip(modes["frequency"].values, modes["shape"].values.transpose(2, 0, 1), strict=True)
-    ):
+    shapes = modes["shape"].values.transpose(2, 0, 1)
+    for k, (hertz, shape) in enumerate(zip(modes["frequency"].values, shapes, strict=True)):
         name = f"mode_{k + 1:03d}_{hertz:.6g}_Hz"
         size = np.linalg.norm(shape[:, :3], axis=1).max()
         points[name] = shape[:, :3] / (size or 1.0)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.structure.fe.exchange import mesh as meshes
-from flexclear.pipeline.structure.fe.exchange.model import assemble
+from flexclear.pipeline.structure.fe.exchange import matrices
 from flexclear.pipeline.structure.kinds.kind import Kind
 
 KIND = Kind(
-    build=meshes.build,
-    vtu=meshes.as_vtu,
-    assemble=assemble,
+    build=matrices.build,
+    vtu=matrices.as_vtu,
+    assemble=matrices.assemble,
     words=lambda model, families, vectors: ["elastic"] * vectors.shape[1],
 )

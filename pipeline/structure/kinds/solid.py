@@ -21,7 +21,7 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     _, extent, axes = np.linalg.svd(X, full_matrices=False)
     if extent[1] > SLENDER * extent[0]:
         return ["elastic"] * vectors.shape[1]
-    u = (model.drawn.translation @ vectors).reshape(len(X), 3, -1)
+    u = model.drawn.moved(vectors)[:, :3]
     axis = axes[0]
     across = X - np.outer(X @ axis, axis)
     size = np.linalg.norm(across, axis=1, keepdims=True)

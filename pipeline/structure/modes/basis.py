@@ -1,4 +1,7 @@
-"""The shapes of a body under a reference condition: static ones, and as many normal modes as are requested."""
+"""The shapes of a body under a reference condition: static ones, and as many normal modes as are requested.
+
+Of equal frequencies all modes are retained or none.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +13,30 @@ import numpy as np
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import Interface, Model
-from flexclear.pipeline.structure.modes import compliance, eigen, normal, select
+from flexclear.pipeline.structure.modes import deficits, eigen, normal
 from flexclear.pipeline.structure.modes.condition import Condition
-from flexclear.pipeline.structure.modes.normal import Normal
-from flexclear.pipeline.structure.modes.select import ModeRequest
+from flexclear.pipeline.structure.modes.normal import WHERE, Normal
 from flexclear.pipeline.structure.modes.statics import Flexibility, border
 
 #: normal modes tried first where a fraction decides how many are needed; then twice as many, and so on
 FIRST = 16
+#: modes to compute beyond those requested, to see where the last cluster ends
+MARGIN = 8
 
 
-@dataclass(frozen=True)
-class Basis:
-    """Independent shapes that respect a reference condition, in any combination and scale.
+@dataclass(frozen=True, slots=True)
+class ModeRequest:
+    """What decides the number of coordinates; nothing at all means every one that the mesh has.
 
-    vectors: shape (ndof, count).
-    rigid_frequency: frequencies [Hz] of rigid-body modes that were found and left out, ascending; may be empty.
+    count: elastic coordinates, static ones included.  up_to: highest normal retained frequency [Hz].
+    compliance: least fraction of the static compliance between the interfaces, in each direction.
+    mass: least fraction of the mass that moves with the basis, in each direction.
     """
 
-    vectors: np.ndarray
-    rigid_frequency: np.ndarray
+    count: int | None = None
+    up_to: float | None = None
+    compliance: float | None = None
+    mass: float | None = None
 
 
 @dataclass(frozen=True)
@@ -47,8 +54,11 @@ class Body:
         return normal.lowest(self.model, self.condition.held, count, self.flexibility, self.progress)
 
 
-def build(body: Body, requested: ModeRequest) -> Basis:
+def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
     """Static shapes and normal modes, rigid motion taken out where the condition says so.
+
+    Independent shapes that respect the condition, in any combination and scale, (ndof, count); and frequencies [Hz] of
+    rigid-body modes that were found and left out, ascending, maybe none.
 
     Raises InputError for a count beyond the mesh or within a cluster, and for shares that no count reaches.
     """
@@ -58,23 +68,58 @@ def build(body: Body, requested: ModeRequest) -> Basis:
     static = _static(body)
     free = available(body.model, body.condition)
     if requested.count is not None or requested == ModeRequest():
-        count = select.request(requested.count, free, static.shape[1])
+        count = request(requested.count, free, static.shape[1])
         none = Normal(np.empty(0), np.empty((body.model.size, 0)), np.empty(0))
-        modes = body.normal(min(count + select.MARGIN, free)) if count else none
-        return _joined(body, static, modes, select.whole(modes.values, count, static.shape[1]))
+        modes = body.normal(min(count + MARGIN, free)) if count else none
+        count = whole(modes.values, count, static.shape[1])
+        return _joined(body, static, modes, count), modes.rigid_frequency
     tried = FIRST
     while True:
         modes = body.normal(min(tried, free))
         # static shapes alone are a basis, no shape at all is none
-        ends = [0] * bool(static.shape[1]) + [stop for _, stop in select.clusters(modes.values)]
+        ends = [0] * bool(static.shape[1]) + [stop for _, stop in eigen.clusters(modes.values)]
         _check_first(modes, static, requested)
         # the last cluster may continue beyond what was computed
         for stop in ends if tried >= free else ends[:-1]:
             if _enough(body, static, modes, stop, requested):
-                return _joined(body, static, modes, stop)
+                return _joined(body, static, modes, stop), modes.rigid_frequency
         if tried >= free:
             raise _unreachable(body, static, modes, requested)
         tried *= 2
+
+
+def request(count: int | None, available: int, static: int = 0) -> int:
+    """How many normal modes, of `available` ones, a basis of `count` coordinates needs; None asks for all.
+
+    static: constraint modes that the count includes.  InputError for a count that the mesh cannot give.
+    """
+    if count is None:
+        return available
+    total = available + static
+    if count > total:
+        problem = f"{count} modes are asked for, the mesh has {total} elastic coordinates"
+        raise InputError(WHERE, problem, f"ask for at most {total}")
+    least = max(static, 1)
+    if count < least:
+        reason = f": the {static} constraint modes of its interfaces belong to it" if static else ""
+        raise InputError(WHERE, f"a basis of {count} modes is too small{reason}", f"ask for at least {least}")
+    return count - static
+
+
+def whole(values: np.ndarray, n: int, static: int = 0) -> int:
+    """The number n of retained modes, or InputError when it would keep a part of a cluster of equal frequencies.
+
+    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless there are no more.
+    static: as of `request`.
+    """
+    for start, stop in eigen.clusters(values):
+        if start < n < stop:
+            counts = [c + static for c in (start, stop) if c + static > 0]
+            hertz = float(eigen.frequency(values[start : start + 1])[0])
+            nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
+            problem = f"{n + static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz"
+            raise InputError(WHERE, problem, f"the nearest whole {nearest}")
+    return n
 
 
 def available(model: Model, condition: Condition) -> int:
@@ -97,7 +142,7 @@ def _static(body: Body) -> np.ndarray:
     return np.empty((body.model.size, 0))
 
 
-def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> Basis:
+def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> np.ndarray:
     shapes = modes.shapes[:, :count]
     if body.condition.residual and static.size:
         # what the retained modes answer of a load: phi phi^T f / omega^2, with f = K u
@@ -106,7 +151,7 @@ def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> Basis:
     if body.condition.mean_axes and body.condition.held.shape[0]:
         momentum = body.model.mass @ body.model.rigid
         vectors = vectors - body.model.rigid @ np.linalg.solve(body.model.rigid.T @ momentum, momentum.T @ vectors)
-    return Basis(vectors, modes.rigid_frequency)
+    return vectors
 
 
 def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> None:
@@ -120,10 +165,10 @@ def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested
     if requested.up_to is not None:
         following = modes.values[count : count + 1]
         return bool(following.size == 0 or eigen.frequency(following)[0] > requested.up_to)
-    basis = _joined(body, static, modes, count)
+    vectors = _joined(body, static, modes, count)
     if requested.compliance is not None:
-        return compliance.least(body.flexibility(), body.interfaces, basis.vectors)[0] >= requested.compliance
-    return requested.mass is not None and _mass_fraction(body.model, basis.vectors) >= requested.mass
+        return deficits.least(body.flexibility(), body.interfaces, vectors)[0] >= requested.compliance
+    return requested.mass is not None and _mass_fraction(body.model, vectors) >= requested.mass
 
 
 def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
@@ -135,9 +180,9 @@ def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
 
 
 def _unreachable(body: Body, static: np.ndarray, modes: Normal, requested: ModeRequest) -> InputError:
-    vectors = _joined(body, static, modes, len(modes.values)).vectors
+    vectors = _joined(body, static, modes, len(modes.values))
     if requested.compliance is not None:
-        fraction, where = compliance.least(body.flexibility(), body.interfaces, vectors)
+        fraction, where = deficits.least(body.flexibility(), body.interfaces, vectors)
         problem = f"with every mode of this reference condition the basis has {fraction:.3g} of the compliance {where}"
         return InputError("modes.compliance", problem, 'take one with static shapes, as reference = "craig-bampton"')
     fraction = _mass_fraction(body.model, vectors)

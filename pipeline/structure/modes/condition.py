@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe.model import DIRECTIONS, Interface, Model, own_dofs
+from flexclear.pipeline.structure.fe.model import Interface, Model, own_dofs
 
 WHERE = "modes.reference"
 ONCE = "hold each motion once; interfaces that are tied to the same nodes move alike"
@@ -48,36 +47,11 @@ class Condition:
     mean_axes: bool = False
 
 
-def holding(held: sp.csr_array, note: str, moved: np.ndarray | None = None) -> Condition:
-    """Normal modes with some functionals held, and constraint modes for `moved` ones."""
-    none = sp.csr_array((0, held.shape[1]))
-    return Condition(held, note, np.empty(0, dtype=int) if moved is None else moved, none)
-
-
-def floating(model: Model, note: str, loaded: sp.csr_array | None = None) -> Condition:
-    """Normal modes of the free body without rigid ones, and attachment modes for `loaded` functionals."""
-    none = sp.csr_array((0, model.size))
-    return Condition(none, note, np.empty(0, dtype=int), none if loaded is None else loaded, mean_axes=True)
-
-
 def joined(given: Given, count: int, needs: str) -> tuple[Interface, ...]:
     """The interfaces, of which a condition needs so many; InputError where there are fewer.  needs: in words."""
     if len(given.interfaces) < count:
         raise InputError("modes.interfaces", needs, "name the recipe's frames")
     return given.interfaces
-
-
-def functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:
-    """The motion ``frame.direction`` in axes of the frame, shape (1, ndof); InputError for unknown names."""
-    frame_name, _, direction = name.partition(".")
-    known = {frame.name: frame for frame in frames}
-    if frame_name not in known:
-        raise InputError("modes.held", f"the mesh has no frame called '{frame_name}'", suggestion(frame_name, known))
-    if direction not in DIRECTIONS:
-        raise InputError(
-            "modes.held", f"'{name}' names no direction", f"after the frame comes one of {', '.join(DIRECTIONS)}"
-        )
-    return sp.csr_array(in_own_axes(known[frame_name])[[DIRECTIONS.index(direction)]])
 
 
 def in_own_axes(frame: Interface) -> sp.csr_array:
@@ -94,11 +68,8 @@ def different(frames: tuple[Interface, ...]) -> None:
     for k, frame in enumerate(frames):
         for other in frames[:k]:
             if abs(frame.motion - other.motion).max() == 0.0:
-                raise InputError(
-                    "modes.interfaces",
-                    f"two interfaces lie on the same node: '{other.name}' and '{frame.name}'",
-                    "keep one of them",
-                )
+                problem = f"two interfaces lie on the same node: '{other.name}' and '{frame.name}'"
+                raise InputError("modes.interfaces", problem, "keep one of them")
 
 
 def check(model: Model, condition: Condition) -> None:
@@ -116,8 +87,5 @@ def check(model: Model, condition: Condition) -> None:
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / max(lengths.max(), 1e-300)] * 3])
     left = 6 - np.linalg.matrix_rank(np.asarray(held @ model.rigid) * scale, tol=1e-9)
     if left:
-        raise InputError(
-            WHERE,
-            f"the held motions leave {left} rigid-body motions of the body free",
-            'hold six motions that fix it, or take mean axes: reference = "mean-axis"',
-        )
+        problem = f"the held motions leave {left} rigid-body motions of the body free"
+        raise InputError(WHERE, problem, 'hold six motions that fix it, or take mean axes: reference = "mean-axis"')

@@ -32,10 +32,11 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.artifacts.compliance import fractions
+from flexclear.pipeline.core.artifacts.compliance import fractions, reduced
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model
-from flexclear.pipeline.structure.modes import compliance, eigen, normal
+from flexclear.pipeline.structure.fe.model import DIRECTIONS, Interface, Model
+from flexclear.pipeline.structure.modes import eigen, normal
+from flexclear.pipeline.structure.modes.condition import in_own_axes
 from flexclear.pipeline.structure.modes.statics import Flexibility
 
 #: frequencies of the error bound, as fractions of the free body's first one
@@ -51,8 +52,8 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
     model = flexibility.model
     names = [frame.name for frame in model.interfaces]
     progress(None, "compliance of the full model")
-    whole = compliance.full(flexibility, model.interfaces)
-    fraction = fractions(compliance.of_basis(flexibility, model.interfaces, vectors), whole)
+    whole = full(flexibility, model.interfaces)
+    fraction = fractions(of_basis(flexibility, model.interfaces, vectors), whole)
     first, resolved = _frequencies(flexibility, vectors, progress)
     progress(None, "error bounds")
     at = first * np.array(BOUND_AT)
@@ -76,7 +77,7 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
     model = flexibility.model
     basis = np.hstack([model.rigid, vectors])
     K, M = model.stiffness @ basis, model.mass @ basis
-    loads = compliance.frames(flexibility, model.interfaces)[0].T
+    loads = frames(flexibility, model.interfaces)[0].T
     result = np.empty((loads.shape[1], len(hertz)))
     for k, value in enumerate(hertz):
         square = (2.0 * np.pi * value) ** 2
@@ -119,3 +120,50 @@ def _effective_mass(model: Model, vectors: np.ndarray) -> np.ndarray:
     shift = np.eye(6)
     shift[:3, 3:] = -inertia[:3, 3:] / inertia[0, 0]
     return (shift.T @ (momentum.T @ vectors)) ** 2
+
+
+def frames(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Motion of p frames in their own axes: functionals, (6 p, ndof), and under the six rigid motions, (p, 6, 6)."""
+    motion = np.vstack([in_own_axes(frame).toarray() for frame in interfaces])
+    return motion, (motion @ flexibility.model.rigid).reshape(-1, 6, 6)
+
+
+def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndarray:
+    """Compliance [m/N, rad/(N m)] of each frame with each held (or, with itself, nothing), shape (p, p, 6)."""
+    (motion, rigid), p = frames(flexibility, interfaces), len(interfaces)
+    loads = np.hstack([motion.T, flexibility.momentum])
+    gram = loads.T @ flexibility.response(loads)
+    result = np.empty((p, p, 6))
+    for i in range(p):
+        for j in range(p):
+            # the load on i and its reaction: at j, or the inertia of the whole body
+            balance = np.zeros((6 * p + 6, 6))
+            balance[6 * i : 6 * i + 6] = np.eye(6)
+            if i == j:
+                balance[6 * p :] = -np.linalg.solve(flexibility.inertia, rigid[i].T)
+            else:
+                balance[6 * j : 6 * j + 6] = -np.linalg.solve(rigid[j].T, rigid[i].T)
+            result[i, j] = np.einsum("ad,ab,bd->d", balance, gram, balance)
+    return result
+
+
+def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> np.ndarray:
+    """Compliance that shapes of (ndof, n) can show, likewise; any combination and scale of them."""
+    functionals, rigid = frames(flexibility, interfaces)
+    K = vectors.T @ (flexibility.model.stiffness @ vectors)
+    relief = np.linalg.solve(flexibility.inertia, flexibility.momentum.T @ vectors)
+    scale = 1.0 / np.sqrt(np.diag(K))
+    inner = scale[:, None] * (0.5 * (K + K.T)) * scale
+    motion = (functionals @ (vectors * scale)).reshape(len(interfaces), 6, -1)
+    return reduced(motion, rigid, relief * scale, inner)
+
+
+def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
+    """Smallest fraction of the compliance between the interfaces (of a single one: of the free body), and where."""
+    whole = full(flexibility, interfaces)
+    each = fractions(of_basis(flexibility, interfaces, vectors), whole)
+    if len(interfaces) > 1:
+        each[np.arange(len(each)), np.arange(len(each))] = 1.0
+    i, j, d = np.unravel_index(int(np.argmin(each)), each.shape)
+    held = "with nothing held" if i == j else f"with '{interfaces[j].name}' held"
+    return float(each[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"

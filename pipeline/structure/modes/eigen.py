@@ -1,15 +1,21 @@
-"""The symmetric eigenproblem K x = lambda M x from its lower end, the same in every process."""
+"""The symmetric eigenproblem K x = lambda M x from its lower end, the same in every process.
+
+Where it leaves axes and signs open, they are chosen here, and so is the family of each mode.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
+from flexclear.pipeline.core.numerics.rotations import first_largest
 from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.structure.fe.model import Model
 
 #: up to here the dense solver is as quick, finds every multiple root, and gives complete bases
 DENSE_LIMIT = 900
@@ -17,6 +23,8 @@ DENSE_LIMIT = 900
 EQUAL = 1e-6
 #: modal masses further than this from one are computed again from the modes themselves
 ORTHONORMAL = 1e-12
+#: rigid eigenvalues are zero up to rounding; elastic ones lie at least this factor above them
+RIGID_GAP = 1e4
 
 
 def dense(stiffness: sp.csr_array, mass: sp.csr_array, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -59,11 +67,8 @@ def inverted(
 
 def gap(values: np.ndarray) -> tuple[int, float] | None:
     """How many eigenvalues lie below the last gap between unequal ones, and a value within it; None without gap."""
-    gaps = np.flatnonzero(np.diff(values) > 2.0 * EQUAL * np.abs(values[1:]))
-    if gaps.size == 0:
-        return None
-    last = int(gaps[-1])
-    return last + 1, float(0.5 * (values[last] + values[last + 1]))
+    last = clusters(values)[-1][0]
+    return (last, float(0.5 * (values[last - 1] + values[last]))) if last else None
 
 
 def rediagonalise(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,3 +98,68 @@ def _rayleigh_ritz(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarra
 def frequency(values: np.ndarray) -> np.ndarray:
     """Eigenvalues [rad^2/s^2] to Hz; the rounding noise of rigid modes may be negative and is shown by its size."""
     return np.sqrt(np.abs(values)) / (2.0 * np.pi)
+
+
+def clusters(values: np.ndarray) -> list[tuple[int, int]]:
+    """Ranges [start, stop) of equal eigenvalues; single ones are ranges of length one."""
+    hertz = frequency(values)
+    breaks = np.flatnonzero(np.diff(hertz) > EQUAL * hertz[1:]) + 1
+    edges = [0, *breaks.tolist(), len(values)]
+    return [(a, b) for a, b in pairwise(edges) if b > a]
+
+
+def without_rigid(values: np.ndarray, rigid: int) -> None:
+    """Check that exactly the first `rigid` eigenvalues are rigid: a gap of RIGID_GAP above them.
+
+    Raises SolverError when the gap is not there (a mechanism inside the mesh, or rounding that hides it).
+    """
+    if not values[rigid] > RIGID_GAP * np.abs(values[:rigid]).max():
+        last, first = frequency(values[rigid - 1 : rigid + 1])
+        raise SolverError(
+            f"modes: {rigid} rigid-body modes are expected below a gap, "
+            f"but mode {rigid} is at {last:.3g} Hz and mode {rigid + 1} at {first:.3g} Hz"
+        )
+
+
+def orient(model: Model, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Vectors of equal eigenvalues turned to the body's axes: its families in their order.
+
+    values: ascending, shape (n,).  vectors: mass-normalised, shape (ndof, n).
+    """
+    result = vectors.copy()
+    local, weight = model.families.local, _rank(model)
+    for start, stop in clusters(values):
+        if stop - start > 1:
+            part = vectors[:, start:stop]
+            measure = (local @ part).T @ (weight[:, None] * (local @ (model.mass @ part)))
+            turn = np.linalg.eigh(0.5 * (measure + measure.T))[1]
+            result[:, start:stop] = part @ turn[:, ::-1]
+    return result
+
+
+def _rank(model: Model) -> np.ndarray:
+    """A weight per local component that separates the families, and within one the positions along the body."""
+    families = model.families
+    return 0.25 * (1.0 - families.along) + (len(families.names) - 1 - families.member)
+
+
+def family(model: Model, vectors: np.ndarray) -> list[str]:
+    """For each vector the family with the largest fraction of its kinetic energy."""
+    families = model.families
+    fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
+    totals = np.stack([fraction[families.member == k].sum(axis=0) for k in range(len(families.names))])
+    # a solid's torsion has equal fractions along y and z
+    return [families.names[k] for k in first_largest(totals, axis=0)]
+
+
+def signed(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndarray:
+    """Each vector with its largest displacement positive (rotation, where it twists).
+
+    Of components that are equally large, as those at the two ends of an antisymmetric shape, the first counts.
+    """
+    result = vectors.copy()
+    main = dict(zip(model.families.names, model.families.main, strict=True))
+    for j, name in enumerate(families):
+        component = model.families.local[main[name]] @ vectors[:, j]
+        result[:, j] *= np.sign(component[first_largest(np.abs(component))])
+    return result

@@ -13,13 +13,14 @@ import scipy.sparse.linalg
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import Model, own_dofs
-from flexclear.pipeline.structure.modes import eigen, select
+from flexclear.pipeline.structure.modes import eigen
 from flexclear.pipeline.structure.modes.statics import Flexibility, border
 from flexclear.pipeline.structure.sparse.multifrontal import negative_pivots
 
 #: largest dense eigenproblem; its three matrices take about a gigabyte
 DENSE_MOST = 6000
 NOBODY = np.empty(0)
+WHERE = "modes.count"
 #: residual of a rough eigenvalue, relative; frequencies have an error of its square at most
 ROUGH = 1e-6
 
@@ -52,7 +53,7 @@ def lowest(
     if size <= eigen.DENSE_LIMIT or count > size // 4:
         if size > DENSE_MOST:
             most = size // 4
-            raise InputError(select.WHERE, f"{count} modes of {size} coordinates are too many", f"ask for up to {most}")
+            raise InputError(WHERE, f"{count} modes of {size} coordinates are too many", f"ask for up to {most}")
         return _dense_held(model, held, count) if held.shape[0] else _dense_free(model, count)
     return _sparse(model, held, count, flexibility(), progress, rough=rough)
 
@@ -61,7 +62,7 @@ def _dense_free(model: Model, count: int) -> Normal:
     n = model.rigid.shape[1]
     values, shapes = eigen.dense(model.stiffness, model.mass, n + min(count + 1, model.size - n))
     if len(values) > n:
-        select.without_rigid(values, n)
+        eigen.without_rigid(values, n)
     elastic = shapes[:, n : n + count]
     # the solver leaves a trace of rigid motion; momentum is to vanish to rounding
     momentum = model.mass @ model.rigid
@@ -113,7 +114,7 @@ def _rigid_frequency(model: Model, first: float) -> np.ndarray:
     """Frequencies [Hz] of the rigid motions, ascending; SolverError when they store energy."""
     K, M = (model.rigid.T @ (matrix @ model.rigid) for matrix in (model.stiffness, model.mass))
     values = scipy.linalg.eigh(K, M, eigvals_only=True)
-    select.without_rigid(np.append(values, first), len(values))
+    eigen.without_rigid(np.append(values, first), len(values))
     return np.sort(eigen.frequency(values))
 
 

@@ -13,11 +13,11 @@ from flexclear.pipeline.core.artifacts.schema import MODES, conform
 from flexclear.pipeline.core.scene.registry import lookup, suggestion
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.structure.fe.model import Interface, Model
+from flexclear.pipeline.structure.fe.model import DOFS, Interface, Model
 from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.modes import basis, deficits, eigen, orient, select
+from flexclear.pipeline.structure.modes import basis, deficits, eigen
+from flexclear.pipeline.structure.modes.basis import ModeRequest
 from flexclear.pipeline.structure.modes.condition import Condition, Given, check
-from flexclear.pipeline.structure.modes.select import ModeRequest
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 if TYPE_CHECKING:
@@ -58,17 +58,17 @@ def solve(
         return support(model, lambda fraction: progress(fraction, f"factorising {model.size} coordinates"))
 
     body = basis.Body(model, condition, given.interfaces, flexibility, progress)
-    shapes = basis.build(body, requested or ModeRequest(count=count))
-    values, vectors = eigen.rediagonalise(model.stiffness, model.mass, shapes.vectors)
-    vectors = orient.orient(model, values, vectors)
-    families = orient.family(model, vectors)
-    vectors = orient.signed(model, vectors, families)
+    shapes, rigid_frequency = basis.build(body, requested or ModeRequest(count=count))
+    values, vectors = eigen.rediagonalise(model.stiffness, model.mass, shapes)
+    vectors = eigen.orient(model, values, vectors)
+    families = eigen.family(model, vectors)
+    vectors = eigen.signed(model, vectors, families)
     data = _variables(model, values, vectors)
     data["kind"] = (("mode",), np.array(kind.words(model, families, vectors)))
     exact = kind.exact(mesh, reference, families, names) if kind.exact is not None else {}
     data |= {theory: (("mode",), hertz) for theory, hertz in exact.items()}
-    if shapes.rigid_frequency.size:
-        data["rigid_frequency"] = (("rigid_mode",), shapes.rigid_frequency)
+    if rigid_frequency.size:
+        data["rigid_frequency"] = (("rigid_mode",), rigid_frequency)
     lacks, attributes = deficits.measure(flexibility(), vectors, progress)
     attributes |= {name: mesh.attrs[name] for name in CARRIED}
     attributes |= {"reference": reference, "count": len(values), "interfaces": " ".join(names)}
@@ -94,7 +94,7 @@ def require_possible(model: Model, modes: Modes, names: Sequence[str]) -> None:
     _, condition = _held(model, modes.reference, modes.interfaces or names, modes.held, modes.of)
     if isinstance(modes.count, int) and modes.count:
         static = len(condition.moved) or condition.loaded.shape[0]
-        select.request(modes.count, basis.available(model, condition), static)
+        basis.request(modes.count, basis.available(model, condition), static)
 
 
 def _frame(model: Model, name: str) -> Interface:
@@ -105,14 +105,12 @@ def _frame(model: Model, name: str) -> Interface:
 
 
 def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[str, Any]:
-    n = vectors.shape[1]
-    moved = [(motion @ vectors).reshape(-1, 3, n) for motion in (model.drawn.translation, model.drawn.rotation)]
     return {
         "frequency": (("mode",), eigen.frequency(values)),
-        "shape": (("node", "dof", "mode"), np.concatenate(moved, axis=1)),
+        "shape": (("node", "dof", "mode"), model.drawn.moved(vectors)),
         "vector": (("unknown", "mode"), vectors),
         "node_position": (("node", "axis"), model.drawn.position),
         "cell_node": (("cell", "corner"), model.drawn.cell),
-        "dof": (("dof",), ["ux", "uy", "uz", "rx", "ry", "rz"]),
+        "dof": (("dof",), list(DOFS)),
         "frame": (("frame",), [frame.name for frame in model.interfaces]),
     }

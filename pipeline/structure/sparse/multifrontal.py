@@ -8,7 +8,7 @@ Source: Duff & Reid (1983), ACM Trans. Math. Softw. 9, 302-325; Liu (1992), SIAM
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,47 +19,6 @@ from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.structure.sparse.dissection import Tree, dissect
 
 Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True)
-class Block:
-    """Columns of the factor: own rows [start, stop) in elimination order, `below` the rows under them."""
-
-    start: int
-    stop: int
-    below: np.ndarray
-    diagonal: np.ndarray  #: lower triangle, shape (stop - start, stop - start)
-    under: np.ndarray  #: shape (len(below), stop - start)
-
-
-@dataclass(frozen=True)
-class Factor:
-    """Cholesky factor of a symmetric positive definite matrix."""
-
-    order: np.ndarray
-    blocks: tuple[Block, ...]
-
-    def smallest_pivot(self, diagonal: np.ndarray) -> float:
-        """Least pivot as a fraction of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
-        pivots = np.concatenate([np.diag(block.diagonal) for block in self.blocks]) ** 2
-        return float((pivots / diagonal[self.order]).min())
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solution for right-hand sides of shape (n,) or (n, m)."""
-        x = np.asfortranarray(right[self.order].reshape(len(self.order), -1), dtype=float)
-        for block in self.blocks:
-            own = blas.dtrsm(1.0, block.diagonal, x[block.start : block.stop], lower=1)
-            x[block.start : block.stop] = own
-            if len(block.below):
-                x[block.below] -= block.under @ own
-        for block in reversed(self.blocks):
-            own = x[block.start : block.stop]
-            if len(block.below):
-                own = own - block.under.T @ x[block.below]
-            x[block.start : block.stop] = blas.dtrsm(1.0, block.diagonal, own, lower=1, trans_a=1)
-        result = np.empty_like(x)
-        result[self.order] = x
-        return result.reshape(right.shape)
 
 
 @dataclass(frozen=True)
@@ -75,6 +34,11 @@ class Front:
     under: np.ndarray  #: shape (len(below), k)
     rest: np.ndarray  #: what is handed to the parent, shape (len(below), len(below))
 
+    @property
+    def own(self) -> slice:
+        """Its own unknowns in elimination order."""
+        return slice(self.start, self.start + len(self.diagonal))
+
     def add(self, at: np.ndarray, theirs: np.ndarray) -> None:
         """Add the lower triangle of a child's matrix; at: where its rows are here, ascending."""
         k = len(self.diagonal)
@@ -85,6 +49,36 @@ class Front:
             for column, columns in here:
                 self.under[row, column] += theirs[own:, :own][rows, columns]
         _add_lower(self.rest, there, theirs[own:, own:])
+
+
+@dataclass(frozen=True)
+class Factor:
+    """Cholesky factor of a symmetric positive definite matrix: fronts that hold it in place of the matrix."""
+
+    order: np.ndarray
+    blocks: tuple[Front, ...]
+
+    def smallest_pivot(self, diagonal: np.ndarray) -> float:
+        """Least pivot as a fraction of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
+        pivots = np.concatenate([np.diag(block.diagonal) for block in self.blocks]) ** 2
+        return float((pivots / diagonal[self.order]).min())
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solution for right-hand sides of shape (n,) or (n, m)."""
+        x = np.asfortranarray(right[self.order].reshape(len(self.order), -1), dtype=float)
+        for block in self.blocks:
+            own = blas.dtrsm(1.0, block.diagonal, x[block.own], lower=1)
+            x[block.own] = own
+            if len(block.below):
+                x[block.below] -= block.under @ own
+        for block in reversed(self.blocks):
+            own = x[block.own]
+            if len(block.below):
+                own = own - block.under.T @ x[block.below]
+            x[block.own] = blas.dtrsm(1.0, block.diagonal, own, lower=1, trans_a=1)
+        result = np.empty_like(x)
+        result[self.order] = x
+        return result.reshape(right.shape)
 
 
 Runs = list[tuple[slice, slice]]
@@ -117,7 +111,7 @@ def cholesky(matrix: sp.csr_array, positions: np.ndarray, progress: Progress = l
         if info != 0:
             raise SolverError(f"modes: a matrix of {len(tree.order)} rows is not positive definite")
         under = _under(diagonal, front)
-        blocks.append(Block(front.start, front.start + len(diagonal), front.below, diagonal, under))
+        blocks.append(replace(front, diagonal=diagonal, under=under, rest=np.empty((0, 0))))
     return Factor(tree.order, tuple(blocks))
 
 

@@ -6,12 +6,20 @@ mode acceleration and force summation, are one. What is needed of the rod is its
 for each section which slices and frames lie on its far side.
 
 There is one section at either end of every cell, so that forces which act at a node show as a jump.
-Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (mode acceleration).
+Axial stress is :math:`\sigma = N/A + M_y z/I_y - M_z y/I_z`. Shear stress of circles and tubes is the exact solution of
+St. Venant (torsion and flexure); that of rectangles the exact one of torsion and the parabola of flexure, which leaves
+out Poisson's part of the variation across the width.
+
+Sources: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (mode acceleration);
+Love, *A Treatise on the Mathematical Theory of Elasticity*, ch. XV (flexure of a hollow circular cylinder);
+Timoshenko & Goodier, *Theory of Elasticity*, sec. 109 (torsion of a rectangle).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,12 +27,30 @@ import xarray as xr
 
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import beam as beams
+from flexclear.pipeline.structure.fe import section as sections
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
-from flexclear.pipeline.structure.fe.section import POINTS, Section
-from flexclear.pipeline.structure.fe.slices import Maps, slices
-from flexclear.pipeline.structure.stress.outline import Outline, outline
+from flexclear.pipeline.structure.fe.section import POINTS, Section, Value
+from flexclear.pipeline.structure.fe.slices import slices
 
 CONSTANTS = ("area", "second_moment")
+#: fibres around a round section, a whole step of 5 deg; one of them lies in the plane of bending (`Outline.round`)
+AROUND = 72
+#: fibres along each side of a rectangle, corners included
+ALONG = 9
+#: odd terms of the series of a rectangle's torsion; they fall as 1/n^2 at the middle of a side
+TERMS = np.arange(1, 400, 2)
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Stress maps of one section.
+
+    stress: axial stress and shear along y and z [Pa] per N, Qy, Qz, T, My, Mz, shape (fibres, 3, 6).
+    round: the same about every axis, so that y may be turned into the plane of bending.
+    """
+
+    stress: np.ndarray
+    round: bool
 
 
 def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Any]) -> dict[str, Any]:
@@ -55,6 +81,7 @@ def _sections(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarr
 def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray) -> dict[str, Any]:
     body = slices(mesh, beam)
     shape = ("slice", "axis", "mode")
+    moved = (body.motion @ vectors).reshape(-1, 6, vectors.shape[1])
     x, cells = mesh["abscissa"].values, mesh.sizes["cell"]
     positions, ending = x[nodes], np.tile([False, True], cells)
     lumps = x[mesh["lump_node"].values] if "lump_node" in mesh else np.empty(0)
@@ -64,8 +91,8 @@ def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray
         "slice_mass": (("slice",), body.mass),
         "slice_position": (("slice", "axis"), body.position),
         "slice_spread": (("slice", "axis", "axis2"), body.spread),
-        "slice_translation_shape": (shape, _shapes(body.translation, vectors)),
-        "slice_rotation_shape": (shape, _shapes(body.rotation, vectors)),
+        "slice_translation_shape": (shape, moved[:, :3]),
+        "slice_rotation_shape": (shape, moved[:, 3:]),
         "slice_beyond": (("section", "slice"), np.hstack([inside, _beyond(lumps, positions, ending)]).astype(np.int8)),
         "frame_beyond": (
             ("section", "frame"),
@@ -78,10 +105,6 @@ def _beyond(points: np.ndarray, positions: np.ndarray, ending: np.ndarray) -> np
     """Whether what sits on nodes at `points` lies beyond each section; where a cell ends, its end node does."""
     ahead = points[None, :] - positions[:, None]
     return (ahead > 0.0) | (ending[:, None] & (ahead == 0.0))
-
-
-def _shapes(maps: Maps, vectors: np.ndarray) -> np.ndarray:
-    return np.stack([along @ vectors for along in maps], axis=1)
 
 
 def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
@@ -116,3 +139,72 @@ def _at_ends(mesh: xr.Dataset, name: str) -> np.ndarray:
     powers = np.vander(POINTS, increasing=True)
     ends = np.vander([0.0, 1.0], len(POINTS), increasing=True) @ np.linalg.inv(powers)
     return np.einsum("ep,cp...->ce...", ends, values)
+
+
+def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline | None:
+    """The maps of a section with these constants that is of one of `types`; None where it has no known outline."""
+    name, lengths = sections.shape(types, given)
+    if not name:
+        return None
+    made = getattr(sections, name)(*lengths)
+    return _sides(made, *lengths) if name == "rectangle" else _round(made, *lengths, poisson=poisson)
+
+
+def _round(made: Section, radius: float, inner: float = 0.0, *, poisson: float) -> Outline:
+    angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
+    ring = np.stack([np.cos(angle), np.sin(angle)])
+    y, z = np.concatenate([radius * ring, inner * ring if inner else np.zeros((2, 1))], axis=1)
+    stress = _axial(made, y, z)
+    stress[:, 1, 3], stress[:, 2, 3] = -z / made.torsion, y / made.torsion
+    stress[:, 1, 1], stress[:, 2, 1] = _flexure(y, z, radius, inner, poisson, made.second_z)
+    # a force along z is one along y, seen a quarter turn on
+    stress[:, 2, 2], stress[:, 1, 2] = _flexure(z, y, radius, inner, poisson, made.second_y)
+    return Outline(stress, True)
+
+
+def _axial(made: Section, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    stress = np.zeros((len(y), 3, 6))
+    stress[:, 0, 0] = 1.0 / made.area
+    stress[:, 0, 4], stress[:, 0, 5] = z / made.second_y, -y / made.second_z
+    return stress
+
+
+def _flexure(
+    y: np.ndarray, z: np.ndarray, radius: float, inner: float, poisson: float, second: Value
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shear stress along y and z per unit force along y."""
+    square, k = np.maximum(y**2 + z**2, 1e-12 * radius**2), 0.75 + 0.5 * poisson
+    hole = (radius * inner) ** 2
+    along = -k * (radius**2 + inner**2) - k * hole * (z**2 - y**2) / square**2 + 0.75 * (y**2 - z**2)
+    across = 2.0 * k * hole * y * z / square**2 - 1.5 * y * z
+    scale = -1.0 / (2.0 * (1.0 + poisson) * second)
+    along = along + 0.5 * poisson * y**2 + (1.0 - 0.5 * poisson) * z**2
+    return scale * along, scale * (across + (2.0 + poisson) * y * z)
+
+
+def _sides(made: Section, width: float, height: float) -> Outline:
+    s = np.linspace(-0.5, 0.5, ALONG)
+    half = np.full(ALONG, 0.5)
+    y = width * np.concatenate([s, s, half, -half, [0.0]])
+    z = height * np.concatenate([half, -half, s, s, [0.0]])
+    stress = _axial(made, y, z)
+    stress[:, 1, 3], stress[:, 2, 3] = _torsion(y, z, width, height, made.torsion)
+    stress[:, 1, 1] = 1.5 / made.area * (1.0 - (2.0 * y / width) ** 2)
+    stress[:, 2, 2] = 1.5 / made.area * (1.0 - (2.0 * z / height) ** 2)
+    return Outline(stress, False)
+
+
+def _torsion(y: np.ndarray, z: np.ndarray, width: float, height: float, J: Value) -> tuple[np.ndarray, np.ndarray]:
+    """Shear stress along y and z of a rectangle per unit torque."""
+    a, b, n = 0.5 * width, 0.5 * height, TERMS
+    sign = np.where(n % 4 == 1, 1.0, -1.0) / n**2
+    wave = np.outer(y, n) * math.pi / (2.0 * a)
+    # cosh(k z) / cosh(k b) and sinh(k z) / cosh(k b) without their large exponents
+    k, far = n * math.pi / (2.0 * a), np.abs(z)[:, None]
+    rise, fall = np.exp(-k * (b - far)), np.exp(-k * (b + far))
+    base = 1.0 + np.exp(-2.0 * k * b)
+    cosh, sinh = (rise + fall) / base, np.sign(z)[:, None] * (rise - fall) / base
+    series = 16.0 * a / math.pi**2
+    along_y = -series * np.sum(sign * sinh * np.cos(wave), axis=1)
+    along_z = 2.0 * y - series * np.sum(sign * cosh * np.sin(wave), axis=1)
+    return along_y / J, along_z / J

@@ -27,7 +27,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.coordinates import AXES
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model, rows
+from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model, grouped, rows
 from flexclear.pipeline.structure.fe.solid import elasticity
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, from_stress_points, sampled
@@ -38,6 +38,11 @@ from flexclear.pipeline.structure.modes.statics import support
 ROWS, COLUMNS = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
 #: a gauge's node is no farther from the given position than this fraction of the body's size
 ASTRAY = 0.1
+#: names, nodes and their owners in a mesh, by what a gauge may name
+CHOSEN = {
+    "frame": ("frame", "tie_node", "tie_frame"),
+    "region": ("surface_region", "patch_node", "patch_region"),
+}
 
 
 def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -49,11 +54,9 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
     shown, doubtful = surface(mesh)[0], _doubtful(mesh)
     places = _gauges(mesh, shown, gauges)
     if doubtful[shown].all():
-        raise InputError(
-            "[output] stress",
-            "all surface nodes lie in cells that touch a rigidly tied frame, where stress is an artefact of the tie",
-            "refine the mesh, or tie the frame in the mean",
-        )
+        artefact = "cells that touch a rigidly tied frame, where stress is an artefact of the tie"
+        problem = f"all surface nodes lie in {artefact}"
+        raise InputError("[output] stress", problem, "refine the mesh, or tie the frame in the mean")
     vectors, omega = modes["vector"].values, 2.0 * np.pi * modes["frequency"].values
     inertia = _inertia(elasticity.mass(solid), solid.nodes, unknowns.spread)
     loads = np.hstack([rows(model.interfaces, model.size).T.toarray(), inertia, -(model.mass @ vectors)])
@@ -62,13 +65,14 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
     names += [f"{frame.name} {direction}" for frame in model.interfaces for direction in DIRECTIONS]
     names += [f"acceleration {k}" for k in AXES] + [f"acceleration {k} per {x}" for k in AXES for x in AXES]
     names += [f"acceleration of mode {k + 1}" for k in range(len(omega))]
+    entries, gauge = grouped(places.values())
     return {
         "stress_field": (("node", "tensor", "field"), at_nodes(solid, shown, fields)),
         "field": (("field",), names),
         "node_doubtful": (("node",), doubtful[shown].astype(np.int8)),
         "gauge": (("gauge",), list(places)),
-        "gauge_node": (("gauge_entry",), np.concatenate([np.zeros(0, dtype=np.int64), *places.values()])),
-        "gauge_index": (("gauge_entry",), np.repeat(np.arange(len(places)), [len(n) for n in places.values()])),
+        "gauge_node": (("gauge_entry",), entries),
+        "gauge_index": (("gauge_entry",), gauge),
     }
 
 
@@ -140,9 +144,7 @@ def _gauges(mesh: xr.Dataset, shown: np.ndarray, gauges: Mapping[str, Mapping[st
             found[name] = np.array([_nearest(mesh["node_position"].values[shown], gauge["position"], where)])
             continue
         kind = "frame" if gauge.get("frame") is not None else "region"
-        dim, nodes, index = {"frame": ("frame", "tie_node", "tie_frame")}.get(
-            kind, ("surface_region", "patch_node", "patch_region")
-        )
+        dim, nodes, index = CHOSEN[kind]
         names = mesh[dim].values.tolist()
         if gauge[kind] not in names:
             raise InputError(f"{where} {kind}", f"no {kind} is called '{gauge[kind]}'", suggestion(gauge[kind], names))

@@ -19,9 +19,9 @@ import scipy.sparse as sp
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.external_files import reading, require_file
-from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.model import DOFS, Model
 
-COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz", "internal")
+COMPONENTS = (*DOFS, "internal")
 COLUMNS = ("node", "x", "y", "z", "component")
 #: bodies with more unknowns are exported without their integrals, which are then taken from the mass matrix
 MOMENTS_UP_TO = 1500
@@ -160,9 +160,8 @@ def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) 
     content = _table(unknowns, where, max(matrix.shape[0] for matrix in matrices))
     for path, matrix in zip((stiffness, mass), matrices, strict=True):
         if matrix.shape != (len(content.node),) * 2:
-            raise InputError(
-                where, f"'{path.name}' has the shape {matrix.shape}, '{unknowns.name}' another number of lines"
-            )
+            problem = f"'{path.name}' has the shape {matrix.shape}, '{unknowns.name}' another number of lines"
+            raise InputError(where, problem)
     return Contents(matrices[0], matrices[1], content, {})
 
 

@@ -39,21 +39,11 @@ class Solid:
     density: np.ndarray
 
 
-@dataclass(frozen=True)
-class _Pattern:
-    """Where the pair of nodes a, b of each cell lies in a sparse matrix of nodes."""
-
-    index: np.ndarray  #: (cells * nodes^2,)
-    indices: np.ndarray
-    indptr: np.ndarray
-
-
 def stiffness(solid: Solid) -> sp.csr_array:
     """Stiffness of all nodes, x y z of each in turn, shape (3 n, 3 n)."""
     at = sampled(solid.element, ELEMENTS[solid.element].stiffness_order)
-    pattern, n = _pattern(solid), len(solid.nodes)
-    pairs = solid.cells.shape[1] ** 2
-    data = np.zeros((len(pattern.indices), 3, 3))
+    (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
+    data = np.zeros((len(indices), 3, 3))
     for part in chunks(solid, at):
         weight, gradient = gradients(solid, part, at)
         c, q, a, _ = gradient.shape
@@ -65,26 +55,25 @@ def stiffness(solid: Solid) -> sp.csr_array:
         trace = shear[..., 0, 0] * np.einsum("cakbk->cab", D)
         for i in range(3):
             K[:, :, i, :, i] += trace
-        index = pattern.index[part.start * pairs : part.stop * pairs]
+        index = pairs[part].ravel()
         for i in range(3):
             for j in range(3):
                 data[:, i, j] += np.bincount(index, K[:, :, i, :, j].ravel(), minlength=len(data))
-    blocks = sp.bsr_array((data, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n))
+    blocks = sp.bsr_array((data, indices, indptr), shape=(3 * n, 3 * n))
     return symmetric(blocks.tocsr())
 
 
 def mass(solid: Solid) -> sp.csr_array:
     """Mass of the nodes for motion along one axis [kg], shape (n, n)."""
     at = sampled(solid.element, ELEMENTS[solid.element].mass_order)
-    pattern, n = _pattern(solid), len(solid.nodes)
+    (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
     products = np.einsum("qa,qb->qab", at.value, at.value).reshape(len(at.weight), -1)
-    data = np.zeros(len(pattern.indices))
-    pairs = solid.cells.shape[1] ** 2
+    data = np.zeros(len(indices))
     for part in chunks(solid, at):
         weight = _jacobian(solid, part, at)[0] * at.weight * solid.density[part][:, None]
-        index = pattern.index[part.start * pairs : part.stop * pairs]
+        index = pairs[part].ravel()
         data += np.bincount(index, (weight @ products).ravel(), minlength=len(data))
-    return symmetric(sp.csr_array((data, pattern.indices, pattern.indptr), shape=(n, n)))
+    return symmetric(sp.csr_array((data, indices, indptr), shape=(n, n)))
 
 
 def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) -> None:
@@ -97,11 +86,8 @@ def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) 
         wrong = np.flatnonzero(~(low > 0.0))
         if wrong.size:
             shown = ", ".join(str(k) for k in wrong[:5]) + (" ..." if wrong.size > 5 else "")
-            raise InputError(
-                where,
-                f"{wrong.size} of {len(cells)} cells are inverted or flat (Jacobian not positive): {shown}",
-                "mend the mesh, or renumber the cells' nodes to a right-handed order",
-            )
+            problem = f"{wrong.size} of {len(cells)} cells are inverted or flat (Jacobian not positive): {shown}"
+            raise InputError(where, problem, "mend the mesh, or renumber the cells' nodes to a right-handed order")
 
 
 def _jacobian(solid: Solid, part: slice, at: Sampled) -> tuple[np.ndarray, np.ndarray]:
@@ -125,10 +111,11 @@ def chunks(solid: Solid, at: Sampled, fields: int = 0) -> Iterator[slice]:
         yield slice(start, min(start + step, len(solid.cells)))
 
 
-def _pattern(solid: Solid) -> _Pattern:
+def _pattern(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the pairs of nodes of each cell lie in a sparse matrix of nodes, (cells, pairs); its columns and rows."""
     n, a = len(solid.nodes), solid.cells.shape[1]
     rows = np.repeat(solid.cells, a, axis=1).ravel().astype(np.int64)
     columns = np.tile(solid.cells, (1, a)).ravel().astype(np.int64)
     keys, index = np.unique(rows * n + columns, return_inverse=True)
     indptr = np.searchsorted(keys, np.arange(n + 1) * n)
-    return _Pattern(index.ravel(), (keys % n).astype(np.int32), indptr.astype(np.int32))
+    return index.reshape(-1, a * a), (keys % n).astype(np.int32), indptr.astype(np.int32)

@@ -98,11 +98,8 @@ def _check_pieces(geometry: Geometry, where: str) -> None:
     if count > 1:
         sizes = np.sort(np.bincount(label[geometry.cells[:, 0]]))[::-1]
         shown = ", ".join(str(k) for k in sizes[:5])
-        raise InputError(
-            where,
-            f"the mesh is in {count} pieces that share no node (of {shown} cells)",
-            "merge the nodes where the pieces touch, or make each a body of its own",
-        )
+        problem = f"the mesh is in {count} pieces that share no node (of {shown} cells)"
+        raise InputError(where, problem, "merge the nodes where the pieces touch, or make each a body of its own")
 
 
 def _check_numbering(geometry: Geometry, where: str) -> None:

@@ -104,26 +104,16 @@ def _regions(mesh: Mesh, solid: list[int], renumber: np.ndarray) -> tuple[dict[s
 def _cell_groups(mesh: Mesh) -> list[tuple[str, list[np.ndarray]]]:
     """Named groups of cells: for each block, the indices that belong to it."""
     groups = list(mesh.cell_sets.items())
-    named = {(tag, dim): name for name, (tag, dim) in mesh.field_data.items()}
     for key, values in mesh.cell_data.items():
         different = np.unique(np.concatenate(values))
         for value in different if len(different) <= MOST_REGIONS else ():
             chosen = [np.flatnonzero(part == value) for part in values]
             groups.append((f"{key}={value}", chosen))
             if key == "gmsh:physical":
-                groups += _physical(mesh, int(value), chosen, named)
+                groups += [(n, _of(mesh, chosen, dim)) for n, (tag, dim) in mesh.field_data.items() if tag == value]
     return groups
 
 
-def _physical(
-    mesh: Mesh, tag: int, chosen: list[np.ndarray], named: dict[tuple[int, int], str]
-) -> list[tuple[str, list[np.ndarray]]]:
-    """A Gmsh tag's groups by their names; tags of surfaces and volumes are counted apart."""
-    groups = []
-    for (known, dimension), name in named.items():
-        if known == tag:
-            of_dimension = [
-                part if block.dim == dimension else part[:0] for part, block in zip(chosen, mesh.cells, strict=True)
-            ]
-            groups.append((name, of_dimension))
-    return groups
+def _of(mesh: Mesh, chosen: list[np.ndarray], dimension: int) -> list[np.ndarray]:
+    """Those of one dimension: Gmsh counts the tags of surfaces and of volumes apart."""
+    return [part if block.dim == dimension else part[:0] for part, block in zip(chosen, mesh.cells, strict=True)]

@@ -10,6 +10,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import SOLID, conform
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.structure.fe.model import grouped
 from flexclear.pipeline.structure.fe.solid import geometry as geometries
 from flexclear.pipeline.structure.fe.solid import imported, ties
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
@@ -19,10 +20,7 @@ from flexclear.pipeline.structure.fe.vtu import vtu
 
 
 def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
-    """The mesh dataset (schema SOLID); InputError for meshes and frames that cannot be meant.
-
-    folder: what the recipe's files are relative to.  where: name of the recipe in messages.
-    """
+    """The mesh dataset (schema SOLID); InputError for meshes and frames that cannot be meant."""
     where = f"{path} [shape]"
     shape = recipe.shape
     geometry = imported.read(shape, folder, where) if isinstance(shape, MeshFile) else geometries.made(shape)
@@ -38,16 +36,8 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     for name in ("youngs_modulus", "poisson", "density"):
         data[name] = (("region",), np.array([getattr(material, name) for material in materials]))
     data |= _frames(recipe, geometry, path) | _regions(geometry)
-    return conform(
-        xr.Dataset(data),
-        SOLID,
-        title=recipe.title,
-        body_kind="solid",
-        element=geometry.element,
-        section="solid",
-        inertia_section="solid",
-        interfaces=" ".join(recipe.interfaces),
-    )
+    kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "solid") | {"element": geometry.element}
+    return conform(xr.Dataset(data), SOLID, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
 
 
 def _materials(recipe: SolidRecipe, geometry: Geometry, path: str) -> tuple[list[str], np.ndarray]:
@@ -76,18 +66,17 @@ def _regions(geometry: Geometry) -> dict[str, Any]:
     """The nodes of each named region that are on the boundary."""
     outside = geometries.boundary_nodes(geometry)
     regions = {name: np.intersect1d(nodes, outside) for name, nodes in ties.regions(geometry).items()}
-    names = list(regions)
+    nodes, region = grouped(regions.values())
     return {
-        "surface_region": (("surface_region",), names),
-        "patch_node": (("patch",), np.concatenate([regions[name] for name in names] or [np.zeros(0, dtype=np.int64)])),
-        "patch_region": (("patch",), np.repeat(np.arange(len(names)), [len(regions[name]) for name in names])),
+        "surface_region": (("surface_region",), list(regions)),
+        "patch_node": (("patch",), nodes),
+        "patch_region": (("patch",), region),
     }
 
 
 def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any]:
-    columns: dict[str, list[Any]] = {name: [] for name in ("node", "weight", "frame", "position", "rotation")}
     taken = np.full(len(geometry.nodes), -1, dtype=np.int64)
-    names = list(recipe.frames)
+    names, tied, weights, origins = list(recipe.frames), [], [], []
     for k, (name, frame) in enumerate(recipe.frames.items()):
         where = f"{path} [frames.{name}.on]"
         nodes = ties.chosen(geometry, frame.on, where)
@@ -96,25 +85,23 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any
         if frame.tie == "rigid":
             other = taken[nodes].max()
             if other >= 0:
-                raise InputError(
-                    where, f"'{names[other]}' and '{name}' tie the same nodes rigidly", "make one of them a mean tie"
-                )
+                problem = f"'{names[other]}' and '{name}' tie the same nodes rigidly"
+                raise InputError(where, problem, "make one of them a mean tie")
             taken[nodes] = k
             if taken.min() >= 0:
                 raise InputError(where, "rigid ties take every node of the body", "tie fewer nodes, or their mean")
-        columns["node"].append(nodes)
-        columns["weight"].append(weight)
-        columns["frame"].append(np.full(len(nodes), k))
-        columns["position"].append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
-        columns["rotation"].append(frame.orientation())
+        tied.append(nodes)
+        weights.append(weight)
+        origins.append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
+    nodes, frames = grouped(tied)
     return {
         "frame": (("frame",), names),
         "frame_tie": (("frame",), [frame.tie for frame in recipe.frames.values()]),
-        "frame_position": (("frame", "axis"), np.array(columns["position"])),
-        "frame_rotation": (("frame", "axis", "axis2"), np.array(columns["rotation"])),
-        "tie_node": (("tie",), np.concatenate(columns["node"])),
-        "tie_weight": (("tie",), np.concatenate(columns["weight"])),
-        "tie_frame": (("tie",), np.concatenate(columns["frame"])),
+        "frame_position": (("frame", "axis"), np.array(origins)),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array([f.orientation() for f in recipe.frames.values()])),
+        "tie_node": (("tie",), nodes),
+        "tie_weight": (("tie",), np.concatenate(weights)),
+        "tie_frame": (("tie",), frames),
     }
 
 

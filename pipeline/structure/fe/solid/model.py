@@ -9,16 +9,24 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions, symmetric
+from flexclear.pipeline.structure.fe import model as models
+from flexclear.pipeline.structure.fe.model import Drawn, Families, Integrals, Model
 from flexclear.pipeline.structure.fe.solid import elasticity, ties
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid
-from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry, boundary, face_nodes
 
 #: families by direction, in the order that they take within a cluster of equal frequencies
 FAMILIES = ("y", "z", "x")
 #: components of a frame's motion by family: turning about z moves the body along y
 MEMBER = {"y": (1, 5), "z": (2, 4), "x": (0, 3)}
+#: corners of the pieces of a face with so many nodes, which are in the order of `Element.face_nodes`
+PIECES = {
+    3: [[0, 1, 2]],
+    4: [[0, 1, 2, 3]],
+    6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+    8: [[0, 1, 2, 3]],
+    9: [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]],
+}
 
 
 @dataclass(frozen=True)
@@ -39,15 +47,15 @@ def assemble(mesh: xr.Dataset) -> Model:
     line = elasticity.mass(solid)
     K = T.T @ elasticity.stiffness(solid) @ T
     M = T.T @ sp.csr_array(sp.kron(line, sp.eye_array(3))) @ T
-    interfaces = _interfaces(mesh, unknowns)
+    frames = models.interfaces(mesh, partial(_motion, mesh, unknowns))
     recipe = mesh.attrs["interfaces"].split()
-    ends = tuple(frame for name in recipe[:2] for frame in interfaces if frame.name == name)
+    ends = tuple(frame for name in recipe[:2] for frame in frames if frame.name == name)
     return Model(
-        stiffness=symmetric(K),
-        mass=symmetric(M),
-        rigid=rigid_motions(unknowns.position, unknowns.component, unknowns.position.mean(axis=0)),
+        stiffness=models.symmetric(K),
+        mass=models.symmetric(M),
+        rigid=models.rigid_motions(unknowns.position, unknowns.component, unknowns.position.mean(axis=0)),
         position=unknowns.position,
-        interfaces=interfaces,
+        interfaces=frames,
         ends=ends,
         integrate=partial(integrals, line, solid.nodes, T),
         families=families(unknowns.position, unknowns.component),
@@ -100,7 +108,7 @@ def unknowns_of(mesh: xr.Dataset) -> Unknowns:
     positions, component, first = [np.repeat(x[free], 3, axis=0)], [np.tile(np.arange(3), len(free))], {}
     for k in rigid:
         nodes, position = tie_node[tie_frame == k], mesh["frame_position"].values[k]
-        motion = ties.slaves(x[nodes], position)
+        motion = models.carried(x[nodes] - position)
         rows.append(np.broadcast_to((3 * nodes[:, None] + np.arange(3))[:, :, None], motion.shape).ravel())
         columns.append(np.broadcast_to(size + np.arange(6), motion.shape).ravel())
         values.append(motion.ravel())
@@ -114,20 +122,14 @@ def unknowns_of(mesh: xr.Dataset) -> Unknowns:
     return Unknowns(spread, np.vstack(positions), np.concatenate(component), first)
 
 
-def _interfaces(mesh: xr.Dataset, unknowns: Unknowns) -> tuple[Interface, ...]:
-    size, interfaces = len(unknowns.position), []
-    for k, name in enumerate(mesh["frame"].values):
-        position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
-        if k in unknowns.first:
-            own = unknowns.first[k] + np.arange(6)
-            motion = sp.csr_array((np.ones(6), (np.arange(6), own)), shape=(6, size))
-        else:
-            tied = mesh["tie_frame"].values == k
-            nodes, weight = mesh["tie_node"].values[tied], mesh["tie_weight"].values[tied]
-            x = mesh["node_position"].values[nodes]
-            motion = sp.csr_array(ties.mean(x, weight, nodes, position, mesh.sizes["node"]) @ unknowns.spread)
-        interfaces.append(Interface(str(name), position, rotation, motion))
-    return tuple(interfaces)
+def _motion(mesh: xr.Dataset, unknowns: Unknowns, k: int) -> sp.csr_array:
+    """Motion of frame k: its own unknowns, or the mean of its nodes."""
+    if k in unknowns.first:
+        return models.selection(unknowns.first[k] + np.arange(6), len(unknowns.position))
+    tied = mesh["tie_frame"].values == k
+    nodes, weight = mesh["tie_node"].values[tied], mesh["tie_weight"].values[tied]
+    x, position = mesh["node_position"].values, mesh["frame_position"].values[k]
+    return sp.csr_array(ties.mean(x[nodes], weight, nodes, position, len(x)) @ unknowns.spread)
 
 
 def families(position: np.ndarray, component: np.ndarray) -> Families:
@@ -149,23 +151,17 @@ def surface(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """
     geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, {}, {})
     faces = face_nodes(geometry, *boundary(geometry))
-    pieces = faces[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(faces.shape[1])[0]))
+    corners = PIECES[faces.shape[1]]
+    pieces = faces[:, corners].reshape(-1, len(corners[0]))
     used, cell = np.unique(pieces, return_inverse=True)
     return used, cell.reshape(pieces.shape)
 
 
 def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
     used, cell = surface(mesh)
-    translation = sp.csr_array(spread[(3 * used[:, None] + np.arange(3)).ravel()])
     # a solid has no rotations of its own
-    rotation = sp.csr_array(translation.shape)
-    return Drawn(mesh["node_position"].values[used], cell, np.zeros(len(cell)), translation, rotation)
-
-
-def _cut(nodes: int) -> list[list[int]]:
-    """Corners of the pieces of a face with so many nodes, which are in the order of `Element.face_nodes`."""
-    if nodes in (3, 4, 8):
-        return [[0, 1, 2]] if nodes == 3 else [[0, 1, 2, 3]]
-    if nodes == 6:
-        return [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
-    return [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]
+    unknowns, rows = (
+        (size * np.asarray(nodes)[:, None] + np.arange(3)).ravel() for size, nodes in ((3, used), (6, range(len(used))))
+    )
+    motion = sp.csr_array(models.selection(unknowns, spread.shape[0], rows, 6 * len(used)) @ spread)
+    return Drawn(mesh["node_position"].values[used], cell, np.zeros(len(cell)), motion)

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Direction, Length, Part, Position
-from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
+from flexclear.pipeline.core.scene.fields import Direction, Length, Part, Position, Positive
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, TurnedFrame
 
 Cells = Annotated[int, Field(ge=1, le=1000)]
 ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]

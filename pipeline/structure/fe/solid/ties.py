@@ -90,14 +90,8 @@ def check_rank(x: np.ndarray, where: str) -> None:
     """InputError when the nodes lie on a line, so that turning about it is not determined."""
     spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
     if len(x) < 3 or spread[1] < 1e-9 * spread[0]:
-        raise InputError(
-            where, f"{len(x)} nodes on a line cannot carry a frame's rotation", "select a face, or more nodes of it"
-        )
-
-
-def slaves(x: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Motion of nodes that follow a frame, shape (n, 3, 6)."""
-    return np.concatenate([np.broadcast_to(np.eye(3), (len(x), 3, 3)), -skew(x - position)], axis=2)
+        problem = f"{len(x)} nodes on a line cannot carry a frame's rotation"
+        raise InputError(where, problem, "select a face, or more nodes of it")
 
 
 def mean(x: np.ndarray, weight: np.ndarray, nodes: np.ndarray, position: np.ndarray, size: int) -> sp.csr_array:

@@ -1,1 +1,0 @@
-"""Closed-form results, for comparison with those of finite elements."""

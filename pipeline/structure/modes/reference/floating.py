@@ -1,0 +1,66 @@
+r"""Mean axes: the body frame follows the body as a whole, and no shape has linear or angular momentum.
+
+.. math:: \int\rho\, S\,dV = 0, \qquad \int\rho\, (X - X_c)\times S\,dV = 0
+
+Sources: Canavin & Likins (1977), J. Spacecraft 14, 724-732 (Tisserand's or Buckens' frame); Shabana, *Dynamics of
+Multibody Systems*, ch. 5; Wang & Wang (2019), sec. 3.4 and Table 5 (free-free modes).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.structure.fe.model import Model, rows
+from flexclear.pipeline.structure.modes.condition import Condition, Given, different, joined
+
+FAMILY = "flexclear.pipeline.structure.modes.reference"
+
+
+def free_free(model: Model, given: Given) -> Condition:
+    """Normal modes of the free body; `given` plays no part."""
+    return _free(model, "the six rigid-body modes below the gap in the free body's frequencies were left out")
+
+
+def craig_chang(model: Model, given: Given) -> Condition:
+    """Six inertia-relief attachment modes per interface and normal modes of the free body.
+
+    The attachment modes are the answers of the free body to unit forces and moments at the interfaces, balanced by its
+    own inertia; with them the static response at the interfaces is exact. Their rigid motion depends on the supports
+    that they were computed with and is taken out by mass orthogonality.  InputError without interfaces.
+    Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
+    """
+    different(joined(given, 1, "attachment modes need an interface to load"))
+    note = "six rigid-body modes were left out; the attachment modes' rigid motion was taken out by mass orthogonality"
+    return _free(model, note, rows(given.interfaces, model.size))
+
+
+def residual_flexibility(model: Model, given: Given) -> Condition:
+    """Six residual attachment modes per interface and normal modes of the free body, with the residual mass.
+
+    A residual attachment mode is what the retained normal modes miss of the answer to a unit load at an interface; it
+    is orthogonal to them. The space is Craig and Chang's; the shapes stay independent however many normal modes are
+    retained.  InputError without interfaces.
+    Source: MacNeal (1971), Computers & Structures 1, 581-601; Rubin (1975), AIAA Journal 13, 995-1006.
+    """
+    return replace(craig_chang(model, given), residual=True)
+
+
+def mean_axis(model: Model, given: Given) -> Condition:
+    """The shapes of the condition that `given.of` names, linear and angular momentum taken out."""
+    if given.of is None or given.of == "mean-axis":
+        problem = "mean-axis changes the shapes of another condition, and none is named"
+        raise InputError("modes.of", problem, 'name it, as of = "craig-bampton"')
+    based: Condition = lookup(FAMILY, given.of, where="modes.of")(model, given)
+    note = f"shapes of {given.of}; their linear and angular momentum was taken out"
+    return replace(based, mean_axes=True, note=note)
+
+
+def _free(model: Model, note: str, loaded: sp.csr_array | None = None) -> Condition:
+    """Normal modes of the free body without rigid ones, and attachment modes for `loaded` functionals."""
+    none = sp.csr_array((0, model.size))
+    return Condition(none, note, np.empty(0, dtype=int), none if loaded is None else loaded, mean_axes=True)
