@@ -72,7 +72,9 @@ def _at_once(graph: Graph, sources: Sources) -> set[str]:
     nor the integrators that may take over."""
     own = module_name(graph.scene.solver.integrator)
     others = {f"{INTEGRATE}.{module_name(name)}" for name in INTEGRATORS} - {f"{INTEGRATE}.{own}"}
-    waiting = [name for names in _roots(graph, ()) for name in names]
+    single = [task for task in in_order(graph.up_to("post")) if task.met]
+    met = {name for task in single for name in {*task.roots()} - {*task.roots(())}}  # others may reach it, too
+    waiting = [name for names in _roots(graph, ()) for name in names - met]
     seen = set[str]()
     while waiting:
         name = waiting.pop()

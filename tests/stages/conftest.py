@@ -17,8 +17,9 @@ import pytest
 
 from flexclear.commands import scenes
 from flexclear.commands.__main__ import main
-from flexclear.pipeline import dynamics, post
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.dynamics import analyses
+from flexclear.pipeline.post.single_run import series
 from flexclear.stages.sweeps import sweep_engine
 from tests.processes import copied
 
@@ -195,7 +196,8 @@ def project(tmp_path: Path) -> Iterator[Project]:
     folder = copied(tmp_path / "project")
     (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)
     (folder / "pipeline" / "dynamics" / "analyses.py").write_text("from flexclear.pipeline.dynamics import *\n")
-    (folder / "pipeline" / "post" / "__init__.py").write_text("from flexclear.pipeline.dynamics import log\n" + POST)
+    derived = "from flexclear.pipeline.dynamics import log\n" + POST
+    (folder / "pipeline" / "post" / "single_run" / "series.py").write_text(derived)
     made = Project(folder)
     made.add("ideal", SCENE + JOINT)
     made.add("contact", CONTACT)
@@ -209,7 +211,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     """The same two scenes and engines in this process, for what is no matter of processes or of sources."""
     engines: dict[str, Any] = {}
     exec(ENGINE + POST, engines)
-    for module, name in ((dynamics, "simulated"), (analyses, "ensemble"), (post, "derived")):
+    for module, name in ((dynamics, "simulated"), (analyses, "ensemble"), (series, "derived")):
         monkeypatch.setattr(module, name, engines[name])
     monkeypatch.setattr(scenes, "DATA", tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -162,7 +162,7 @@ def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
         scene = check(root, "driven_pendulum", sections=requested, **{"solver.rtol": 1e-10})
     else:
         scene = check(root, "bounce", ensemble={"members": 4})
-    make, left = partial(getattr(dynamics, of), scene, {}, silent), [calls]
+    make, left = partial(getattr(analyses, of), scene, {}, silent), [calls]
     whole = make()
     owner, _, name = f"flexclear.pipeline.dynamics.record.{part}".rpartition(".")
     proper = pkgutil.resolve_name(f"{owner}.{name}")

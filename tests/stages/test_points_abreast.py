@@ -16,7 +16,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record import point as points_of
 from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.run import run as runs
+from flexclear.pipeline.dynamics.run import alike
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.stages.sweeps import sweep_engine, sweep_points
 
@@ -163,13 +163,13 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
 def test_the_run_that_tells_a_points_error_takes_the_model_over(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model is made from scratch, for the first run of the first point."""
     paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "2 ms"})
-    proper, made = runs.engines, list[float]()
+    proper, made = alike.engines, list[float]()
 
     def noted(scene: Scene, *rest: Any) -> Any:
         made.append(scene.solver.rtol)
         return proper(scene, *rest)
 
-    monkeypatch.setattr(runs, "engines", noted)
+    monkeypatch.setattr(alike, "engines", noted)
     worker = runner(paper, keep=("platform.velocity.largest",), error=True)
     for clearance in (3e-4, 4e-4):
         assert not worker.run(with_numbers(paper, {"joint.A1.clearance": clearance})).refused
