@@ -133,7 +133,7 @@ def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(comm
     for module in ("integrate.radau", "integrate.newton", "run.singular_poses.collocation"):
         assert f"{module}:" in some
         assert f"{module}:" not in always
-    for module in ("dynamics.compile", "dynamics.linear", "dynamics.plan"):  # how code is made, and other commands
+    for module in ("dynamics.compile", "dynamics.plan"):  # how code is made, and other commands
         assert module not in said
 
 

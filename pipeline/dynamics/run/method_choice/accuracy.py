@@ -46,7 +46,7 @@ REFUSED_FOR_GOOD, TIGHTER_AFTER_REFUSAL = 1e-9, 0.1
 #: an error that does not fall below this fraction at the FINER_TOLERANCE has another cause than the steps
 STUCK = 0.3
 #: the default request, as a fraction of each quantity's range; it is searched for at so many tolerances at most
-BY_DEFAULT, FEW_TRIES = 1e-3, 3
+BY_DEFAULT, FEW_TRIES = 1e-3, 4
 #: what is below this fraction of the motion's natural size is rounding, which stiff rods magnify in forces
 ROUNDING_OF_MOTION = 1e-9
 
