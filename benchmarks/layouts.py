@@ -274,7 +274,7 @@ def _leg(layout: Layout, k: int, *, flexible: bool, along: float, aside: float) 
 
 
 def deviation_row(effect: Deviation) -> dict[str, float]:
-    """What a page tells of how far a platform is from the ideal one: angle [rad], z [m], its rate [m/s]."""
+    """A row on how far a platform is from the ideal one: angle [rad], z [m], its rate [m/s]."""
     return {"angle": effect.angle, "displacement": effect.displacement, "velocity": effect.velocity}
 
 

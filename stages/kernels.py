@@ -37,7 +37,12 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
 def shared(scene: Scene) -> tuple[str, ...]:
     """Equal for scenes that run on the same kernels: numbers are not compiled, and code for one wiring is left to
     the runs, a second of the processor each."""
-    return simulation.modules(scene)
+    from flexclear.pipeline.core.scene.registry import module_of
+    from flexclear.pipeline.dynamics.effects import RUNS
+    from flexclear.pipeline.dynamics.run import NAMES
+
+    ways = {module_of(RUNS, name) for name in NAMES}
+    return tuple(name for name in simulation.modules(scene) if name not in ways)
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +14,12 @@ from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Record, ea
 from benchmarks.page import Columns, table
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import scene_of
+from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import FlexclearError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
+from flexclear.pipeline.dynamics.effects import RUNS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -339,7 +342,8 @@ def show(records: list[Record]) -> str:
 def modules(case: Case) -> set[str]:
     """What decides about a case: its scene and the dynamics."""
     del case
-    return {__name__, "flexclear.pipeline.dynamics"}
+    ways = {module_of(RUNS, name) for name in import_module(RUNS).NAMES}  # that scenes call for by these names
+    return {__name__, "flexclear.pipeline.dynamics", *ways}
 
 
 FAMILY = Family(

@@ -21,6 +21,7 @@ from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options, open_workplace
 
 INTEGRATE, COMPILE = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.compile"
+RUNS = "flexclear.pipeline.dynamics.run"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,7 +99,7 @@ def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
             continue
         those = {module_of(family, name) for name in listed} & set(reached)
         yield from those - set(parts)
-        yield from inside if not those & set(parts) else ()
+        yield from inside if family != RUNS and not those & set(parts) else ()  # other modules of runs are no parts
 
 
 def named(source: str) -> Iterator[str]:

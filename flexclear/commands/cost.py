@@ -189,7 +189,7 @@ class Study:
                 "quantities": [q.written() for q in self._chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
-                "complete": self._complete and not self.undone,
+                "complete": self._complete and all(self._crawls(design) for design in self.undone),
                 "undone": _listed([design.key for design in self.undone]),
                 "peers": list(self.peers),
             },
@@ -228,7 +228,7 @@ class Study:
     def _crawls(self, design: cost_design.Design) -> bool:
         """Whether its method used up its evaluations at a tolerance that is no tighter."""
         solver = design.scene.solver
-        return solver.step is None and solver.rtol <= self.used_up.get(solver.integrator, 0.0)
+        return design.chooses_steps and solver.rtol <= self.used_up.get(solver.integrator, 0.0)
 
     def _made(self, design: cost_design.Design) -> xr.Dataset:
         """One point, brought up to date."""
@@ -245,12 +245,13 @@ class Study:
         solver = design.scene.solver
         if "evaluations" in record.attrs.get("refused", ""):
             self.spent += POINT + self._most() * self.seconds_each
-            self.used_up[solver.integrator] = max(solver.rtol, self.used_up.get(solver.integrator, 0.0))
+            if design.chooses_steps:
+                self.used_up[solver.integrator] = max(solver.rtol, self.used_up.get(solver.integrator, 0.0))
         elif "refused" in record.attrs:
             self.spent += POINT
         else:
             self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
-            if solver.step is None and design.group in ("tolerance", "sampling"):
+            if design.chooses_steps:
                 known = self.evaluations.setdefault(solver.integrator, {})
                 known[solver.rtol] = float(record.attrs["evaluations"])
         return record

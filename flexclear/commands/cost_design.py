@@ -64,6 +64,11 @@ class Design:
     scene: Scene
     recipe: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def chooses_steps(self) -> bool:
+        """Whether its evaluations are those of the scene's own model at its tolerance."""
+        return self.scene.solver.step is None and self.group in ("tolerance", "sampling")
+
     def evaluations(self, seen: Mapping[str, Mapping[float, float]], own: float) -> float:
         """Predicted evaluations of the right-hand side.
 
@@ -74,7 +79,7 @@ class Design:
         if solver.step is not None:
             return (self.scene.time.end - self.scene.time.start) / solver.step * order
         known = seen.get(solver.integrator)
-        if self.group not in ("tolerance", "sampling"):
+        if not self.chooses_steps:
             return UNSEEN * own
         if not known:
             return UNSEEN * own * max(1.0, 1e-6 / solver.rtol) ** (1.0 / (order + 1.0))

@@ -162,6 +162,6 @@ def force(run: xr.Dataset) -> np.ndarray:
 
 
 def differ(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether the means of two ensembles' members do, by `SLIGHT` and by `APART`."""
+    """Whether the means of two ensembles' members do, by `SLIGHT` and by `SEPARATION`."""
     gap, spread = abs(a.mean() - b.mean()), max(a.std(ddof=1), b.std(ddof=1))
     return bool(gap > SLIGHT * abs(b.mean()) and gap > SEPARATION * spread)

@@ -15,6 +15,7 @@ from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.limits import check_members, require_scatter
 from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import Recorded, parse_recorded
+from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.machine import instruction_set
@@ -320,8 +321,12 @@ def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]
 
 
 def _modules(requested: Plan) -> tuple[str, ...]:
-    """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
-    modules = set(simulation.modules(requested.scene))
+    """Modules that any point reaches by the names of its parts: values that are no numbers may name others.
+
+    A number, too, may call for some: a tolerance of frames for what fits them.
+    """
+    fitting = module_of("flexclear.pipeline.dynamics.run", "frames to a tolerance")
+    modules = {*simulation.modules(requested.scene), fitting}
     for _, scene in _worded(requested.scene, requested.design):
         modules |= set(simulation.modules(scene))
     return tuple(sorted(modules))

@@ -220,3 +220,9 @@ def test_what_a_run_may_meet_is_in_no_key_before_it_has(root: Path) -> None:
     assert later <= {name for known in may.values() for name in known}
     assert set(modules(scene, alone=True)).union(*may.values()) <= set(modules(scene))
     assert effects.METHOD.format("radau") not in met(load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": {}}))
+
+
+def test_a_plan_holds_what_runs_without_its_flexible_bodies_call_for(root: Path) -> None:
+    """Of a recipe's rigid body the frames are known as well as its mesh has them; a plan tries the scene with it."""
+    scene = load_scene(root / "scenes/checks/flexible_slider_crank.toml")
+    assert module_of(effects.RUNS, "frames to a tolerance") in modules(scene)

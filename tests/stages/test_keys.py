@@ -6,6 +6,7 @@ import ast
 import datetime
 import json
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -430,3 +431,16 @@ def test_what_several_tasks_meet_at_once_counts_for_each() -> None:
     meet("last")
     assert one == {"first", "second", "third"}
     assert other == {"second"}
+
+
+def test_what_is_met_is_noted_while_other_threads_begin_and_end() -> None:
+    def met(name: str) -> list[bool]:
+        kept = []
+        for _ in range(2000):
+            with noted() as mine:
+                meet(name)
+            kept.append(name in mine)
+        return kept
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(all(one) for one in pool.map(met, "abcd"))

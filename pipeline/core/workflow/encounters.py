@@ -8,22 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import Lock
 
 _noted: list[set[str]] = []
+_noting = Lock()
 
 
 def meet(what: str) -> None:
     """To be said before code is imported or compiled for something that a run has met."""
-    for met in _noted:
-        met.add(what)
+    with _noting:
+        for met in _noted:
+            met.add(what)
 
 
 @contextmanager
 def noted() -> Iterator[set[str]]:
     """What this process meets from here on; more than that of one task where several run in it."""
     met = set[str]()
-    _noted.append(met)
+    with _noting:
+        _noted.append(met)
     try:
         yield met
     finally:
-        _noted[:] = [one for one in _noted if one is not met]
+        with _noting:
+            _noted[:] = [one for one in _noted if one is not met]

@@ -79,7 +79,8 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
     last = store.last(task.folder, task.label)
     # of what the last run has not met no code counts
-    names = [name for name, modules in task.met.items() if last and all(f"module {m}" in last.facts for m in modules)]
+    always, seen = set(task.roots(())), last.facts if last is not None else {}
+    names = [name for name, those in task.met.items() if any(f"module {m}" in seen for m in {*those} - always)]
     now = _facts(task, fresh, sources, names)
     if last is None and stale:
         return State(task, None, ("never run",))

@@ -205,7 +205,8 @@ def ways(scene: Scene) -> list[str]:
     if scene.accuracy.quantities if scene.accuracy is not None else scene.solver.by_need:
         found += ["accuracy", *(["method selection"] if scene.by_need() else [])]
     found += ["horizon"] if _touches(scene) else []
-    if scene.meshed() or any(body.frame_tolerance for body in scene.rigid().values()):
+    # plans make bodies of recipes rigid, whose frames are then known as well as the mesh has them
+    if scene.recipes() or any(body.frame_tolerance for body in scene.rigid().values()):
         found.append("frames to a tolerance")
     if any(" " in load_kind(scene, name) for name in scene.forces()):
         found.append("expressions")

@@ -53,8 +53,10 @@ def _effects(compared: xr.Dataset) -> list[str]:
     for j, name in enumerate(str(q) for q in compared["quantity"].values):
         difference, error = float(last["difference"][j]), float(first["error"][j]) + float(last["error"][j])
         if np.isfinite(difference):
-            change = Influence(difference, error if np.isfinite(error) else 0.0)
-            text = in_words(change, float(first["largest"][j]), str(compared["unit"].values[j]))
+            unit = str(compared["unit"].values[j])
+            text = f"differs by <b class='n'>{measured(difference, np.nan, unit)}</b>; how exact that is is not known"
+            if np.isfinite(error):
+                text = in_words(Influence(difference, error), float(first["largest"][j]), unit)
             said.append(f"<b>{html.escape(name)}</b>: {text}.")
     return said
 

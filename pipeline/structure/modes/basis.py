@@ -58,7 +58,7 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
     """Static shapes and normal modes, rigid motion taken out where the condition says so.
 
     Independent shapes that respect the condition, in any combination and scale, (ndof, count); and frequencies [Hz] of
-    rigid-body modes that were found and left out, ascending, maybe none.
+    rigid-body modes that were left out, ascending, maybe none.
 
     Raises InputError for a count beyond the mesh or within a cluster, and for shares that no count reaches.
     """

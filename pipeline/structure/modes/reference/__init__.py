@@ -1,6 +1,6 @@
 """Reference conditions: what ties the body frame to the deforming body, and so which shapes are admissible.
 
-To add one: ``condition(model, given) -> Condition`` in a module here, and a line below.
+To add one: a function ``(model, given) -> Condition`` in `held` or `floating`, and a line below.
 """
 
 KIND = "reference condition"
