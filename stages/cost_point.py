@@ -24,7 +24,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     the median time of the recording among them.
 
     params: `simulate`, as of the simulate stage, the `quantities` of the study, and whether the point is `brief`, as of
-    `dynamics.cost`.  inputs: bundles, and `kernels`, the artifact of `stages.kernels`.  A run that the solver refuses
+    `analyses.cost`.  inputs: bundles, and `kernels`, the artifact of `stages.kernels`.  A run that the solver refuses
     leaves an empty dataset whose attribute `refused` says why: that, too, is a result of the study.
     """
     import numpy as np

@@ -81,7 +81,7 @@ def campbell(
 ) -> xr.Dataset:
     """Vibrations about steady motion over the speed of a drive [rad/s or m/s] (schema CAMPBELL).
 
-    drive: its name; the only one that moves when None.  time, drives: as of `pipeline.dynamics.equilibrium`.
+    drive: its name; the only one that moves when None.  time, drives: as of `pipeline.dynamics.analyses.equilibrium`.
     A speed without steady motion, as a critical one, has no numbers.  Raises InputError, or SolverError where none has.
     """
     bench, start = hold(scene, bundles, progress, time, drives, True)

@@ -159,7 +159,7 @@ def balanced(
 ) -> tuple[Bench, Equilibrium, Vibrations | None]:
     """The bench of a scene, its equilibrium or steady motion, and of the latter the vibrations about it.
 
-    Arguments as of `pipeline.dynamics.equilibrium`.
+    Arguments as of `pipeline.dynamics.analyses.equilibrium`.
     """
     bench, q = hold(scene, bundles, progress, time, drives, moving)
     progress(None, f"Computing the {'steady motion' if moving else 'equilibrium'}")
