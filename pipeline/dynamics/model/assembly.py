@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.effects import way
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
 from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, far_apart, misfit, opposite
-from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
+from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import NONE
@@ -130,8 +130,7 @@ def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str,
     """Largest residual per joint [m, or the sine of an angle], without drives."""
     worst = {}
     for joint in joints:
-        values, _ = demands(joint.edge.kind, *joint.frames(poses))
-        worst[joint.name] = float(np.max(np.abs(values), initial=0.0))
+        worst[joint.name] = float(np.max(np.abs(joint.demands(poses).residuals), initial=0.0))
     return worst
 
 
