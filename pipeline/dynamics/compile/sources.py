@@ -317,10 +317,10 @@ def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Com
 
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
-    """The module of a kind of loads, or what it makes of the kernel of an expression (`_formulas`)."""
+    """The kernel of a kind of loads, which may be made of that of an expression (`_formulas`)."""
     module = file.part(LOADS, name)
     if not formula:
-        return module
+        return f"{module}.apply"
     file.take(f"{DYNAMICS}.kernels", "kernel")
     file.take(LOADS, "looks")
     return f"{module}.applying(formula{number})"

@@ -76,14 +76,14 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
     mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
     for c in arrays.table(m.CLOSURES):
         total: np.ndarray = np.zeros(c["n_rows"])
-        for part, (site, turning, factor) in enumerate(_acting(model, c)):
+        for part, (site, turning, ratio) in enumerate(_acting(model, c)):
             mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
             mine = mine[mine["part"] == part]
             turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
             angle = np.linalg.norm(turn, axis=1)
             way = np.linalg.norm(shift + np.cross(turn, points[site]), axis=1) + model.length * angle
             fraction = mobility[support[c["support0"] + mine["slot"]]]
-            along, about = (np.sum((factor * size) ** 2 * fraction) for size in (way, angle))
+            along, about = (np.sum((ratio * size) ** 2 * fraction) for size in (way, angle))
             total = total + np.where(turning, about, along)
         lengths[c["row0"] : c["row0"] + c["n_rows"]] = np.sqrt(total)
     return lengths
