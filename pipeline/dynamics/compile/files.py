@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.compile import machine_code
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 
-#: told the file that has to be compiled, or waited for
+#: receives the file that has to be compiled, or waited for
 Tell = Callable[[Path], None]
 #: functions of this process by the name of their file
 loaded: dict[str, machine_code.Code] = {}

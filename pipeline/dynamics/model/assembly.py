@@ -13,7 +13,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.effects import way
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
-from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, far_apart, misfit, opposite
+from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, ill_fitting, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
@@ -43,10 +43,10 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     placed = given_start.given_links(mechanism)
     between = [joint for joint in joints if {joint.link_a, joint.link_b} <= placed]
     free = len(placed) + sum(link.massless for link in mechanism.links[1:]) < len(mechanism.links)
-    wrong = far_apart(mechanism, joints, poses) or opposite(joints, poses)
+    wrong = ill_fitting(mechanism, joints, poses) or opposite(joints, poses)
     search = free and not mechanism.has_paths and (wrong is not None or bool(starts))
     judged = between if search else joints
-    wrong = far_apart(mechanism, judged, poses) or opposite(judged, poses)
+    wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
     if wrong is not None:
         raise wrong
     missed = given_start.misses(mechanism, joints, poses, given)

@@ -161,7 +161,7 @@ def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> li
     return moved
 
 
-def far_apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
+def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
     """What is wrong about joints whose frames are far from fitting, if some are."""
     for joint in joints:
         demanded = joint.demands(poses)
