@@ -98,8 +98,8 @@ def straight(
 def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
 
-    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are, see `batched.differentiated`; of what
-    only describes no more than the arrays.
+    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are (`batched.differentiated`); of
+    what only describes no more than the arrays.
     """
     begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
     places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
