@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
@@ -72,9 +72,15 @@ def fill(filling: Filling) -> dict[str, Any]:
         link, reverse = _link(mechanism, name)
         closure = next((c for c, one in enumerate(closures) if one.name == name), -1)
         entries = uncommon(closure_route(numbering, *sites))
-        reaction = _terms(numbering, link, ends, articulated) if link >= 0 else _Reaction([], [], [])
-        ranges = _add(tables, list(entries), reaction, len(BEARINGS[joint.type]))
-        tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges))
+        momenta, columns, loops = _reaction(numbering, link, ends, articulated) if link >= 0 else ([], [], [])
+        ranges = (
+            *_added(tables["rubbing_entries"], entries),
+            *_added(tables["reaction_terms"], momenta),
+            *_added(tables["reaction_terms"], columns),
+            *_added(tables["reaction_loops"], loops),
+        )
+        where = len(tables["bearings"]), len(BEARINGS[joint.type])
+        tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges, *where))
         for kind, side, axis in BEARINGS[joint.type]:
             size = _bristle(name, joint)
             law = laws.index(joint.friction.law) if joint.friction is not None else -1
@@ -84,24 +90,10 @@ def fill(filling: Filling) -> dict[str, Any]:
     return tables
 
 
-class _Reaction(NamedTuple):
-    """What the reaction of a tree's joint consists of: terms of momenta and of columns, and closures beyond it."""
-
-    momenta: Rows
-    columns: Rows
-    loops: Rows
-
-
-def _add(tables: dict[str, list[Any]], entries: Rows, reaction: _Reaction, bearings: int) -> tuple[int, ...]:
-    """Add the rows of one joint; where they begin and how many there are, in the order of the table `rubbing`."""
-    terms, loops = tables["reaction_terms"], tables["reaction_loops"]
-    momenta, columns, first = len(reaction.momenta), len(reaction.columns), len(terms)
-    of_terms, of_loops = (first, momenta, first + momenta, columns), (len(loops), len(reaction.loops))
-    ranges = (len(tables["rubbing_entries"]), len(entries), *of_terms, *of_loops, len(tables["bearings"]), bearings)
-    tables["rubbing_entries"] += entries
-    terms += [*reaction.momenta, *reaction.columns]
-    loops += reaction.loops
-    return ranges
+def _added(table: Rows, rows: Sequence[tuple[int, ...]]) -> tuple[int, int]:
+    """Add rows to a table; where they begin there, and how many they are."""
+    table += rows
+    return len(table) - len(rows), len(rows)
 
 
 def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
@@ -125,8 +117,10 @@ def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
     return bearings[-1] if bearings else (-1, False)
 
 
-def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool) -> _Reaction:
-    """What the reaction of a link's joint consists of.
+def _reaction(
+    numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool
+) -> tuple[Rows, Rows, Rows]:
+    """What the reaction of a link's joint consists of: terms of momenta and of columns, and closures beyond it.
 
     ends: (closure, part, first site, second site) of all closures; a coupling has two parts.
     """
@@ -147,4 +141,4 @@ def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]
         sign = int(numbering.sites[b].link in beyond) - int(numbering.sites[a].link in beyond)
         if sign:
             loops.append((c, sign, part))
-    return _Reaction(momenta, columns, loops)
+    return momenta, columns, loops
