@@ -102,7 +102,7 @@ class Entry:
 
     def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
         """Slope of the state in Y at time t, into the first row of SLOPES."""
-        self._advance(_tables(h, f, w, n), t, repeat, _FLOATS, _TABLE, _TABLE)
+        self._function("advance")(*_tables(h, f, w, n), t, repeat, *_record(_FLOATS, _TABLE, _TABLE))
 
     def advance(
         self,
@@ -120,21 +120,9 @@ class Entry:
         by: what is to call the compiled function, given its address, and a word for each of its arguments but t and
         repeat.
         """
-        self._advance(_tables(h, f, w, n), 0, -1, outputs, rows, events, by)
-
-    def _advance(
-        self,
-        tables: tuple,
-        t: float,
-        repeat: int,
-        outputs: np.ndarray,
-        rows: np.ndarray,
-        events: np.ndarray,
-        by: Callable[[int, list[int]], None] | None = None,
-    ) -> None:
-        record = [place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape]
+        tables, record = _tables(h, f, w, n), _record(outputs, rows, events)
         if by is None:
-            self._function("advance")(*tables, t, repeat, *record)
+            self._function("advance")(*tables, 0, -1, *record)
         else:
             by(self.addresses["advance"], [*tables, *record])
 
@@ -171,6 +159,10 @@ class Entry:
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
     return place(h, np.int64), place(f), place(w), place(n, np.int64)
+
+
+def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple:
+    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
 
 
 class Late:

@@ -76,6 +76,11 @@ class Model:
         """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
         return self.state_scales[self.speeds]
 
+    def rows_of(self, *kinds: type) -> dict[str, np.ndarray]:
+        """Row of the table LOADS of each load of such kinds, by name, as the scene has them."""
+        rows = {name: row for (name, _), row in zip(self.loads, self.arrays.table(m.LOADS), strict=True)}
+        return {name: rows[name] for name, load in self.scene.forces().items() if isinstance(load, kinds)}
+
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:
     """Place a mechanism's links so that its joints fit, number it and fill its tables.
