@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 from flexclear.pipeline.dynamics.bodies.interface import all_in_interface, deform, modal_rates
@@ -51,6 +52,9 @@ def straight(d, k, j, vector, first):
     return 0.0
 
 
+LINEAR = SimpleNamespace(first_moment=straight, second_moment=straight, at_port=straight)
+
+
 def of_each(body: Callable) -> Callable:
     """The kernel that applies body(d, k) to every flexible body k."""
 
@@ -62,16 +66,15 @@ def of_each(body: Callable) -> Callable:
     return bodies
 
 
-def flexible_bodies(shortening: Any = None) -> Callable[[Any], FlexibleBodies]:
+def flexible_bodies(shortening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]:
     """What makes the kernels of bodies with linear shapes, or with those that bending shortens
     (`effects.stiffening.bodies`): of what factors the mass matrix, the module `articulated` or `composite`."""
     return partial(_flexible_bodies, shortening)
 
 
 def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
-    first_moment = straight if shortening is None else shortening.first_moment
-    second_moment = straight if shortening is None else shortening.second_moment
-    site, inboard = make_ports(straight if shortening is None else shortening.at_port, tree)
+    first_moment, second_moment = shortening.first_moment, shortening.second_moment
+    site, inboard = make_ports(shortening.at_port, tree)
     carried, body_mass_matrix = make_carrying(tree)
     reference, demand_of = tree.origin, tree.demand_of
 

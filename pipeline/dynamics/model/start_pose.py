@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.model.constraints import Constraint, constraint
 from flexclear.pipeline.dynamics.model.driving import label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.placing import opened
+from flexclear.pipeline.dynamics.model.placing import guess, targets
 from flexclear.pipeline.dynamics.model.plausibility import offsets
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates
 
@@ -81,7 +81,8 @@ def start_pose(scene: Scene, bundles: Mapping[str, Labelled], drawn: Mapping[str
 def _open(mechanism: Mechanism) -> Mechanism:
     """The mechanism with bodies without poses put where one joint each has them; loops may stay open."""
     starts, placed = given_coordinates(mechanism.scene), given_start.given_links(mechanism)
-    return settled(mechanism, opened(mechanism, constraints(mechanism, starts=starts), placed, starts))
+    joints = constraints(mechanism, starts=starts)
+    return settled(mechanism, guess(mechanism, joints, placed, targets(joints, starts)[1]))
 
 
 def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> list[Gap]:

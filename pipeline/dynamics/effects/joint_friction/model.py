@@ -10,7 +10,7 @@ from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BEARINGS, SLIDER
 from flexclear.pipeline.dynamics.model.components import Floors, Group
-from flexclear.pipeline.dynamics.model.contacts import friction_law
+from flexclear.pipeline.dynamics.model.contacts import bristle, friction_law
 from flexclear.pipeline.dynamics.model.filling import Filling
 from flexclear.pipeline.dynamics.model.guards import Guard, speeds
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
@@ -27,16 +27,10 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Grou
     """First the loss of each joint [J], then the bristles [m] of each bearing."""
     losses, bristles = list[Group](), list[Group]()
     for name, joint in mechanism.scene.rubbing().items():
-        part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), _bristle(name, joint)
+        part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), bristle(name, joint)
         losses.append((energies[part], 1, part))
         bristles += [] if size is None else [(size, 3, part)] * len(BEARINGS[joint.type])
     return losses + bristles
-
-
-def _bristle(name: str, joint: IdealJoint) -> float | None:
-    """Size of the bristles of each of its bearings, or None."""
-    size: float | None = friction_law(name, joint).bristle(joint.friction)
-    return size
 
 
 def guards(mechanism: Mechanism) -> Iterator[Guard]:
@@ -64,7 +58,7 @@ def fill(filling: Filling) -> dict[str, Any]:
     mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
     pairs = [(c, part, *both) for c, one in enumerate(closures) for part, both in enumerate(one.ends)]
     ends = [(c, part, numbering.site(a), numbering.site(b)) for c, part, a, b in pairs]
-    bristle = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
+    slot = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
     tables: dict[str, list[Any]] = defaultdict(list)
     for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
@@ -82,11 +76,11 @@ def fill(filling: Filling) -> dict[str, Any]:
         where = len(tables["bearings"]), len(BEARINGS[joint.type])
         tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges, *where))
         for kind, side, axis in BEARINGS[joint.type]:
-            size = _bristle(name, joint)
+            size = bristle(name, joint)
             law = laws.index(joint.friction.law) if joint.friction is not None else -1
-            tables["bearings"].append((number, kind, law, side, axis, bristle if size is not None else -1))
+            tables["bearings"].append((number, kind, law, side, axis, slot if size is not None else -1))
             tables["bearing_numbers"].append(_numbers(name, joint, kind))
-            bristle += 3 if size is not None else 0
+            slot += 3 if size is not None else 0
     return tables
 
 
