@@ -47,14 +47,10 @@ def tangential(normal, v):
     return sub(v, scale(dot(normal, v), normal))
 
 
-def frictionless() -> Callable:
+@kernel
+def frictionless(d, c, normal, turning, p_WQ, f_n):
     """The kernel `rub` of a scene without friction."""
-
-    @kernel
-    def rub(d, c, normal, turning, p_WQ, f_n):
-        return ZERO
-
-    return rub
+    return ZERO
 
 
 def rubbing(traction: Callable) -> Callable:
@@ -119,7 +115,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
     """
     separation = choose(tuple(kind.separation for kind in surfaces))
     normal_force = make_normal_force(forms)
-    rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless()
+    rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless
 
     @kernel
     def measure(d, c):

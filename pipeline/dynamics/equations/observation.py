@@ -158,12 +158,6 @@ def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def no_energy(d, component):
-    """Kinetic and elastic energy where no body is flexible."""
-    return 0.0, 0.0
-
-
-@kernel
 def columns_before_state(d):
     """Columns of what is worked out, and of the frames of links and sites."""
     return SIZE * d.n_bodies + 3 * d.n_frames + 2 + m.FRAME.size * (d.n_links + d.n_sites)
@@ -217,25 +211,22 @@ def foresee(d, rows, r, state, closed, states):
 
 def make_description(
     joints: tuple[Any, ...],
-    flexible: Any = None,
-    contacts: Callable | None = None,
-    loads: Callable | None = None,
-    stops: Callable | None = None,
-    couplings: Callable | None = None,
-    friction: Callable | None = None,
+    flexible: Callable[[Any], rigid.FlexibleBodies] = rigid.all_rigid,
+    contacts: Callable = nothing,
+    loads: Callable = nothing,
+    stops: Callable = nothing,
+    couplings: Callable = nothing,
+    friction: Callable = nothing,
 ) -> Callable:
     """The kernel describe(h, f, w, n): motion, wrenches and energies of what has been evaluated.
 
     couplings: takes them off their links (`effects.gears`); friction: of ideal joints, in closures
     (`effects.joint_friction`); the other arguments are those of `make_rates`.
     """
-    bodies = None if flexible is None else flexible(composite)  # wrenches about the kernels' origin
+    bodies = flexible(composite)  # wrenches about the kernels' origin
     kinematics = make_kinematics(joints, composite, bodies)
     forces = make_forces(composite, bodies, contacts, loads, stops)
-    modal_inertia = nothing if bodies is None else bodies.modal_inertia
-    couple = nothing if couplings is None else couplings
-    rub = nothing if friction is None else friction
-    flexible_energy = no_energy if bodies is None else bodies.energies
+    modal_inertia, flexible_energy = bodies.modal_inertia, bodies.energies
 
     @kernel
     def closure_wrenches(d):
@@ -250,8 +241,8 @@ def make_description(
             on_a, on_b = d.wrench[d.sites[closure.site_a].link], d.wrench[d.sites[closure.site_b].link]
             add_wrench(on_b, scale(-1.0, moment), scale(-1.0, force))
             add_wrench(on_a, moment, force)
-        couple(d)
-        rub(d)
+        couplings(d)
+        friction(d)
 
     @kernel
     def joint_wrenches(d):
