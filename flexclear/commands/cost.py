@@ -367,7 +367,6 @@ def _measured(design: cost_design.Design, function: str, more: Mapping[str, obje
         params={"simulate": simulation.params(design.scene, ensemble=ensemble), **more},
         inputs={**_bundles(design), "kernels": compiled},
         modules=simulation.modules(design.scene),
-        folder="",
         exclusive=True,
     )
 

@@ -114,7 +114,6 @@ def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
         run=f"{figures.__name__}:index",
         params={"names": names},
         modules=tuple(dict.fromkeys(module_of(figures.__name__, name) for name in names)),
-        folder="",
     )
     (made,) = workplace.made(task)
     index: dict[str, dict[str, Any]] = json.loads(made.read("index.json"))

@@ -18,9 +18,10 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import xarray as xr
 from scipy.special import stdtrit
 
-from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.artifacts.points import Point, unpacked
 from flexclear.pipeline.core.numerics.rotations import rotation_between
 from flexclear.pipeline.core.scene.quantity import Quantity, Recorded
 
@@ -106,6 +107,11 @@ def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) 
     owners: of the scene, by what they are.
     """
     return [Recorded(q, r) for q in chosen if q.is_there(owners) for r in _reductions(q)]
+
+
+def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
+    """The point in an artifact of `stages.watched_quantities`."""
+    return unpacked(stored, recorded(owners, chosen))["point"]
 
 
 def _reductions(quantity: Quantity) -> tuple[str, ...]:
