@@ -27,7 +27,7 @@ def reference():
 
 
 @pytest.mark.parametrize("requested", [10.0**-k for k in (2, 3, 5, 7, 9)])
-def test_the_delivered_error_is_the_wanted_one(reference, requested):
+def test_the_delivered_error_is_the_requested_one(reference, requested):
     scene = load_scene(CSJ, {"accuracy": {"platform": {"velocity": {"relative": requested}}}})
     run = dynamics.simulate(scene, {}, quiet)
     velocity = parse("platform.velocity", scene.owners())

@@ -100,7 +100,7 @@ def test_a_pass_depends_on_no_unit_of_length(size: float) -> None:
     assert len(dataset.pass_time) == 2
 
 
-def test_what_is_recorded_beside_a_pose_is_that_of_the_smooth_motion() -> None:
+def test_what_is_recorded_near_a_change_point_is_the_smooth_motion() -> None:
     """Rows every tenth of a millisecond, some of which rounding would blur: accelerations go on smoothly."""
     table = cp.scott_russell(1.5, time={"end": 0.03}, output={"interval": 1e-4})
     dataset = simulate(cp.driven(table, "O", cp.steady(1.5, 6.0)))
@@ -109,7 +109,7 @@ def test_what_is_recorded_beside_a_pose_is_that_of_the_smooth_motion() -> None:
     assert np.abs(dataset.acceleration.sel(body="slider").values[:, 0] - known).max() < 1e-5
 
 
-def test_passes_are_kept_where_another_method_goes_on() -> None:
+def test_passes_stay_recorded_when_another_method_takes_over() -> None:
     """Handed on after the first of two poses, in which a row is recorded."""
     first = (np.pi - 1.5) / 4.0
     table = cp.four_bar(1.5, 1.0, time={"end": 2.0}, output={"interval": 0.1 * first}, solver={"rtol": 1e-10})
@@ -149,7 +149,7 @@ def test_rest_start_and_reach_are_three_sentences() -> None:
 
 
 @pytest.mark.parametrize("beyond", [-0.01, 1e-3, 0.003])
-def test_a_motion_that_stops_beside_the_pose_is_none_of_them(beyond: float) -> None:
+def test_a_motion_that_stops_near_the_pose_is_none_of_them(beyond: float) -> None:
     dataset = simulate(stopped(np.pi - 2.5 + beyond))
     assert len(dataset.pass_time) == (beyond > 0.0)
     crank = np.unwrap(angle(dataset, "crank"))
@@ -205,7 +205,7 @@ def test_a_choice_that_is_none_is_refused() -> None:
         assert caught.value.place.startswith("[start.branch")
 
 
-def test_an_open_choice_says_which_joint_tells_the_branches_apart() -> None:
+def test_an_open_choice_names_a_joint_that_distinguishes_the_branches() -> None:
     with pytest.raises(SolverError, match=r"2 ways, on which joint \w+ begins to move like") as caught:
         simulate(from_rest(LAWS["rest"]))
     assert "[start] branch = { joint =" in str(caught.value)
@@ -302,7 +302,7 @@ def test_a_coupler_that_bends_between_its_pins_passes_like_a_rigid_one(count: in
 
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", [{"rtol": 1e-8}, {"integrator": "radau", "rtol": 1e-6}])
-def test_a_loose_pin_beside_the_loop_does_not_keep_it_from_passing(solver: Table) -> None:
+def test_a_loop_with_a_loose_pin_next_to_it_passes(solver: Table) -> None:
     table = cp.four_bar(1.5, 1.0, time={"end": 0.6}, solver=solver)
     _, rocker = cp.elbow(1.5, 1.0, cp.FOUR_BAR)
     tip = np.array([0.5, 0.0]) + 0.3 * np.array([np.cos(rocker), np.sin(rocker)])
@@ -336,7 +336,7 @@ def test_a_soft_contact_that_is_deep_within_the_drives_reach_is_no_end() -> None
     assert -run.observed.touch["gap"].min() > 1.5e-3
 
 
-def test_a_drive_that_leads_a_loose_loop_out_of_reach_is_told_when_it_does() -> None:
+def test_a_drive_that_leads_a_loose_loop_out_of_reach_is_refused_when_it_does() -> None:
     """Contacts give way where ideal joints do not; the rocker of the scene turns by 1.5 rad in 50 ms."""
     start, travel, end = LOOSE_START, 1.5, LOOSE_END
     texts: list[str] = []

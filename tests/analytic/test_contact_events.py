@@ -21,7 +21,7 @@ def thrown_up(beyond: float) -> xr.Dataset:
 
 
 @pytest.mark.parametrize("beyond", [1e-12, 1e-9, 1e-6])
-def test_a_grazing_contact_is_found_however_short_it_is(beyond: float) -> None:
+def test_a_grazing_contact_is_located_however_short_it_is(beyond: float) -> None:
     dataset = thrown_up(beyond)
     (begun,), (ended,) = of_kind(dataset, "closing"), of_kind(dataset, "opening")
     # the gap is located to 1e-13 of the clearance, the speed is the root of twice that share of `beyond`
@@ -41,7 +41,7 @@ def test_a_near_miss_is_no_contact(short: float) -> None:
     assert float(dataset.contact_gap.min()) == pytest.approx(short, abs=0.5 * GRAVITY * 0.5e-3**2)
 
 
-def test_contacts_at_one_time_are_all_found_and_do_not_see_each_other() -> None:
+def test_simultaneous_contacts_are_all_located_and_independent() -> None:
     ball = {"type": "rigid", "mass": MASS, "inertia": [4e-3] * 3, "pose": {}, "frames": {"centre": {}}}
     law = {"law": "lankarani-nikravesh", "restitution": 0.7, "stiffness": STIFFNESS}
     joint = {"type": "clearance-spherical", "clearance": CLEARANCE, "ball_radius": 0.1, "normal": law}

@@ -85,7 +85,7 @@ def test_members_of_an_ensemble_hand_over_too() -> None:
 
 
 @pytest.mark.parametrize("step, stable", [("1e-5 s", False), ("1e-6 s", True)])
-def test_a_fixed_step_beyond_stability_is_told(step: str, stable: bool) -> None:
+def test_a_fixed_step_beyond_stability_is_reported(step: str, stable: bool) -> None:
     """The slope of friction has some 4e5 1/s here, and rk4 is stable up to 2.785 over the step."""
     made = run(integrator="rk4", step=step, end="0.3 ms")
     assert ("too long for rk4 to be stable" in made.attrs["warnings"]) is not stable

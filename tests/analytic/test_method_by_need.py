@@ -199,7 +199,7 @@ def test_where_the_explicit_method_is_dear_the_stiff_one_is_tried() -> None:
     assert dear.best(1e-14) == "dop853"
 
 
-def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
+def test_a_run_that_was_handed_over_reports_the_cost_of_its_last_method() -> None:
     early, late = known(exponential=(1e-4, 5e4)), known(exponential=(1e-4, 5e4))
     for suit, left in ((early, (4e4, 0.2)), (late, (4e4, 0.97))):
         suit.expected["exponential"], suit.left = 9e4, left
@@ -208,7 +208,7 @@ def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
     assert "radau" not in late.seen
 
 
-def test_what_becomes_of_a_twin_tells_nothing_of_its_run() -> None:
+def test_the_outcome_of_a_perturbed_run_is_not_reported_as_that_of_the_run() -> None:
     """The twin may be handed on where the run is not, and is made before, beside or after it."""
     suit = known(exponential=(1e-4, 400.0))
     solver = SimpleNamespace(integrator="exponential")
@@ -227,7 +227,7 @@ def looks(*pairs: tuple[float, int], stiff: float = 0.0) -> list[Look]:
     return [Look(time, used, used // 12, int(stiff * used / 12)) for time, used in pairs]
 
 
-def test_a_pace_that_drops_late_is_told_when_that_has_cost_as_much_as_all_before() -> None:
+def test_a_late_drop_of_the_progress_rate_is_reported_when_it_has_cost_as_much_as_all_before() -> None:
     even, late = [(0.1 * k, 100 * k) for k in range(9)], [(0.8 + 1e-6 * k, 800 + 100 * k) for k in range(1, 9)]
     assert pace(looks(*even), 500) == pytest.approx(1000.0)
     assert pace(looks(*even, *late[:7]), 500) < 1e4

@@ -155,7 +155,7 @@ def test_modes_up_to_a_share_of_the_mass(rod: xr.Dataset) -> None:
     assert axial == [1, 2]
 
 
-def test_a_mechanism_is_told_from_a_body(body: Flexibility) -> None:
+def test_a_mechanism_is_distinguished_from_a_body(body: Flexibility) -> None:
     """A hinge: the stiffness of a chain whose middle node is cut in two that share their place only."""
     middle = body.model.position[:, 0] < 0.11
     cut = sp.diags_array(middle.astype(float)) @ body.model.stiffness @ sp.diags_array(middle.astype(float))

@@ -106,7 +106,7 @@ def test_what_is_no_stop_is_refused_in_words(text: str, tmp_path: Path) -> None:
     assert [word for word in WRONG[text] if word not in said] == []
 
 
-def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_told() -> None:
+def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_given() -> None:
     place = ("stop.A.upper", "-20 mm")
     with pytest.raises(InputError, match=r"(?s)stop\.A.*0\.02 m beyond -0\.02 m.*initial_approach_speed"):
         run(SCENE, (place,))

@@ -66,7 +66,7 @@ def test_bending_of_a_round_rod_peaks_at_M_r_over_I_in_any_plane(angle: float) -
     assert peaks(maps("circle", CIRCLE), forces) == pytest.approx((expected, expected), rel=1e-13)
 
 
-def test_pressure_is_told_by_its_sign() -> None:
+def test_pressure_is_shown_by_its_sign() -> None:
     forces = [-300.0, 0.0, 0.0, 0.0, 12.0, 0.0]
     axial, _ = peaks(maps("circle", CIRCLE), forces)
     assert axial == pytest.approx(-300.0 / CIRCLE.area - 12.0 * R / CIRCLE.second_y, rel=1e-13)

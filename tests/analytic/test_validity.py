@@ -41,7 +41,7 @@ def told(run: xr.Dataset) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_beam_that_bends_too_far_is_told_with_how_far() -> None:
+def test_a_beam_that_bends_too_far_is_reported_with_its_deflection() -> None:
     run = turning(0.1, 9.81)
     bent, turned = told(run)
     # the tip seen from the hub, whose x axis the undeformed beam lies along
@@ -66,14 +66,14 @@ def test_a_beam_that_bends_little_and_turns_slowly_has_nothing_to_say() -> None:
 
 
 @pytest.mark.slow
-def test_a_beam_that_turns_fast_without_stiffening_is_told() -> None:
+def test_a_beam_that_turns_fast_without_stiffening_is_reported() -> None:
     (said,) = told(turning(2.0, 0.1))
     assert "turns at 2 rad/s, 0.53 of its first frequency (3.798 rad/s)" in said
     assert "stiffening = {}" in said
 
 
 @pytest.mark.slow
-def test_a_run_that_ends_as_its_beam_flies_apart_names_the_beam() -> None:
+def test_a_run_that_ends_as_its_beam_diverges_names_the_beam() -> None:
     with pytest.raises(SolverError, match="evaluations is used up") as refusal:
         turning(8.0, 9.81, solver={"evaluations": 300}, **{"time.end": 30.0})
     assert "beam: at t =" in str(refusal.value)
@@ -81,7 +81,7 @@ def test_a_run_that_ends_as_its_beam_flies_apart_names_the_beam() -> None:
     assert "stiffening = {}" in str(refusal.value)
 
 
-def test_what_a_rejected_step_tried_is_not_told() -> None:
+def test_the_values_of_a_rejected_step_are_not_reported() -> None:
     """A run may pause right after one; what is in the work space then is no state of the motion."""
     scene = load_scene(TREE / "scenes" / "checks" / "swinging_rod.toml")
     engine = engine_of(scene, bundles(scene), silent)
@@ -119,7 +119,7 @@ def dropped(depth: float) -> xr.Dataset:
 
 
 @pytest.mark.slow
-def test_a_contact_is_told_when_deep_and_refused_when_the_ball_leaves_through_the_socket() -> None:
+def test_a_deep_contact_is_reported_and_a_ball_that_leaves_through_its_socket_refused() -> None:
     assert told(dropped(1e-3)) == []
     (said,) = told(dropped(5e-3))
     assert "joint j: the surfaces are up to 0.005" in said

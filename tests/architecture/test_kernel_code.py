@@ -204,7 +204,7 @@ def _kernels(source: str) -> list[tuple[str, str]]:
     return found
 
 
-def test_no_kernel_stands_twice(root: Path) -> None:
+def test_no_kernel_is_there_twice(root: Path) -> None:
     places = defaultdict(list)
     for path in sorted((root / "pipeline" / "dynamics").rglob("*.py")):
         for name, says in _kernels(path.read_text(encoding="utf-8")):

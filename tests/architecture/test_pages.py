@@ -107,7 +107,7 @@ def test_declarations_of_effects_import_no_code(root: Path) -> None:
     )
 
 
-def test_the_table_stands_in_the_order_of_the_arrows(root: Path) -> None:
+def test_the_table_has_the_order_of_the_arrays(root: Path) -> None:
     rows = [bare(name) for name in tabled(root)]
     assert [(a, b) for a, b in drawn(root) if rows.index(a) > rows.index(b)] == []
 

@@ -82,7 +82,7 @@ def test_assumptions_are_merged_over_scenes():
     assert merged == [("x", REASON, ("a", "b")), ("y", REASON, ("a",))]
 
 
-def test_assumptions_that_differ_between_scenes_are_all_kept():
+def test_assumptions_that_differ_between_scenes_are_all_listed():
     told = {
         "a": {"assumptions": json.dumps({"x": "assumed: 1"})},
         "b": {"assumptions": json.dumps({"x": "assumed: 2"})},

@@ -171,7 +171,7 @@ def test_whole_turns_contradict_nothing_and_bodies_without_a_pose_go_where_the_d
     assert crank.start.R[:2, 0] == pytest.approx([np.cos(1.5), np.sin(1.5)], abs=1e-14)
 
 
-def test_what_assembly_moves_is_told_with_amounts() -> None:
+def test_the_moves_of_an_assembly_are_reported_with_amounts() -> None:
     mechanism = start_of(driven(1.5, 1.45))
     (told,) = moved(mechanism, [link.start for link in mechanism.links])
     before, after = angles(1.5), angles(1.45)

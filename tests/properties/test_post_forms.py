@@ -147,7 +147,7 @@ def test_a_file_that_is_no_surface_is_refused_in_words(content: bytes, tmp_path:
         forms.read(tmp_path / "part.stl", 1.0)
 
 
-def test_a_shape_file_that_is_not_there_is_told_with_its_place():
+def test_a_missing_shape_file_is_refused_with_its_key():
     scene = load_scene("scenes/checks/pendulum.toml")
     name = next(iter(scene.rigid()))
     there = load_scene(
@@ -236,7 +236,7 @@ def test_all_modes_of_a_body_are_in_its_page(shown: Shown):
     assert "<title>A scene: modes</title>" in page
 
 
-def test_the_mode_sets_of_several_bodies_stand_beside_each_other():
+def test_the_mode_sets_of_several_bodies_are_shown_next_to_each_other():
     sets = {f"{scene}: rod1": synthetic.bundle() for scene in ("free", "fixed")}
     page = make("modes", "html", Shown(bundles=sets))["modes.html"].decode()
     assert page.count("<div class='viewer'") == 2

@@ -120,7 +120,7 @@ def test_up_is_against_gravity_and_the_axis_across_runs_to_the_right():
     assert np.cross(found.up, found.direction)[0] > 0.0
 
 
-def test_a_wanted_direction_is_taken():
+def test_a_requested_direction_is_taken():
     found = view(moving(np.array([0.0, 0, 1]), np.array([1.0, 0, 0])), {}, [2.0, 0.0, 0.0])
     np.testing.assert_allclose(found.direction / np.linalg.norm(found.direction), [1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(found.up, [0, 0, 1], atol=1e-12)

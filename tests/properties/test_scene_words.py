@@ -71,7 +71,7 @@ SAID = {
 
 
 @pytest.mark.parametrize("text", SAID)
-def test_one_mistake_is_told_once_with_key_and_rule(tmp_path: Path, text: str) -> None:
+def test_one_error_is_reported_once_with_key_and_rule(tmp_path: Path, text: str) -> None:
     (said,) = mistakes(tmp_path, text)
     for words in SAID[text]:
         assert words in said
@@ -87,7 +87,7 @@ def test_one_mistake_is_told_once_with_key_and_rule(tmp_path: Path, text: str) -
         ("phase = 30 deg", 'phase = "30 deg"'),
     ],
 )
-def test_a_quantity_without_quotation_marks_is_told_with_its_line_mended(
+def test_a_quantity_without_quotation_marks_is_reported_with_its_line_corrected(
     tmp_path: Path, written: str, mended: str
 ) -> None:
     (said,) = mistakes(tmp_path, f'[body.b]\ntype = "rigid"\n{written}\n')
@@ -180,7 +180,7 @@ def test_opposite_to_z_the_frame_turns_about_x() -> None:
 
 
 @pytest.mark.parametrize("other", ["quaternion", "rotation_vector", "axes"])
-def test_an_axis_stands_alone(other: str) -> None:
+def test_an_axis_is_given_alone(other: str) -> None:
     value = {"quaternion": [1, 0, 0, 0], "rotation_vector": [0, 0, 1], "axes": {"z": [0, 0, 1], "x": [1, 0, 0]}}[other]
     with pytest.raises(ValidationError, match="an orientation is given once"):
         Pose.model_validate({"axis": [0, 0, 1], other: value})

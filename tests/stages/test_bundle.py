@@ -79,7 +79,7 @@ def test_a_bundle_holds_files_of_any_name_but_none_from_elsewhere(
     assert names == {"mine.toml", "base", "rod.recipe", "body.inp", "parts/a.dat"}
 
 
-def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, command: Command) -> None:
+def test_a_run_that_ends_otherwise_is_reported(scene: Path, tmp_path: Path, command: Command) -> None:
     path, _ = reproduction.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}

@@ -25,7 +25,7 @@ def put(store: Store, letter: str, stage: str = "simulate", **facts: str) -> Rec
     return made
 
 
-def test_damage_is_told_and_removed(store: Store, command: Command):
+def test_damage_is_reported_and_removed(store: Store, command: Command):
     for letter in "abc":
         store.show(put(store, letter), f"runs/{letter}", {}, "simulate")
     assert "3 artifacts, 0 faults" in command("cache", "check").out
@@ -85,7 +85,7 @@ def test_points_of_sweeps_are_looked_at_as_well(store: Store, command: Command):
     assert f"sweep/x/{'d' * 32}.nc is corrupt" in command("cache", "check", code=4).out
 
 
-def test_what_an_artifact_was_made_from_is_told(store: Store, command: Command):
+def test_the_inputs_of_an_artifact_are_reported(store: Store, command: Command):
     store.show(put(store, "a"), "runs/x", {"nc": "run.nc"}, "simulate")
     for what in (str(store.root / "runs" / "x" / "run.nc"), "aaaa"):
         told = command("cache", "explain", what).out
@@ -95,7 +95,7 @@ def test_what_an_artifact_was_made_from_is_told(store: Store, command: Command):
     assert "simulate          1 artifacts" in command("cache", "size").out
 
 
-def test_kernels_of_another_build_are_told_and_are_no_damage(store: Store, command: Command):
+def test_kernels_of_another_build_are_counted_and_are_no_damage(store: Store, command: Command):
     """Their sums name other files than source and code; one of this build whose code is another's is damaged."""
     folder = store.root.parent / "kernels" / "abc"
     folder.mkdir(parents=True)
@@ -150,7 +150,7 @@ def test_the_record_of_a_run_names_its_processor(shown: Path, command: Command):
     assert f"computed by processor: {machine.instruction_set()['processor']}" in said
 
 
-def test_bit_rot_in_a_shown_file_is_found_and_run_shows_it_again(shown: Path, command: Command):
+def test_bit_rot_in_a_shown_file_is_detected_and_run_shows_it_again(shown: Path, command: Command):
     good = shown.read_bytes()
     command("cache", "check")
     rot(shown)

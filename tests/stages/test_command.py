@@ -56,7 +56,7 @@ def test_wrong_scenes_are_refused_before_anything_runs(
         assert part in said.err
 
 
-def test_all_mistakes_of_all_scenes_are_told_at_once(command: Command, tmp_path: Path):
+def test_all_errors_of_all_scenes_are_reported_at_once(command: Command, tmp_path: Path):
     for name in ("one", "two"):
         (tmp_path / f"{name}.toml").write_text(SCENE.replace('"1 kg"', "-1").replace('"1 s"', '"1 kg"') + JOINT)
     err = command("run", tmp_path / "one.toml", tmp_path / "two.toml", "sps4/nothing", code=2).err
@@ -123,7 +123,7 @@ def test_cite_names_methods_that_are_used_and_no_others(command: Command):
 
 
 @pytest.mark.parametrize("scene", ["sps4/csj", "sps4/far_csj_cb"])
-def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(command: Command, scene: str):
+def test_cite_separates_the_methods_of_every_run_from_those_that_only_some_need(command: Command, scene: str):
     """All were in one list, with Lyapunov exponents, LU factors and the registers of the processor."""
     said = command("cite", scene).out
     always, _, rest = said.partition("Methods that are used where a run or a command needs them\n")

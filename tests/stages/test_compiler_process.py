@@ -238,7 +238,7 @@ def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, sce
     assert heard == [idle] * len(scenes)
 
 
-def test_code_that_cannot_be_kept_is_compiled_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "file" / "kernels"))
     told: list[str] = []

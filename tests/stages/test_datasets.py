@@ -45,7 +45,7 @@ def test_every_unit_is_one_that_udunits_reads(name: str) -> None:
     assert {unit for unit in units if not is_udunits(unit)} == set()
 
 
-def test_what_udunits_does_not_read_is_told_apart() -> None:
+def test_texts_that_udunits_does_not_read_are_recognised() -> None:
     assert not any(is_udunits(text) for text in ("kg0.5 m", "m or rad", "N or N m", "sqrt(kg)", "", "m^2"))
 
 

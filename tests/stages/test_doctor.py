@@ -69,7 +69,7 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> 
     assert code() == before
 
 
-def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(tmp_path: Path, command: Command) -> None:
+def test_a_wrong_scene_is_refused_before_anything_is_compiled(tmp_path: Path, command: Command) -> None:
     assert "none.toml" in command("doctor", "--compile", tmp_path / "none.toml", code=2).err
 
 

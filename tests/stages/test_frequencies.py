@@ -28,7 +28,7 @@ def test_the_command_prints_pose_residual_and_mobility_then_the_table(root: Path
     assert float(hertz) == pytest.approx(np.sqrt(9.81) / (2.0 * np.pi), rel=1e-6)
 
 
-def test_what_loops_say_twice_is_told_where_reactions_depend_on_it() -> None:
+def test_redundant_closures_are_reported_where_reactions_depend_on_them() -> None:
     """A four-bar of hinges whose motor is held: three conditions too many, and nothing that could vibrate."""
     told = {
         "scene": "four_bar", "time": 0.0, "drives": "held", "residual": 0.0, "iterations": 0, "mobility": 0,

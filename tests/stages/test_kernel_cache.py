@@ -56,7 +56,7 @@ def test_what_is_whole_is_fetched(kernel: Path) -> None:
     assert not list(kernel.parent.rglob("*.lock"))
 
 
-def test_every_flipped_bit_and_every_cut_is_found_before_anything_is_loaded(kernel: Path) -> None:
+def test_every_flipped_bit_and_every_cut_is_detected_before_anything_is_loaded(kernel: Path) -> None:
     """Also in the file of digests itself; then it is compiled again, and whole."""
     for k in range(3):
         for name in (part.name for part in parts(kernel)):

@@ -68,7 +68,7 @@ def test_floats_keep_every_digit():
     assert flatten(0.1) != flatten(0.1 + 2**-56)
 
 
-def test_what_json_cannot_say_is_kept_as_text():
+def test_what_json_cannot_express_is_text():
     """A nan or a date in a recipe is for the recipe's check to refuse, in words."""
     assert flatten({"a": float("nan"), "b": datetime.date(2019, 3, 10)}) == [("a", "NaN"), ("b", '"2019-03-10"')]
 
@@ -94,7 +94,7 @@ def test_reasons_are_words():
     assert reasons({}, {"input mesh": "2"}, frozenset({"mesh"})) == []
 
 
-def test_imports_are_found_wherever_they_stand():
+def test_imports_are_collected_from_anywhere_in_a_module():
     text = b"""
 import numpy as np
 from flexclear.pipeline.core.scene import units

@@ -154,7 +154,7 @@ def test_the_estimate_of_a_row_is_what_a_run_takes(root: Path):
         assert 0.5 * measured < estimate < 2.0 * measured
 
 
-def test_a_page_that_the_disk_has_no_room_for_is_told_by_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_page_for_which_the_disk_has_no_room_is_named_by_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The page that was there stays whole."""
 
     def full(path: Path, content: bytes) -> str:

@@ -130,7 +130,7 @@ def test_members_that_would_all_be_the_same_run_are_refused_before_anything_runs
     assert not fresh.exists()
 
 
-def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path, command: Command):
+def test_errors_of_several_files_are_reported_together_and_as_json(tmp_path: Path, command: Command):
     scene, rod = write("slider-crank", tmp_path)
     scene.write_text(scene.read_text().replace('"0.8 kg"', "-1").replace('"crank.pin"] ', '"crank.pim"] '))
     rod.write_text(rod.read_text().replace('"7850 kg/m^3"', '"7850 kg"'))
@@ -146,7 +146,7 @@ def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path,
     }
 
 
-def test_a_mistake_in_an_extended_scene_is_told_in_its_file(tmp_path: Path, command: Command):
+def test_an_error_in_an_extended_scene_is_reported_in_its_file(tmp_path: Path, command: Command):
     scene, _ = write("slider-crank", tmp_path)
     scene.write_text(scene.read_text().replace('mass = "0.8 kg"', "mass = -1"))
     (tmp_path / "other.toml").write_text('extends = "slider_crank.toml"\n')
@@ -309,7 +309,7 @@ def test_results_are_printed_as_json_for_scripts(command: Command, fresh: Path):
     }
 
 
-def test_datasets_are_told_as_json_with_units_and_without_what_json_lacks():
+def test_datasets_are_printed_as_json_with_units_and_without_what_json_lacks():
     data = xr.Dataset({"f": ("k", [1.0, np.nan], {"units": "Hz"})}, coords={"k": ["a", "b"]}, attrs={"n": np.int64(3)})
     found = json.loads(as_json({"scene": data}))["scene"]
     assert found["attributes"] == {"n": 3}

@@ -87,7 +87,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
 
 
 @pytest.mark.usefixtures("parting", "two")
-def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_perturbed_run_that_has_separated_is_stopped(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not even where it is ahead of the run, whose largest velocity tells what is visible: then it waits."""
     rows: list[float] = []
     enough = Pair._enough
@@ -140,7 +140,7 @@ def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(
 
 
 @pytest.mark.usefixtures("parting")
-def test_a_twin_that_fails_after_it_has_parted_tells_as_much_as_one_that_does_not(root: Path) -> None:
+def test_a_perturbed_run_that_fails_after_its_separation_gives_the_same_horizon(root: Path) -> None:
     """However far it was followed: beside a slower run it may come to where it fails, and after the run it does not."""
     engine = engine_of(check(root, "clearance_slider_crank"), {}, silent)
     start = consistent_start(engine)
@@ -246,7 +246,7 @@ def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: p
     assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")
 
 
-def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) -> None:
+def test_rows_for_comparisons_alone_are_not_in_the_dataset(root: Path) -> None:
     """Ten outputs in the whole run, and comparisons between them."""
     scene = check(root, "bounce", **{"output.interval": 0.1})
     engine = engine_of(scene, {}, silent)
@@ -256,7 +256,7 @@ def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) ->
     assert np.isin(engine.output_times(0.1), run.time.values).all()
 
 
-def test_what_goes_on_meanwhile_is_ended_with_what_it_goes_on_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_concurrent_work_ends_with_its_block(monkeypatch: pytest.MonkeyPatch) -> None:
     processors(monkeypatch, 2)
     ended = threading.Event()
 
@@ -281,7 +281,7 @@ def test_workers_of_another_program_take_no_second_processor() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_what_the_work_raises_is_told_to_who_waits_for_it(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_concurrent_work_raises_reaches_its_caller(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     processors(monkeypatch, count)
 
     def work(alive: Progress) -> int:

@@ -92,7 +92,7 @@ def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(tmp_pa
     assert found.influence["ball.force"] == pytest.approx(PLATFORM * GRAVITY, rel=0.05)
 
 
-def test_the_vibration_that_is_told_is_one_that_the_loads_excite(tmp_path: Path):
+def test_the_reported_vibration_is_one_that_the_loads_excite(tmp_path: Path):
     """Loads along an upright leg leave its bending at rounding, which the sudden weight was told to magnify 12 times.
 
     The bar with a mass at its end has b tan b = (its mass)/(that mass), b = 2 pi f L sqrt(rho/E).
@@ -127,7 +127,7 @@ def test_vibrations_about_a_ramp_and_a_step_have_their_closed_form_amplitudes():
     np.testing.assert_allclose(step, np.broadcast_to(5.0 / omega**2, step.shape), rtol=1e-11)
 
 
-def test_the_elements_that_are_called_for_make_the_error_that_is_wanted(tmp_path: Path):
+def test_the_recommended_elements_give_the_requested_error(tmp_path: Path):
     """Of a rod of few elements, beside its reduction on many: the estimated error of a frequency is the true one, and a
     mesh of as many as called for is as right as was asked for."""
     leg = load_scene(write("leg", tmp_path)[0])
@@ -248,7 +248,7 @@ def test_where_nothing_is_known_of_methods_a_plan_keeps_that_of_the_scene():
     assert no_dearer(Search(left_open, {"bob.position": 1e-2}), unknown) is unknown
 
 
-def test_a_plan_keeps_a_rod_that_bends_by_more_than_is_wanted_and_drops_one_that_does_not(tmp_path: Path):
+def test_a_plan_retains_a_rod_that_bends_by_more_than_the_accuracy_and_drops_one_that_does_not(tmp_path: Path):
     """The rod shortens by 0.33 um at rest and vibrates about that when it is let go, to twice as much."""
     leg = _tight(_standing_leg(tmp_path))
     moving = edited(leg, {"drive.stroke": load_scene(tmp_path / "leg.toml").drive["stroke"].model_dump(mode="json")})
@@ -374,7 +374,7 @@ def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(tmp_pat
     assert adjoint.free < 1e-6 * np.abs(shown).max()
 
 
-def test_a_scene_that_cannot_be_run_as_it_stands_has_no_plan(tmp_path: Path, results: Path):
+def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, results: Path):
     """Thrown about by its drive at 1e9 rad/s^2 the rod turns faster than it vibrates; rigid, it could."""
     scene = load_scene(write("slider-crank", tmp_path)[0])
     law = {"type": "polynomial", "coefficients": [0.0, 0.0, 1e9]}

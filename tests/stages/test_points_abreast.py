@@ -59,7 +59,9 @@ def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return made
 
 
-def test_points_are_the_same_to_the_last_bit_whoever_is_beside_them(root: Path, evaluations_abreast: list[int]) -> None:
+def test_points_are_the_same_to_the_last_bit_whichever_are_evaluated_with_them(
+    root: Path, evaluations_abreast: list[int]
+) -> None:
     """More of them than lanes, in each other numbers, also of the laws of time and of the method; of all lengths."""
     ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.5})
     points: list[dict[str, Any]] = [{"joint.contact.normal.restitution": e} for e in (0.5, 0.6, 0.7, 0.8)]
@@ -160,7 +162,7 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
     assert not any(handed_out(evaluations=10_000_000, count=16)[1])  # eight for each of two, but for the first
 
 
-def test_the_run_that_tells_a_points_error_takes_the_model_over(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_run_for_a_points_error_reuses_its_model(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model is made from scratch, for the first run of the first point."""
     paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "2 ms"})
     proper, made = alike.engines, list[float]()

@@ -76,7 +76,7 @@ def test_the_rest_is_estimated_by_the_later_pace_where_that_changes():
     assert " 40% 9 min " in screen.getvalue().splitlines()[-1]
 
 
-def test_a_stretch_that_gets_slow_is_told_before_it_ends():
+def test_a_slow_stretch_is_reported_before_it_ends():
     """Less than a sample's share is done in it, and what is left grows with each look."""
     monitor, screen, clock = watched(terminal=True)
     name = monitor.begin("a", "simulate")
@@ -121,7 +121,7 @@ def test_durations_read_well(seconds: float, text: str):
     assert duration(seconds) == text
 
 
-def test_tasks_of_one_label_are_told_apart():
+def test_tasks_of_one_label_are_numbered():
     """Two copies of a scene that differ in its mesh have a task 'mesh rod1' each."""
     monitor, _, _ = watched(terminal=False)
     first, second = monitor.begin("a", "mesh rod1"), monitor.begin("a", "mesh rod1")
@@ -139,7 +139,7 @@ def _usual_log() -> Iterator[None]:
     write_to(None)
 
 
-def test_the_loggers_level_says_how_much_is_told():
+def test_the_loggers_level_sets_how_much_is_reported():
     told = {}
     for level in (logging.WARNING, logging.INFO, logging.DEBUG):
         LOG.setLevel(level)

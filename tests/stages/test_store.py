@@ -69,7 +69,7 @@ def test_equal_datasets_give_equal_bytes(tmp_path: Path):
     assert write_dataset(tmp_path / "three.nc", dataset(51)) != one.strip()
 
 
-def test_every_flipped_bit_is_found(store: Store, said: list[str]):
+def test_every_flipped_bit_is_detected(store: Store, said: list[str]):
     record = put(store)
     path = store.path("simulate", KEY, "nc")
     whole = path.read_bytes()
@@ -135,7 +135,7 @@ except ResourceError as error:
 
 
 @pytest.mark.parametrize("kind, limit", [("nc", 0), ("nc", 300_000), ("png", 5_000)])
-def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path, kind: str, limit: int):
+def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path: Path, kind: str, limit: int):
     """A limit on the size of files answers a write as a full disk does: with an error from the system."""
     results = tmp_path / "results"
     done = python("-c", FULL, Path(__file__).parent, results, str(limit), kind, succeeds=False)
@@ -172,7 +172,7 @@ assert (folder / "again.nc").read_bytes() == (folder / "whole.nc").read_bytes()
 
 
 @pytest.mark.parametrize("compressed", [1 << 26, 0])
-def test_the_library_tells_of_every_byte_that_it_cannot_write(tmp_path: Path, compressed: int):
+def test_the_library_reports_every_byte_that_it_cannot_write(tmp_path: Path, compressed: int):
     """What it writes is not read back: wherever a disk ends, it raises an error."""
     printed(TOO_SMALL, Path(__file__).parent, tmp_path, str(compressed))
 

@@ -81,7 +81,7 @@ def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tm
         assert np.isnan(left["bob.velocity.largest"].values[~done]).all()
 
 
-def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
+def test_an_absent_scheduler_is_refused_in_words(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["sweep", str(pendulum(tmp_path, 2)), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     said = capsys.readouterr().err
     assert "--scheduler tcp://127.0.0.1:9" in said

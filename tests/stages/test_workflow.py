@@ -66,7 +66,7 @@ def test_equal_results_stop_the_chain(project: Project):
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
 
 
-def test_a_corrupt_artifact_is_told_in_one_line_and_rebuilt(here: Project):
+def test_a_corrupt_artifact_is_reported_in_one_line_and_rebuilt(here: Project):
     here.run("run", "tiny/ideal")
     path = here.artifact("simulate")
     whole = path.read_bytes()
@@ -207,7 +207,7 @@ def _wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def test_two_files_of_one_name_are_told_apart_or_refused(here: Project):
+def test_two_files_of_one_name_are_distinguished_or_refused(here: Project):
     """Below the current folder they are called by their paths; elsewhere one must not take the other's place."""
     for name in ("a", "b"):
         (here.folder / name).mkdir()
