@@ -121,7 +121,7 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
 
 
 def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others are told at their next pause; nobody waits for ever."""
+    """The others end at their next pause; nobody waits for ever."""
     monkeypatch.setattr(cores, "cores", lambda: 1)
     proper, begun = trajectory._begin_closed, itertools.count()
 
@@ -143,7 +143,7 @@ def test_of_concurrent_members_the_first_that_fails_is_reported(monkeypatch: pyt
     def work(k: int, alive: Progress) -> None:
         if k in (1, 3):
             raise SolverError(f"member {k}")
-        while k == 2:  # until it is told that another one has failed
+        while k == 2:  # until another one has failed
             try:
                 alive(None, "")
             except BaseException:

@@ -91,7 +91,7 @@ def test_a_stop_of_the_sliding_within_one_step_is_noted() -> None:
     x = dataset.velocity.sel(body="ball", axis="x").values
     turns = np.flatnonzero(x[1:-1] * x[2:] < 0.0) + 1  # the first output is at rest
     assert len(turns) == 2
-    # beside the start's
+    # next to the start's
     assert len(stops) == len(turns)
     assert len(goes) == len(turns) + 1
     for k, stop, go in zip(turns, stops, goes[1:], strict=True):

@@ -32,8 +32,8 @@ SHORT = {"time.end": "20 ms", "output.interval": "1 ms"}
 WANTED = {"platform.velocity": "0.1 %"}
 
 
-def simulated(scene: Scene, told: list[str] | None = None) -> xr.Dataset:
-    said = [] if told is None else told
+def simulated(scene: Scene, reported: list[str] | None = None) -> xr.Dataset:
+    said = [] if reported is None else reported
     return dynamics.simulate(
         scene, bundles(scene), lambda fraction, text: said.append(text) if fraction is None else None
     )
@@ -56,16 +56,16 @@ def test_forces_of_rounding_are_requested_by_no_default() -> None:
 
 
 def test_ringing_modes_get_the_method_that_follows_them() -> None:
-    told: list[str] = []
+    reported: list[str] = []
     scene = load_scene(RINGING, {**SHORT, "accuracy": WANTED})
-    run = simulated(scene, told)
+    run = simulated(scene, reported)
     assert run.attrs["method"] == "exponential"
     assert "the modes' fastest vibration" in run.attrs["method_reason"]
-    assert run.attrs["method_reason"] in told
+    assert run.attrs["method_reason"] in reported
     velocity = parse("platform.velocity", scene.owners())
     error = quantities.error(run, reference(), velocity) / quantities.scale(reference(), velocity)
     assert run.attrs["accuracy_verdict"] == "met"
-    assert error < 3e-3  # what is wanted, and the estimate's own doubt, as in test_accuracy
+    assert error < 3e-3  # what is requested, and the estimate's own doubt, as in test_accuracy
     # an explicit method is stable with 140 evaluations per millisecond; here some 25 are taken
     assert run.attrs["evaluations"] < 0.5 * reference().attrs["evaluations"]
 
@@ -209,7 +209,7 @@ def test_a_run_that_was_handed_over_reports_the_cost_of_its_last_method() -> Non
 
 
 def test_the_outcome_of_a_perturbed_run_is_not_reported_as_that_of_the_run() -> None:
-    """The twin may be handed on where the run is not, and is made before, beside or after it."""
+    """The twin may be handed on where the run is not, and is made before, next to or after it."""
     suit = known(exponential=(1e-4, 400.0))
     solver = SimpleNamespace(integrator="exponential")
     engine = SimpleNamespace(model=SimpleNamespace(scene=SimpleNamespace(solver=solver)), start=0.0)

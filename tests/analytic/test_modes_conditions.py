@@ -123,7 +123,7 @@ def test_dense_and_sparse_solvers_agree_on_held_functionals(
     # eigenvalues span 1.2e6: the lowest is known to eps times that, 2.6e-10; ten times that
     np.testing.assert_allclose(sparse.values, dense.values, rtol=3e-9)
     for found in (dense, sparse):
-        # what is held moves by rounding only, beside motions of 1 / sqrt(m) = 2
+        # what is held moves by rounding only, next to motions of 1 / sqrt(m) = 2
         assert np.abs(held @ found.shapes).max() < 1e-9
 
 

@@ -153,7 +153,7 @@ def calls_of_kernels(root: Path) -> Iterator[tuple[str, ast.Call]]:
 
 
 def test_no_kernel_that_writes_is_given_an_array_twice(root: Path) -> None:
-    """What it writes into one argument changes nothing that it reads from another: the compiler is told so."""
+    """What it writes into one argument changes nothing that it reads from another: the compiler relies on it."""
     twice = {
         where
         for where, call in calls_of_kernels(root)

@@ -1,4 +1,4 @@
-"""The tables say what the runs say, in the paper's units, beside the paper's own numbers."""
+"""The tables say what the runs say, in the paper's units, next to the paper's own numbers."""
 
 import csv
 import io

@@ -143,7 +143,7 @@ print(hashlib.sha256(b"".join(s.tobytes() for s in shapes)).hexdigest())
 
 
 def test_every_process_gets_the_same_shapes() -> None:
-    """Dense and sparse solver; ARPACK would start from numpy's random state unless told otherwise."""
+    """Dense and sparse solver; ARPACK would start from numpy's random state otherwise."""
     assert len({printed(SHAPES.format(seed=seed)) for seed in (1, 2)}) == 1
 
 

@@ -84,9 +84,9 @@ def test_refused_points_are_gaps_with_their_reason():
 
 def test_errors_near_that_of_the_reference_are_not_resolved():
     found, *_ = study(uncertainty=1e-7)
-    told = resolved(found, "tolerance").sel(adaptive_integrator="dop853", quantity="slider.position")
-    assert told.sel(rtol=1e-6).item()
-    assert not told.sel(rtol=1e-9).item()
+    reported = resolved(found, "tolerance").sel(adaptive_integrator="dop853", quantity="slider.position")
+    assert reported.sel(rtol=1e-6).item()
+    assert not reported.sel(rtol=1e-9).item()
 
 
 def test_errors_beyond_the_horizon_do_not_count():

@@ -43,10 +43,10 @@ def test_evaluations_are_counted_and_capped(solver: dict[str, Any]) -> None:
     made = run(double_pendulum(), solver)
     assert made.counters["evaluations"] > made.counters["steps"] > 0
     assert (made.counters["jacobians"] > 0) is INTEGRATORS[solver["integrator"]].implicit
-    with pytest.raises(SolverError, match="limit of 40 evaluations") as told:
+    with pytest.raises(SolverError, match="limit of 40 evaluations") as caught:
         run(double_pendulum(), {**solver, "evaluations": 40})
     # what used them up, and what to do about it
-    assert all(word in str(told.value) for word in (" steps and ", " rejected ", "more evaluations"))
+    assert all(word in str(caught.value) for word in (" steps and ", " rejected ", "more evaluations"))
 
 
 @every_solver

@@ -85,7 +85,7 @@ def test_zeros_are_far_below_and_the_rest_far_above_the_floor(name: str) -> None
 
 @pytest.mark.parametrize("number", range(6))
 def test_a_singular_pose_is_distinguished_from_redundancy_in_any_orientation(number: int) -> None:
-    """Cranks in one line can go on in parallel or against each other; beside that pose the rank is one higher."""
+    """Cranks in one line can go on in parallel or against each other; next to that pose the rank is one higher."""
     random = np.random.default_rng(number)
     made = parallel_cranks(random, 2 + number % 2, angle=0.0)
     found = analysed(movable.scene(made, random, movable.any_setting(random)))
@@ -175,7 +175,7 @@ def test_drives_that_redundant_loops_tie_are_still_refused() -> None:
 
 
 def test_a_small_part_of_a_large_machine_keeps_its_own_scale() -> None:
-    """A four-bar of 0.1 mm beside one of 10 m, and one on a body of the other."""
+    """A four-bar of 0.1 mm next to one of 10 m, and one on a body of the other."""
     random = np.random.default_rng(0)
     large = loop(random, "four-bar")
     for base in (movable.WORLD, "link1"):

@@ -197,7 +197,7 @@ def test_frames_of_recipes_take_an_axis_too() -> None:
 
 
 def lacking(reference: str, interfaces: str) -> str:
-    """What is told of a body of which half the compliance between A and B is missing."""
+    """What is reported of a body of which half the compliance between A and B is missing."""
     names, directions = ["A", "B"], ["x", "y", "z", "rx", "ry", "rz"]
     fraction = xr.DataArray(
         np.full((2, 2, 6), 0.5),
@@ -205,8 +205,8 @@ def lacking(reference: str, interfaces: str) -> str:
         coords={"frame": names, "frame_held": names, "direction": directions},
     )
     attributes = {"reference": reference, "interfaces": interfaces, "count": 12}
-    (told,) = deficits.warnings(xr.Dataset({"compliance_share": fraction}, attrs=attributes), names, "rod")
-    return told
+    (reported,) = deficits.warnings(xr.Dataset({"compliance_share": fraction}, attrs=attributes), names, "rod")
+    return reported
 
 
 def test_the_remedy_for_missing_compliance_is_one_that_the_body_does_not_have() -> None:

@@ -64,12 +64,12 @@ def test_a_page_says_when_and_where_once(root: Path, name: str):
     text = (root / "docs" / name).read_text()
     sessions = [s for family in page.of_page(name) for s in log.latest(log.FOLDER / f"{family}.jsonl")]
     assert text.count("\nMeasured") == 1
-    told = {page.session_words(s) for s in sessions}
+    reported = {page.session_words(s) for s in sessions}
     lines = [line.removesuffix(".") for line in text.splitlines()]
-    assert all(sum(line.endswith(words) for line in lines) == 1 for words in told)
+    assert all(sum(line.endswith(words) for line in lines) == 1 for words in reported)
     assert text.count("<!-- begin measured -->") == 1
     for said in {s.cpu for s in sessions if s.cpu}:
-        assert text.count(said) == sum(said in words for words in told)
+        assert text.count(said) == sum(said in words for words in reported)
 
 
 @pytest.mark.parametrize(
@@ -200,10 +200,10 @@ def test_the_log_has_machine_and_date_once_and_the_last_of_each_case_counts(tmp_
 
 
 def test_a_page_of_several_sessions_says_which_case_is_whose():
-    told = page.where({"growth": [session(1, "a", "c"), session(2, "b")], "runs": [session(2, "d")]})
-    assert told.startswith("Measured:\n")
-    assert "- growth (a, c): 2026-01-01 on processor 1, python 3" in told
-    assert "- growth (b), runs: 2026-01-02 on processor 2, python 3" in told
+    reported = page.where({"growth": [session(1, "a", "c"), session(2, "b")], "runs": [session(2, "d")]})
+    assert reported.startswith("Measured:\n")
+    assert "- growth (a, c): 2026-01-01 on processor 1, python 3" in reported
+    assert "- growth (b), runs: 2026-01-02 on processor 2, python 3" in reported
     assert page.where({"growth": [session(1, "a")], "runs": [session(1, "d")]}).count("processor 1") == 1
 
 

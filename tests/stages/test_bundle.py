@@ -86,9 +86,9 @@ def test_a_run_that_ends_otherwise_is_reported(scene: Path, tmp_path: Path, comm
     facts = json.loads(content["facts.json"])
     facts |= {"exit_code": 0, "libraries": {"numpy": "1.0"}}
     path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
-    told = command("doctor", "--repeat", path, code=4)
-    assert "there with 0" in told.out
-    assert "here, 1.0 there" in told.out
+    reported = command("doctor", "--repeat", path, code=4)
+    assert "there with 0" in reported.out
+    assert "here, 1.0 there" in reported.out
 
 
 @pytest.mark.parametrize("name", ["../out.toml", "/out.toml", "files/../../out.toml", "files\\out.toml", "C:/out.toml"])

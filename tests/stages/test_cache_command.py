@@ -32,10 +32,10 @@ def test_damage_is_reported_and_removed(store: Store, command: Command):
     store.path("simulate", "a" * 32, "nc").write_bytes(b"b" * 1000)
     path = store.path("simulate", "b" * 32, "json")
     path.write_bytes(path.read_bytes().replace(b'"b"', b'"d"'))
-    told = command("cache", "check", code=4)
-    assert f"{'a' * 32}.nc is corrupt" in told.out
-    assert f"{'b' * 32}.json is no record, or damaged" in told.out
-    assert "never used" in told.err
+    reported = command("cache", "check", code=4)
+    assert f"{'a' * 32}.nc is corrupt" in reported.out
+    assert f"{'b' * 32}.json is no record, or damaged" in reported.out
+    assert "never used" in reported.err
     os.utime(store.path("simulate", "b" * 32, "nc"), (0.0, 0.0))
     command("cache", "prune")
     assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*")) == ["c", "c"]
@@ -88,9 +88,9 @@ def test_points_of_sweeps_are_looked_at_as_well(store: Store, command: Command):
 def test_the_inputs_of_an_artifact_are_reported(store: Store, command: Command):
     store.show(put(store, "a"), "runs/x", {"nc": "run.nc"}, "simulate")
     for what in (str(store.root / "runs" / "x" / "run.nc"), "aaaa"):
-        told = command("cache", "explain", what).out
-        assert f"simulate {'a' * 32}" in told
-        assert "parameter c: a" in told
+        reported = command("cache", "explain", what).out
+        assert f"simulate {'a' * 32}" in reported
+        assert "parameter c: a" in reported
     command("cache", "explain", "b", code=2)
     assert "simulate          1 artifacts" in command("cache", "size").out
 
@@ -102,10 +102,10 @@ def test_kernels_of_another_build_are_counted_and_are_no_damage(store: Store, co
     for name, ends in (("old", (".py", ".nbi")), ("bad", (".py", ".code"))):
         (folder / f"flexclear_{name}.py").write_text("")
         (folder / f"flexclear_{name}.sum").write_bytes(checked({f"flexclear_{name}{end}": "1" for end in ends}))
-    told = command("cache", "check", code=4).out
-    assert "2 compiled kernels, 1 of another build" in told
-    assert "flexclear_bad.py is damaged" in told
-    assert "flexclear_old.py is damaged" not in told
+    reported = command("cache", "check", code=4).out
+    assert "2 compiled kernels, 1 of another build" in reported
+    assert "flexclear_bad.py is damaged" in reported
+    assert "flexclear_old.py is damaged" not in reported
 
 
 def test_results_of_another_processor_are_reported_and_are_fresh():

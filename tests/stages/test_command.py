@@ -41,9 +41,9 @@ WRONG = {
 
 
 @pytest.mark.parametrize("verb", ["run", "why"])
-@pytest.mark.parametrize("text, told", WRONG.values(), ids=WRONG.keys())
+@pytest.mark.parametrize("text, reported", WRONG.values(), ids=WRONG.keys())
 def test_wrong_scenes_are_refused_before_anything_runs(
-    command: Command, tmp_path: Path, root: Path, verb: str, text: str, told: list[str]
+    command: Command, tmp_path: Path, root: Path, verb: str, text: str, reported: list[str]
 ):
     (tmp_path / "ideal.toml").write_text(SCENE + JOINT)
     path = tmp_path / "scene.toml"
@@ -52,7 +52,7 @@ def test_wrong_scenes_are_refused_before_anything_runs(
     assert said.out == ""
     assert said.err.startswith("flexclear: ")
     assert "Traceback" not in said.err
-    for part in told:
+    for part in reported:
         assert part in said.err
 
 
@@ -65,10 +65,10 @@ def test_all_errors_of_all_scenes_are_reported_at_once(command: Command, tmp_pat
 
 
 @pytest.mark.parametrize(
-    "name, told", [("sps4/csk", "did you mean 'sps4/csj'"), ("nowhere/a.toml", "no such file"), (".", "is neither")]
+    "name, reported", [("sps4/csk", "did you mean 'sps4/csj'"), ("nowhere/a.toml", "no such file"), (".", "is neither")]
 )
-def test_scenes_that_are_not_there(command: Command, name: str, told: str):
-    assert told in command("run", name, code=2).err
+def test_scenes_that_are_not_there(command: Command, name: str, reported: str):
+    assert reported in command("run", name, code=2).err
 
 
 def test_scenes_are_named_by_file_or_by_name(command: Command, root: Path):

@@ -37,12 +37,12 @@ def kernel(tmp_path: Path) -> Path:
 def used(path: Path) -> bool:
     """Load it as a new process would, and use it; whether it had to be compiled."""
     loaded.pop(path.stem, None)
-    told: list[Path] = []
-    bring([path], told.append)
+    reported: list[Path] = []
+    bring([path], reported.append)
     scaled = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(loaded[path.stem].address)
     assert scaled(2.0) == 2.0 * 0.123456789
     assert compiled(path)
-    return bool(told)
+    return bool(reported)
 
 
 def parts(path: Path) -> list[Path]:

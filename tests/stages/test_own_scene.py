@@ -1,4 +1,4 @@
-"""A scene of one's own: what `new` writes is right, what is wrong in it is told at once, editors know its keys."""
+"""A scene of one's own: what `new` writes is right, what is wrong in it is reported at once, editors know its keys."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tests.stages.typical_mistakes import MISTAKES, WARNED
 REPORTED = dict(
     re.findall(r"^## (.+)\n((?:.+\n?)+)", (Path(__file__).parent / "typical_mistakes.txt").read_text(), re.MULTILINE)
 )
-#: sweeps are no scenes, though they lie beside them
+#: sweeps are no scenes, though they lie next to them
 SCENES = [p for p in sorted((Path(__file__).parents[2] / "scenes").rglob("*.toml")) if p.parent.name != "sweeps"]
 #: right in itself, but more than `[limits]` allows
 TOO_MUCH = ("far too many rows",)
@@ -237,8 +237,8 @@ def test_check_looks_whether_the_joints_of_flexible_bodies_fit(tmp_path: Path, c
 def test_check_looks_at_a_recipe_as_a_recipe(tmp_path: Path, command: Command):
     _, rod = write("slider-crank", tmp_path)
     # 200 mm x 12 mm x 8 mm of 7850 kg/m^3
-    told = f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no error"
-    assert told in command("check", rod).out
+    reported = f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no error"
+    assert reported in command("check", rod).out
     text = rod.read_text()
     rod.write_text(
         text.replace("elements = 10", "element = 10").replace('small_end = { x = "200 mm"', "small_end = { x = 1")

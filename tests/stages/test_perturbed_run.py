@@ -115,12 +115,12 @@ def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
     monkeypatch.setattr(progress_rate, "TRIAL", 1000)
     monkeypatch.setattr(progress_rate, "HOPELESS", 1100)
     monkeypatch.setattr(trajectory, "SLICE", 100)
-    scene, told = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
+    scene, reported = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
     expected = alone(scene, monkeypatch)
     assert expected.attrs["method"] == "radau"
-    found = dynamics.simulate(scene, {}, lambda fraction, text: told.add(threading.get_ident()))
+    found = dynamics.simulate(scene, {}, lambda fraction, text: reported.add(threading.get_ident()))
     assert found.identical(expected)
-    assert told == {threading.get_ident()}
+    assert reported == {threading.get_ident()}
 
 
 @pytest.mark.parametrize("processors_there", [1, 2])
@@ -141,7 +141,7 @@ def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(
 
 @pytest.mark.usefixtures("parting")
 def test_a_perturbed_run_that_fails_after_its_separation_gives_the_same_horizon(root: Path) -> None:
-    """However far it was followed: beside a slower run it may come to where it fails, and after the run it does not."""
+    """However far it was followed: next to a slower run it may come to where it fails, after the run it does not."""
     engine = engine_of(check(root, "clearance_slider_crank"), {}, silent)
     start = consistent_start(engine)
 
@@ -156,7 +156,7 @@ def test_a_perturbed_run_that_fails_after_its_separation_gives_the_same_horizon(
             return follow(mine, y, silent, lambda name: mine, None, failing, outputs)
 
         pair = Pair(engine)
-        pair.run(lambda *told: follow(engine, start, silent, lambda name: engine, None, *told))
+        pair.run(lambda *reported: follow(engine, start, silent, lambda name: engine, None, *reported))
         return pair.perturbed_run(start, steps, silent)
 
     whole = twin(2.0 * engine.end)
@@ -219,7 +219,7 @@ def test_where_no_thread_is_to_be_had_the_work_is_done_when_its_result_is_asked_
 
 @pytest.mark.parametrize("stopped", ["run", "twin"])
 def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Asked to stop while the run goes on, or its twin alone: what there is of the run is told."""
+    """Asked to stop while the run goes on, or its twin alone: what there is of the run is returned."""
     monkeypatch.setattr(trajectory, "SLICE", 100)
     monkeypatch.setattr(stopping, "_why", "")
     scene = check(root, "bounce", **{"output.interval": 0.05})
@@ -237,10 +237,10 @@ def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: p
     with monkeypatch.context() as patch:
         if stopped == "twin":
             patch.setattr(Pair, "_enough", late_twin)
-        with pytest.raises(StoppedError) as told:
+        with pytest.raises(StoppedError) as caught:
             dynamics.simulate(scene, {}, progress)
     stopping._why = ""
-    left = told.value.partial
+    left = caught.value.partial
     assert left.attrs["complete"] == 0
     assert left.position.identical(whole.position[: left.sizes["time"]])
     assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")

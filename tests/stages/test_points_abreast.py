@@ -134,7 +134,7 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
     """Where they take many evaluations and there are many of them; they still end together."""
 
     def handed_out(evaluations: int, count: int = 200) -> tuple[list[int], list[bool], float]:
-        busy, sizes, told = [0.0, 0.0], list[int](), list[bool]()
+        busy, sizes, reported = [0.0, 0.0], list[int](), list[bool]()
 
         def submit(family: str, packed: bytes, points: list[Any], alone: bool, abreast: bool) -> Any:
             from concurrent.futures import Future
@@ -142,7 +142,7 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
             seconds = 0.1 * len(points)
             busy[busy.index(min(busy))] += seconds
             sizes.append(len(points))
-            told.append(abreast)
+            reported.append(abreast)
             future: Future[Any] = Future()
             future.set_result(([Point({}, {}, {}, evaluations) for _ in points], seconds))
             return future
@@ -150,10 +150,10 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
         jobs = [sweep_engine.Job(str(n), "family", {}) for n in range(count)]
         sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
         assert sum(sizes) == count
-        return sizes, told, sum(busy) / max(busy)
+        return sizes, reported, sum(busy) / max(busy)
 
-    sizes, told, together = handed_out(evaluations=100_000)
-    assert told == [False] + [True] * (len(sizes) - 1)  # the first tells how many it takes
+    sizes, reported, together = handed_out(evaluations=100_000)
+    assert reported == [False] + [True] * (len(sizes) - 1)  # the first tells how many it takes
     assert all(size % sweep_engine.POINTS_TOGETHER == 0 for size in sizes[1:-4])
     assert max(sizes) >= 4 * sweep_engine.POINTS_TOGETHER
     assert together >= 1.85  # found 2.00

@@ -48,7 +48,7 @@ def test_kernels_for_the_timing_alone_are_compiled_concurrently_and_once_per_top
 
 
 @pytest.mark.parametrize(
-    "reference, told",
+    "reference, reported",
     [
         ("sps4/csj:runn", "did you mean 'run'"),
         ("sps4/csj:bundle/rod1", "there is no bundle of 'rod1'"),
@@ -57,6 +57,6 @@ def test_kernels_for_the_timing_alone_are_compiled_concurrently_and_once_per_top
         ("nowhere:timing", "there are no scenes"),
     ],
 )
-def test_references_that_lead_nowhere_are_refused(reference: str, told: str):
-    with pytest.raises(InputError, match=told):
+def test_references_that_lead_nowhere_are_refused(reference: str, reported: str):
+    with pytest.raises(InputError, match=reported):
         Scenes().artifact(reference)

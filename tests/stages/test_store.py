@@ -164,7 +164,7 @@ for limit in sorted(limits):
         netcdf.write(folder / f"{limit}.nc", data)
     except (OSError, RuntimeError):
         continue
-    sys.exit(f"nothing was told of a limit of {limit} of {size} bytes")
+    sys.exit(f"nothing was reported of a limit of {limit} of {size} bytes")
 resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
 netcdf.write(folder / "again.nc", data)
 assert (folder / "again.nc").read_bytes() == (folder / "whole.nc").read_bytes()
@@ -180,7 +180,7 @@ def test_the_library_reports_every_byte_that_it_cannot_write(tmp_path: Path, com
 def test_a_disk_that_takes_no_more_when_it_is_forced_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Network disks may tell only then that they are full; the file is forced by a thread beside its digest."""
+    """Network disks may tell only then that they are full; the file is forced by a thread next to its digest."""
     path = tmp_path / "a.nc"
     digest = write_dataset(path, dataset(9))
 
@@ -254,8 +254,8 @@ def test_what_is_shown_shares_no_bytes_with_the_cache(store: Store, said: list[s
     store.show(record, "runs/tiny", {"nc": "run.nc"}, "simulate")
     assert shown.read_bytes() == kept.read_bytes()
     assert shown.with_name("run.edited.nc").read_bytes() == kept.read_bytes() + b"edited"
-    (told,) = said
-    assert "run.nc was edited; the edit is stored as run.edited.nc" in told
+    (reported,) = said
+    assert "run.nc was edited; the edit is stored as run.edited.nc" in reported
 
 
 def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Store, said: list[str]):

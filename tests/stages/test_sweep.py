@@ -137,9 +137,9 @@ def test_the_reported_error_is_the_error(root: Path):
     decay, omega = 4.0 / 4.0, np.sqrt(k / 2.0 - 1.0)
     exact = 0.25 + 0.1 * np.exp(-decay) * (np.cos(omega) + decay / omega * np.sin(omega))
     off = np.abs(found["mass.position.final"].values[:, 2] - exact)
-    told = found["mass.position.final.error"].values[:, 2]
+    reported = found["mass.position.final.error"].values[:, 2]
     # the tighter run is not exact: it leaves a hundredth, and where errors cancel more
-    assert told == pytest.approx(off, rel=0.5)
+    assert reported == pytest.approx(off, rel=0.5)
     assert (off > 1e-12).all()
 
 
