@@ -100,7 +100,7 @@ class Worker:
 
     def dismiss(self) -> None:
         """End the process, whatever it does."""
-        # first of all: a thread that waits for an answer is told by the end of its line
+        # first of all: the end of its line ends a thread that waits for an answer
         self.process.terminate()
         self.process.join()
         self.line.close()

@@ -21,7 +21,7 @@ def thrown_up(beyond: float) -> xr.Dataset:
 
 
 @pytest.mark.parametrize("beyond", [1e-12, 1e-9, 1e-6])
-def test_a_grazing_contact_is_found_however_short_it_is(beyond: float) -> None:
+def test_a_grazing_contact_is_located_however_short_it_is(beyond: float) -> None:
     dataset = thrown_up(beyond)
     (begun,), (ended,) = of_kind(dataset, "closing"), of_kind(dataset, "opening")
     # the gap is located to 1e-13 of the clearance, the speed is the root of twice that share of `beyond`
@@ -41,7 +41,7 @@ def test_a_near_miss_is_no_contact(short: float) -> None:
     assert float(dataset.contact_gap.min()) == pytest.approx(short, abs=0.5 * GRAVITY * 0.5e-3**2)
 
 
-def test_contacts_at_one_time_are_all_found_and_do_not_see_each_other() -> None:
+def test_simultaneous_contacts_are_all_located_and_independent() -> None:
     ball = {"type": "rigid", "mass": MASS, "inertia": [4e-3] * 3, "pose": {}, "frames": {"centre": {}}}
     law = {"law": "lankarani-nikravesh", "restitution": 0.7, "stiffness": STIFFNESS}
     joint = {"type": "clearance-spherical", "clearance": CLEARANCE, "ball_radius": 0.1, "normal": law}
@@ -91,7 +91,7 @@ def test_a_stop_of_the_sliding_within_one_step_is_noted() -> None:
     x = dataset.velocity.sel(body="ball", axis="x").values
     turns = np.flatnonzero(x[1:-1] * x[2:] < 0.0) + 1  # the first output is at rest
     assert len(turns) == 2
-    # beside the start's
+    # next to the start's
     assert len(stops) == len(turns)
     assert len(goes) == len(turns) + 1
     for k, stop, go in zip(turns, stops, goes[1:], strict=True):

@@ -174,7 +174,7 @@ def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_
     """The rod of the slider-crank begins as bent as without clearance; a compressed one would hit its pin at once.
 
     Pin and journal touch as deep as carries the force of the twin's joint. Of the two ways in which the twin can be
-    assembled where only the drive says how its crank stands, one is taken, and both are told.
+    assembled where only the drive says how its crank stands, one is taken, and both are reported.
     """
     template = TREE / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
     stop = {"joint": "guide", "upper": "0.4 m", "normal": {"law": "flores", "restitution": 0.5, "stiffness": 1e8}}

@@ -1,4 +1,4 @@
-"""Scenes that were tried from outside and came out wrong once; each beside its closed form, or refused in words."""
+"""Scenes that were tried from outside and came out wrong once; each next to its closed form, or refused in words."""
 
 import numpy as np
 import pytest

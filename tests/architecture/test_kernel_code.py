@@ -153,7 +153,7 @@ def calls_of_kernels(root: Path) -> Iterator[tuple[str, ast.Call]]:
 
 
 def test_no_kernel_that_writes_is_given_an_array_twice(root: Path) -> None:
-    """What it writes into one argument changes nothing that it reads from another: the compiler is told so."""
+    """What it writes into one argument changes nothing that it reads from another: the compiler relies on it."""
     twice = {
         where
         for where, call in calls_of_kernels(root)
@@ -204,7 +204,7 @@ def _kernels(source: str) -> list[tuple[str, str]]:
     return found
 
 
-def test_no_kernel_stands_twice(root: Path) -> None:
+def test_no_kernel_is_there_twice(root: Path) -> None:
     places = defaultdict(list)
     for path in sorted((root / "pipeline" / "dynamics").rglob("*.py")):
         for name, says in _kernels(path.read_text(encoding="utf-8")):

@@ -93,7 +93,7 @@ def test_the_schema_of_scenes_knows_it(python: Command) -> None:
     assert "heun" in json.loads(done.stdout)["$defs"]["PlainIntegrator"]["properties"]["integrator"]["enum"]
 
 
-def test_a_misspelt_name_is_told_its_name(python: Command) -> None:
+def test_a_misspelt_name_gets_the_nearest_one(python: Command) -> None:
     done = python("-m", "flexclear", "run", "none.toml", "--to", "simulate")
     assert done.returncode == 2
     assert "did you mean 'heun'" in done.stderr

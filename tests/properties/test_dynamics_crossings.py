@@ -43,7 +43,7 @@ def sprung(clearance: float, phase: float, solver: dict[str, Any]) -> Table:
 @pytest.mark.parametrize(
     "solver", [{"rtol": 1e-2}, {"rtol": 1e-3}, {"rtol": 1e-6}, {"rtol": 1e-3, "integrator": "dopri5"}]
 )
-def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
+def test_the_first_touch_is_located_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
     """Steps of order 8 at loose tolerances are longer than the swing takes to and from the wall."""
     run = simulate(sprung(clearance, phase, solver))
     touch = (np.arcsin(clearance / SWING) - phase) / RATE
@@ -55,7 +55,7 @@ def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: floa
 
 @pytest.mark.parametrize("clearance", [1e-4, 1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("solver", [{"rtol": 1e-3}, {"rtol": 1e-10}, {"rtol": 1e-6, "integrator": "dopri5"}])
-def test_the_first_touch_is_found_in_a_step_of_many_clearances(clearance: float, solver: dict[str, Any]) -> None:
+def test_the_first_touch_is_located_in_a_step_of_many_clearances(clearance: float, solver: dict[str, Any]) -> None:
     """A parabola 3 m away is one step: beyond the socket's wall by a fiftieth of the clearance, and out below."""
     gravity, below = 10.0, 0.3 * clearance
     up = np.sqrt(2.0 * gravity * (1.02 * clearance + below))
