@@ -139,3 +139,10 @@ def apply_wrench(d, s, moment, force):
         for j in range(body.n_modes - body.n_held):
             column = d.columns[port.column + j]
             d.modal_bias[body.c0 + body.n_held + j] -= dot(column.angular, moment) + dot(column.linear, force)
+
+
+@kernel
+def apply_between(d, a, b, moment, force):
+    """Apply a wrench as above on site b, and against it on site a."""
+    apply_wrench(d, b, moment, force)
+    apply_wrench(d, a, scale(-1.0, moment), scale(-1.0, force))

@@ -178,18 +178,18 @@ def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bo
     return _of_wiring(file, wiring, STRAIGHT, FILES, kernel=file.kernel, options=options, level=level)
 
 
-def abreast(parts: Parts, wiring: Wiring, lanes: int) -> str:
+def batched(parts: Parts, wiring: Wiring, lanes: int) -> str:
     """Source of what lets so many steppers of one wiring proceed (`compile.lanes`)."""
     file = _equations(parts)
-    file.take(f"{DYNAMICS}.specialise", "abreast")
+    file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
     return _of_wiring(file, wiring, LANES, lanes=lanes)
 
 
-def along(parts: Parts, wiring: Wiring) -> str:
+def tangent(parts: Parts, wiring: Wiring) -> str:
     """Source of the right-hand side for one wiring with its tangent."""
     file = _equations(parts)
-    file.take(f"{DYNAMICS}.specialise", "abreast")
+    file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.fields", "data")
     change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
     return _of_wiring(file, wiring, CHANGES, law_changes=f"{file.take(PRESCRIBED, 'make_law_changes')}({change})")
@@ -317,10 +317,10 @@ def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Com
 
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
-    """The module of a kind of loads, or what it makes of the kernel of an expression (`_formulas`)."""
+    """The kernel of a kind of loads, which may be made of that of an expression (`_formulas`)."""
     module = file.part(LOADS, name)
     if not formula:
-        return module
+        return f"{module}.apply"
     file.take(f"{DYNAMICS}.kernels", "kernel")
     file.take(LOADS, "looks")
     return f"{module}.applying(formula{number})"
@@ -343,7 +343,7 @@ files.assembles(__name__, NAME, lambda: straight({kernel}, WIRING, {options}), {
 """
 CHANGES = """WIRING = (
 {wiring})
-law_changes, differentiated = {law_changes}, abreast.along(rates, WIRING)
+law_changes, differentiated = {law_changes}, batched.differentiated(rates, WIRING)
 
 
 @calls.exported("evaluate")
@@ -358,7 +358,7 @@ def specialised(h, f, w, n, t, y, dy):
 """
 LANES = """WIRING = (
 {wiring})
-run = make_lanes(*abreast.abreast(rates, WIRING, {lanes}), {lanes})
+run = make_lanes(*batched.batched(rates, WIRING, {lanes}), {lanes})
 
 
 @calls.exported("lanes")

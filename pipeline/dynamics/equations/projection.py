@@ -130,12 +130,12 @@ def make_projection(
         residual says little about the error behind it, nothing is changed.
         """
         d = data(h, f, w, n)
-        step, used, apart = d.at_correction, 0, OPEN_REDUNDANT * d.length
+        step, used, redundant = d.at_correction, 0, OPEN_REDUNDANT * d.length
         if d.last_pivot < BLIND:
             return 0
         for _ in range(PROJECTIONS):
             if open_by(d) <= tolerance:
-                return used if widest(d, d.residual, False) <= max(apart, tolerance) else -1
+                return used if widest(d, d.residual, False) <= max(redundant, tolerance) else -1
             if d.abridged:
                 evaluate(h, f, w, n, t, y, dy)  # for its factors
             stiffen(d)
@@ -154,6 +154,6 @@ def make_projection(
                 return -1
         if not widest(d, d.residual, True) <= ROUNDING_FACTOR * tolerance:
             return -1
-        return used if widest(d, d.residual, False) <= max(apart, ROUNDING_FACTOR * tolerance) else -1
+        return used if widest(d, d.residual, False) <= max(redundant, ROUNDING_FACTOR * tolerance) else -1
 
     return project
