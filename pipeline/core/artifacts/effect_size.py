@@ -39,6 +39,8 @@ OF_KIND = {
     "impact_times": ("count", "first", "last"),
 }
 OTHERS = ("series", "largest")
+#: a difference is real that is at least so many times what of it may be chance, or error of the runs
+REAL = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +57,11 @@ class Influence:
     def most(self) -> float:
         """The largest difference that is not excluded."""
         return self.difference + self.uncertainty
+
+    @property
+    def real(self) -> bool:
+        """Whether there is a difference, whatever its size."""
+        return self.difference >= REAL * self.uncertainty
 
 
 @dataclass(frozen=True, slots=True)

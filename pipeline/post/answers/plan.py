@@ -254,10 +254,11 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
         rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
     return Table(
         "What accuracy calls for",
-        ("of each size", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
+        ("accuracy", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
         tuple(rows),
         (
-            "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
+            "Each accuracy is that of all watched quantities, of positions and angles a fraction of the largest change "
+            "from the start, of others of the largest value; name one in [accuracy] to get its planned scene. "
             "Unchanged without a run: leaving the effect out would save no time worth the runs that measure its size.",
         ),
     )
