@@ -11,6 +11,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import simulated
 
 CSJ = TREE / "scenes" / "sps4" / "csj.toml"
 FULL = TREE / "scenes" / "sps4" / "far_csj_cb.toml"
@@ -23,7 +24,7 @@ def quiet(fraction, text):
 
 @pytest.fixture(scope="module")
 def reference():
-    return dynamics.simulate(load_scene(CSJ, {"solver.rtol": 1e-14}), {}, quiet)
+    return simulated(load_scene(CSJ, {"solver.rtol": 1e-14}))
 
 
 @pytest.mark.parametrize("requested", [10.0**-k for k in (2, 3, 5, 7, 9)])
@@ -40,7 +41,7 @@ def test_the_delivered_error_is_the_requested_one(reference, requested):
     # nor is it too dear: errors jump from tolerance to tolerance, as impacts do, but a ten times looser one misses, or
     # its energy is refused
     with suppress(SolverError):
-        looser = dynamics.simulate(load_scene(CSJ, {"solver.rtol": 10.0 * run.attrs["accuracy_rtol"]}), {}, quiet)
+        looser = simulated(load_scene(CSJ, {"solver.rtol": 10.0 * run.attrs["accuracy_rtol"]}))
         assert quantities.error(looser, reference, velocity) / size > requested
 
 

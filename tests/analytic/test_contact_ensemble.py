@@ -27,7 +27,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engines
 from flexclear.pipeline.post.single_run.series import derive
 from tests.analytic.mechanism_runs import TREE, run
-from tests.properties.mechanisms import joint, rigid
+from tests.properties.mechanisms import joint, rigid, simulated
 from tests.properties.mechanisms import scene as written
 from tests.reference import contact_solutions as exact
 
@@ -187,7 +187,7 @@ def carried(**path: Any) -> Scene:
 def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
     """Nanometres apart, after a few impacts: what members and run differ by is the sensitivity of the impacts."""
     asked = carried(actuators=["rail"])
-    known, members = dynamics.simulate(asked, {}, silent), analyses.ensemble(asked, {}, silent)
+    known, members = simulated(asked), analyses.ensemble(asked, {}, silent)
     closings = known.event_kind.values == "closing"
     assert 2 <= closings.sum() < 20
     assert members.impact_count.values.tolist() == [[closings.sum()]] * 2

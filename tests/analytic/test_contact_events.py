@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import simulate
 from tests.analytic.mechanism_runs import Overrides, of_kind, run
+from tests.properties.mechanisms import simulate
 
 BOUNCE, ROLLING = "checks/bounce", "checks/socket_rolling"
 CLEARANCE, GRAVITY, MASS, STIFFNESS = 0.1, 9.81, 1.0, 1e8
@@ -54,7 +53,7 @@ def test_simultaneous_contacts_are_all_located_and_independent() -> None:
         "time": {"end": 0.5},
         "output": {"interval": 0.01},
     }
-    dataset, alone = simulate(Scene.model_validate(table), {}, lambda fraction, text: None), run(BOUNCE)
+    dataset, alone = simulate(table), run(BOUNCE)
     begun, known = of_kind(dataset, "closing"), of_kind(alone, "closing")[:2]
     assert sorted(dataset.event_contact.values[begun[:3]]) == sorted(dataset.contact.values)
     assert dataset.event_time.values[begun] == pytest.approx(np.repeat(alone.event_time.values[known], 3), abs=1e-8)

@@ -1,5 +1,7 @@
 """The predictability horizon: growth of a small perturbation of the start."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -14,8 +16,11 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.post.single_run.series import horizon
-from tests.analytic.mechanism_runs import TREE, run
+from tests.analytic import mechanism_runs
+from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import ground, joint, rigid, scene
+
+run = partial(mechanism_runs.run, horizon=True)
 
 
 def test_rigid_clearance_converges_over_the_whole_stroke():

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.starts import ideal, snapshot
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import simulated
 from tests.properties.test_assembly import loose
 from tests.properties.test_dynamics_start import angles
 
@@ -22,7 +22,7 @@ CHECKS = TREE / "scenes" / "checks"
 
 
 def simulate(scene: Scene) -> xr.Dataset:
-    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
+    return simulated(scene, bundles(scene))
 
 
 # A four-bar, by the rate of a coordinate -----------------------------------------------------------------------------

@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 
 from flexclear import load_scene
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
@@ -17,7 +16,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
 from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate
+from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate, simulated
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it
 FIRST = 3.798
@@ -33,7 +32,7 @@ def turning(speed: float, gravity: float, **more: Any) -> xr.Dataset:
         "time.end": 1.0,
     }
     scene = load_scene(TREE / "scenes" / "checks" / "spinup_beam.toml", override | more)
-    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
+    return simulated(scene, bundles(scene))
 
 
 def reported(run: xr.Dataset) -> list[str]:

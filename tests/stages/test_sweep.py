@@ -13,7 +13,6 @@ from scipy.special import ellipk
 import flexclear as fc
 from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
@@ -28,6 +27,7 @@ from flexclear.pipeline.post.overview.sweep_figures import figures
 from flexclear.stages.simulation import modules
 from flexclear.stages.sweeps import sweep_plan
 from tests.processes import printed
+from tests.properties.mechanisms import simulated
 
 GRAVITY = 9.81
 
@@ -82,7 +82,7 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
     values = [0.6, 0.8]
     found = fc.sweep(path, {"joint.contact.normal.restitution": values}, keep, workers=1)
     for k, value in enumerate(values):
-        one = dynamics.simulate(load_scene(path, override={"joint.contact.normal.restitution": value}), {}, silent)
+        one = simulated(load_scene(path, override={"joint.contact.normal.restitution": value}))
         here, velocity = found.isel({"joint.contact.normal.restitution": k}), one["velocity"].sel(body="ball").values
         closing = (one["event_kind"] == "closing") & (one["event_approach_speed"] > 1e-4)
         speed, t = np.linalg.norm(velocity, axis=1), one["time"].values
