@@ -323,8 +323,9 @@ MEMORY, VECTORS, MATRICES = _stretches("memory:floats vectors:vectors*ny matrice
 #: of `integrate.modal_basis`, one oscillator per speed at most: omega^2 [1/s^2], damping [1/s], root of the stiffness
 #: of a mode's spring; the rows of Q^T, K^1/2 P K^1/2 and C, the columns of B, what the springs accelerate
 OSCILLATORS = work("square damping root", "?oscillations*nv")
-_stretches("axes:?oscillations*nv*nv coupling:?oscillations*nv*nv reading:?oscillations*nv*nv")
-_stretches("lifting:?oscillations*nv*ny response:?oscillations*nv*ny")
+SQUARES, OBLONG = "?oscillations*nv*nv", "?oscillations*nv*ny"
+AXES, COUPLING, READING = _stretches(f"axes:{SQUARES} coupling:{SQUARES} reading:{SQUARES}")
+LIFTING, RESPONSE = _stretches(f"lifting:{OBLONG} response:{OBLONG}")
 #: (z, z') of each oscillator; its phi functions in each quadrature, and what four sources add to (z, z') by them,
 #: weights of 1 and Lambda each (`integrate.exponential`)
 OSCILLATIONS, QUADRATURES = work("z rate", "oscillations*nv"), work("phi:10 share:8", "quadratures*nv")
