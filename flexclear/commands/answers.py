@@ -276,11 +276,13 @@ class _Comparison:
         return any(self._gone.get(name) == self._gone.get(other) for other in others)
 
     def _bring(self, names: Sequence[str], members: int) -> None:
+        from flexclear.pipeline.core.artifacts.effect_size import watched
+
         tasks = [watched_quantities.task(self._variant(name), self.chosen, members) for name in names]
         for k, (name, made) in enumerate(zip(names, self.workplace.made(*tasks), strict=True)):
             stored = made.dataset()
             self.tasks[name, members] = made.task
-            self.points[name, members] = watched_quantities.point(stored, self._variant(name), self.chosen)
+            self.points[name, members] = watched(stored, self._variant(name).owners(), self.chosen)
             self.took[name] = float(stored.attrs["cpu_seconds"]) / (members if self._touching(name) else 1)
             if not self._repeats(name, names[:k]):
                 self.spent += self._seconds(name, members) + float(stored.attrs["compile_seconds"]) / AT_ONCE

@@ -190,7 +190,8 @@ class Study:
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
                 "complete": self._complete and all(self._crawls(design) for design in self.undone),
-                "undone": _listed([design.key for design in self.undone]),
+                "undone": _listed([d.key for d in self.undone if not self._crawls(d)]),
+                "given_up": _listed([d.key for d in self.undone if self._crawls(d)]),
                 "peers": list(self.peers),
             },
             inputs=inputs | self._ensembles,
@@ -367,7 +368,6 @@ def _measured(design: cost_design.Design, function: str, more: Mapping[str, obje
         params={"simulate": simulation.params(design.scene, ensemble=ensemble), **more},
         inputs={**_bundles(design), "kernels": compiled},
         modules=simulation.modules(design.scene),
-        folder="",
         exclusive=True,
     )
 

@@ -294,7 +294,6 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
                 "members": requested.sweep.members or 0,
                 "error": requested.sweep.error,
             },
-            folder="",
             modules=modules,
         )
         given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)

@@ -103,7 +103,7 @@ def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
             assert {coordinate.part for coordinate in part.COORDINATES} <= set(joints.CHAIN)
 
 
-#: what a scene says beside its joint -> parts of its code, and a module that must be in the key
+#: what a scene says next to its joint -> parts of its code, and a module that must be in the key
 BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
     "stop": (
         {

@@ -18,9 +18,10 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import xarray as xr
 from scipy.special import stdtrit
 
-from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.artifacts.points import Point, unpacked
 from flexclear.pipeline.core.numerics.rotations import rotation_between
 from flexclear.pipeline.core.scene.quantity import Quantity, Recorded
 
@@ -38,6 +39,8 @@ OF_KIND = {
     "impact_times": ("count", "first", "last"),
 }
 OTHERS = ("series", "largest")
+#: a difference is real that is at least so many times what of it may be chance, or error of the runs
+REAL = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +57,11 @@ class Influence:
     def most(self) -> float:
         """The largest difference that is not excluded."""
         return self.difference + self.uncertainty
+
+    @property
+    def real(self) -> bool:
+        """Whether there is a difference, whatever its size."""
+        return self.difference >= REAL * self.uncertainty
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +114,11 @@ def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) 
     owners: of the scene, by what they are.
     """
     return [Recorded(q, r) for q in chosen if q.is_there(owners) for r in _reductions(q)]
+
+
+def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
+    """The point in an artifact of `stages.watched_quantities`."""
+    return unpacked(stored, recorded(owners, chosen))["point"]
 
 
 def _reductions(quantity: Quantity) -> tuple[str, ...]:

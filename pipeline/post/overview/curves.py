@@ -135,6 +135,11 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     return good[0] if good else choices[-1] if largest > 0.0 else choices[0]
 
 
+def size_of(unit: str) -> str:
+    """What fractions of the size of a quantity with this SI unit refer to (`quantities.scale`)."""
+    return {"m": "largest change", "rad": "largest change", "s": "last impact's time"}.get(unit, "largest value")
+
+
 def rounded(value: float, digits: int) -> str:
     """A number to so many significant digits; no exponent where up to seven digits before the point do without it."""
     written = float(f"{value:.{digits}g}")
