@@ -19,8 +19,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the `own` setting of
     the scene (own_integrator, own_rtol or own_step), in words what the budget left `undone` and what was `given_up`
-    with its method, whether the study is `complete`, and `peers`, as of `flexclear.commands.cost.read_peers`.  The reference
-    is the tightest run among the points, and a run by another method confirms it.
+    with its method, whether the study is `complete`, and `peers`, as of `flexclear.commands.cost.read_peers`.  The
+    reference is the tightest run among the points, and a run by another method confirms it.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision

@@ -144,7 +144,7 @@ class Plan:
 
     @property
     def statistics(self) -> list[str]:
-        """Of `points.SHARES`, those that are asked for."""
+        """Of `points.STATISTICS`, those that are asked for."""
         asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
         return [statistic for statistic, requested in asked.items() if requested]
 

@@ -96,18 +96,15 @@ def _sheet(
 
     heading: title, and what is below it.  height: of a row (inches).  legend: columns of the one legend.
     """
-    rows = -(-len(panels) // columns)
-    figure, axes = style.grid(rows, columns, (width, 0.9 + height * rows), sharex=True, **options)
-    for panel, (title, lines) in zip(axes.flat, panels, strict=False):
+    figure, axes = style.panels(len(panels), columns, width, 0.9, height, sharex=True, **options)
+    for panel, (title, lines) in zip(axes, panels, strict=True):
         for label, (values, look) in lines.items():
             panel.plot(1e3 * time, values, label=label, **look)
         panel.set(title=title, xlim=(1e3 * time[0], 1e3 * time[-1]))
-    for panel in axes.flat[len(panels) :]:
-        panel.set_visible(False)
-    for panel in axes[-1]:
+    for panel in figure.axes[-columns:]:
         panel.set_xlabel("time (ms)")
     if legend:
-        style.shared_legend(figure, axes[0, 0], legend)
+        style.shared_legend(figure, axes[0], legend)
     style.heading(figure, *heading)
     return style.files(name, figure)
 
