@@ -165,9 +165,11 @@ def _of_clearance(data: Data) -> Table:
     )
     clearance = 1e3 * float(post.clearance.sel(contact=paper.JOINT))
     count, peak = int(post.impact_count.sel(contact=paper.JOINT)), float(post.peak_force.sel(contact=paper.JOINT))
+    cut = int(np.isnan(post.impact_duration.values).sum())
+    unfinished = f" ({cut} of them still in contact at the end)" if cut else ""
     notes = (
         comparison("CSJ model", ours, TABLE8),
-        f"The run has {count} impacts{_unfinished(post)}; the largest contact force is {peak:.0f} N, the platform's "
+        f"The run has {count} impacts{unfinished}; the largest contact force is {peak:.0f} N, the platform's "
         f"largest vertical acceleration {float(post.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} m/s².",
         _restitution(data[f"{paper.CSJ.scene}:run"], post),
         "Angle and displacement are fitted, not predicted: once the ball rests against the socket, leg 1 is "
@@ -204,11 +206,6 @@ def _between_outputs(data: Data) -> str:
         f"times, first touches of the ball among them, the velocity is off by up to {1e3 * speed:.1f} mm/s (at "
         f"{1e3 * time:.2f} ms)."
     )
-
-
-def _unfinished(post: xr.Dataset) -> str:
-    cut = int(np.isnan(post.impact_duration.values).sum())
-    return f" ({cut} of them still in contact at the end)" if cut else ""
 
 
 def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:

@@ -75,7 +75,8 @@ def _same_path(data: Data, models: Sequence[paper.Model]) -> Outcome:
     ideal = deviations.ball_centre(data[f"{paper.IDEAL.scene}:run"])
     stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
     off = {m: float(np.linalg.norm(difference(data, m, deviations.ball_centre), axis=1).max()) for m in models}
-    words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
+    lengths = {m: f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing" for m, far in off.items()}
+    words = ", ".join(f"{mode_set(model) or model.label} {length}" for model, length in lengths.items())
     numbers = f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
     return _verdict(*(far < SMALL * stroke for far in off.values())), numbers
 
@@ -84,10 +85,6 @@ def _other_path(data: Data) -> Outcome:
     """The contrary statement on the same numbers."""
     verdict, numbers = _same_path(data, [paper.CSJ])
     return {HOLDS: NOT, NOT: HOLDS}[verdict], f"{numbers}: by the measure of the platform's displacement no influence"
-
-
-def _length(far: float) -> str:
-    return f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing"
 
 
 def _slight_vibration(data: Data) -> Outcome:
@@ -227,13 +224,10 @@ def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
     for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
         costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
         tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
-        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in costs.items()))
+        said = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
+        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in said.items()))
     printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
     return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
-
-
-def _ratio(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "fails"
 
 
 def _becomes_chaotic(data: Data) -> Outcome:

@@ -209,10 +209,12 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     ball the two axes of the socket along which the centre moves most.
     """
     offset = 1e3 * _without_noise(run, run["contact_offset"].values[:, contact], "m")
-    i, j = _plane(run, offset, contact)
+    moving = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
+    i, j = PLANES.get(_type(run, contact), moving)
     radius = 1e3 * clearance
     if _type(run, contact) == "ball-on-plane":  # which has a floor and no socket
-        axes.axhline(1e3 * _ball(run, contact), color="#a8a8a8", lw=1.0)
+        joint = parameters(run)["joint"][str(run["contact"].values[contact])]
+        axes.axhline(1e3 * float(joint["ball_radius"]), color="#a8a8a8", lw=1.0)
         axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
         axes.plot(offset[-1:, i], offset[-1:, j], "o", color="#009E73", ms=4)  # of a ball that stays where it is
         axes.margins(y=0.15)
@@ -236,19 +238,9 @@ def centre(run: xr.Dataset, contact: int) -> str:
     return f"centre {HOLDERS.get(_type(run, contact), 'in its socket')} (mm)"
 
 
-def _ball(run: xr.Dataset, contact: int) -> float:
-    """Radius of a ball [m]."""
-    return float(parameters(run)["joint"][str(run["contact"].values[contact])]["ball_radius"])
-
-
 def _type(run: xr.Dataset, contact: int) -> str:
     joint = parameters(run).get("joint", {}).get(str(run["contact"].values[contact]), {})
     return str(joint.get("type", ""))
-
-
-def _plane(run: xr.Dataset, offset: np.ndarray, contact: int) -> tuple[int, int]:
-    i, j = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
-    return PLANES.get(_type(run, contact), (i, j))
 
 
 def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
