@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.papers.wang_wang_2019 import deviations
 from flexclear.papers.wang_wang_2019 import models as paper
 from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import Data, drawn
 from flexclear.papers.wang_wang_2019.figures.errors import NOISE
 from flexclear.papers.wang_wang_2019.figures.table10 import ratios
 from flexclear.papers.wang_wang_2019.models import mode_set
@@ -32,7 +32,15 @@ HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
 Outcome = tuple[str, str]  #: verdict, and the numbers that say so
 
 
-def _verdicts(data: Data) -> Table:
+@drawn(
+    "Verdicts (added): what the paper states in section 6, and whether it holds here",
+    *paper.references((paper.IDEAL, *paper.FAR, paper.CSJ, *paper.FIRST), "run", "post"),
+    *paper.references(paper.FAR_CSJ, "post", "ensemble"),
+    "sps4:timing",
+    files=(SECTIONS,),
+)
+def verdicts(data: Data) -> Table:
+    """Each statement with the verdict of its test."""
     said = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
@@ -311,14 +319,3 @@ TESTS: dict[str, Callable[[Data], Outcome]] = {
     "costs of both": partial(_costs, models=(paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)),
     "becomes chaotic": _becomes_chaotic,
 }
-
-TABLE = Figure(
-    "Verdicts (added): what the paper states in section 6, and whether it holds here",
-    (
-        *paper.references((paper.IDEAL, *paper.FAR, paper.CSJ, *paper.FIRST), "run", "post"),
-        *paper.references(paper.FAR_CSJ, "post", "ensemble"),
-        "sps4:timing",
-    ),
-    _verdicts,
-    (SECTIONS,),
-)
