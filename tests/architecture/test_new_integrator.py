@@ -90,7 +90,7 @@ def asked(python: Command, code: str) -> object:
 def test_the_schema_of_scenes_knows_it(python: Command) -> None:
     done = python("-m", "flexclear", "schema")
     assert done.returncode == 0, done.stderr
-    assert "heun" in json.loads(done.stdout)["$defs"]["PlainIntegrator"]["properties"]["integrator"]["enum"]
+    assert "heun" in json.loads(done.stdout)["$defs"]["Solver"]["properties"]["integrator"]["enum"]
 
 
 def test_a_misspelt_name_is_told_its_name(python: Command) -> None:
