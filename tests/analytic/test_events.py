@@ -17,6 +17,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.stages import simulation
+from tests.properties import mechanisms
 
 TREE = Path(__file__).resolve().parents[2]
 G, GROUND = 9.81, {"type": "ground", "frames": {"O": {}}}
@@ -32,7 +33,7 @@ def simulated(event: dict[str, Any], end: float, **parts: Any) -> xr.Dataset:
         "event": event,
         **parts,
     }
-    return dynamics.simulate(scene_of(table), {}, silent)
+    return mechanisms.simulated(scene_of(table))
 
 
 def pendulum(event: dict[str, Any], end: float = 1.0, **more: Any) -> xr.Dataset:

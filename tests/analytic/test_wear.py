@@ -69,7 +69,7 @@ def test_a_turning_pin_wears_by_archards_law() -> None:
     assert post.wear_impulse_outer.values.sum() == pytest.approx(WEIGHT * SECONDS, rel=1e-8)
 
 
-def test_without_wear_nothing_of_it_is_kept() -> None:
+def test_without_wear_nothing_of_it_is_recorded() -> None:
     table = hanging()
     del table["joint"]["hole"]["wear"]
     assert not Scene.model_validate(table).worn()

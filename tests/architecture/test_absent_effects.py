@@ -20,11 +20,11 @@ from flexclear.pipeline.dynamics.compile import functions, reach
 from flexclear.pipeline.dynamics.compile.reach import imported
 from flexclear.pipeline.dynamics.compile.sources import (
     DESCRIBED,
-    abreast,
-    along,
+    batched,
     kernels,
     sources,
     straight,
+    tangent,
 )
 from flexclear.pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS as DECLARED
@@ -252,7 +252,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
 def test_lines_of_generated_files_tell_all_that_they_import(case: str) -> None:
     """As Python's own parser finds it."""
     parts, _ = CASES[case]
-    alone = straight(parts, ((1, 2),)), straight(parts, (), DESCRIBED), abreast(parts, (), 2), along(parts, ())
+    alone = straight(parts, ((1, 2),)), straight(parts, (), DESCRIBED), batched(parts, (), 2), tangent(parts, ())
     for text in (*generated(parts).values(), *alone):
         assert imported(text) == fingerprint.imported(text.encode(), "entry", package=False)[0]
 

@@ -104,7 +104,7 @@ def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
             assert {coordinate.part for coordinate in part.COORDINATES} <= set(joints.CHAIN)
 
 
-#: what a scene says beside its joint -> parts of its code, and a module that must be in the key
+#: what a scene says next to its joint -> parts of its code, and a module that must be in the key
 BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
     "stop": (
         {
@@ -154,7 +154,7 @@ DYNAMICS = "flexclear.pipeline.dynamics"
 OTHERS = (
     *("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice"),
     *("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual"),
-    *("specialise.abreast", "run.evaluation.batched_evaluation", "run.evaluation.members", "model.refill"),
+    *("specialise.batched", "run.evaluation.batched_evaluation", "run.evaluation.members", "model.refill"),
 )
 
 

@@ -77,7 +77,7 @@ def test_a_flexible_body_thrown_starts_with_the_velocity_of_its_centre_of_mass(
 
 
 def test_velocity_and_spin_of_a_hinged_flexible_rod_agree_about_its_hinge() -> None:
-    """A rod on a ball joint is told its centre's velocity, omega x r: it starts without speeds of deformation."""
+    """A rod on a ball joint is given its centre's velocity, omega x r: it starts without speeds of deformation."""
     omega = np.array([0.0, 4.0, 3.0])
     centre = np.cross(omega, [0.5 * LENGTH, 0.0, 0.0])
     changes = {"time.end": 1e-3, "output.interval": 1e-3, "body.rod.angular_velocity": tuple(omega)}
@@ -171,20 +171,20 @@ def test_whole_turns_contradict_nothing_and_bodies_without_a_pose_go_where_the_d
     assert crank.start.R[:2, 0] == pytest.approx([np.cos(1.5), np.sin(1.5)], abs=1e-14)
 
 
-def test_what_assembly_moves_is_told_with_amounts() -> None:
+def test_the_moves_of_an_assembly_are_reported_with_amounts() -> None:
     mechanism = start_of(driven(1.5, 1.45))
-    (told,) = moved(mechanism, [link.start for link in mechanism.links])
+    (reported,) = moved(mechanism, [link.start for link in mechanism.links])
     before, after = angles(1.5), angles(1.45)
     # three digits are printed
     amounts = dict(zip(("crank", "coupler", "rocker"), np.abs(np.subtract(before, after)), strict=True))
     for name, amount in amounts.items():
-        found = re.search(rf"{name} [^;]*turned by (\S+) rad", told)
+        found = re.search(rf"{name} [^;]*turned by (\S+) rad", reported)
         assert found is not None
         assert float(found[1]) == pytest.approx(amount, rel=5e-3)
-    shift = re.search(r"coupler moved by (\S+) m", told)
+    shift = re.search(r"coupler moved by (\S+) m", reported)
     assert shift is not None
     assert float(shift[1]) == pytest.approx(2.0 * CRANK * np.sin(0.025), rel=5e-3)
-    assert "crank moved" not in told
+    assert "crank moved" not in reported
     assert mechanism.start_residual == pytest.approx(0.05, rel=1e-9)
     fitting = start_of(driven(1.5, 1.5))
     assert moved(fitting, [link.start for link in fitting.links]) == []

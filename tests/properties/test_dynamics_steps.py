@@ -43,10 +43,10 @@ def test_evaluations_are_counted_and_capped(solver: dict[str, Any]) -> None:
     made = run(double_pendulum(), solver)
     assert made.counters["evaluations"] > made.counters["steps"] > 0
     assert (made.counters["jacobians"] > 0) is INTEGRATORS[solver["integrator"]].implicit
-    with pytest.raises(SolverError, match="limit of 40 evaluations") as told:
+    with pytest.raises(SolverError, match="limit of 40 evaluations") as caught:
         run(double_pendulum(), {**solver, "evaluations": 40})
     # what used them up, and what to do about it
-    assert all(word in str(told.value) for word in (" steps and ", " rejected ", "more evaluations"))
+    assert all(word in str(caught.value) for word in (" steps and ", " rejected ", "more evaluations"))
 
 
 @every_solver
@@ -98,7 +98,7 @@ def test_an_acceleration_that_jumps_at_a_break_costs_no_order() -> None:
     assert np.log2(gone[1] / gone[2]) > 3.5
 
 
-def test_loops_are_kept_closed_and_the_cost_is_told() -> None:
+def test_loops_stay_closed_and_the_cost_is_reported() -> None:
     coarse = {"integrator": "rk4", "step": 0.005}
     loose, tight = (trajectory(spatial_four_bar(), {**coarse, "rtol": rtol}) for rtol in (1e-2, 1e-10))
     assert loose.counters["projections"] == 0

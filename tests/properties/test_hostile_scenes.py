@@ -112,7 +112,7 @@ def test_fixed_joints_that_do_not_fit_together_are_refused(tmp_path: Path) -> No
     assert "0.4 m and 0 deg apart" in str(error.value)
 
 
-def test_drives_that_cannot_be_where_they_start_are_told_from_joints_that_do_not_fit(tmp_path: Path) -> None:
+def test_drives_out_of_reach_are_distinguished_from_joints_that_do_not_fit(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(
         BASE

@@ -161,7 +161,7 @@ def values(path: Path) -> np.ndarray:
     return np.column_stack([pieces["start"], pieces["coefficients"][:, 0]])
 
 
-def test_a_table_is_read_beside_the_scene_in_its_units(tmp_path: Path) -> None:
+def test_a_table_next_to_the_scene_is_read_in_its_units(tmp_path: Path) -> None:
     found = values(write(tmp_path, ROWS))
     # the tree meets the hinge from its first frame; three points make one cubic, cut at each of them
     assert found[:, 0] == pytest.approx([0.0, 0.4])

@@ -15,7 +15,7 @@ from scipy.special import beta, ellipk
 
 
 def hysteresis(restitution: float) -> float:
-    """Factor a of Lankarani and Nikravesh for a wanted coefficient of restitution (Wang & Wang 2019, eq. 25)."""
+    """Factor a of Lankarani and Nikravesh for a requested coefficient of restitution (Wang & Wang 2019, eq. 25)."""
     return 0.75 * (1.0 - restitution**2)
 
 

@@ -131,7 +131,7 @@ def released() -> Known:
 
 
 def _mass(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrix for reference points beside the centres, and forces: weight and centrifugal terms."""
+    """Mass matrix for reference points next to the centres, and forces: weight and centrifugal terms."""
     M, f = np.zeros((9, 9)), np.zeros(9)
     for k, (mass, inertia, centre) in enumerate(SIZES.bodies.values()):
         c, s = centre * np.cos(q[3 * k + 2]), centre * np.sin(q[3 * k + 2])

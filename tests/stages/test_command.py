@@ -41,9 +41,9 @@ WRONG = {
 
 
 @pytest.mark.parametrize("verb", ["run", "why"])
-@pytest.mark.parametrize("text, told", WRONG.values(), ids=WRONG.keys())
+@pytest.mark.parametrize("text, reported", WRONG.values(), ids=WRONG.keys())
 def test_wrong_scenes_are_refused_before_anything_runs(
-    command: Command, tmp_path: Path, root: Path, verb: str, text: str, told: list[str]
+    command: Command, tmp_path: Path, root: Path, verb: str, text: str, reported: list[str]
 ):
     (tmp_path / "ideal.toml").write_text(SCENE + JOINT)
     path = tmp_path / "scene.toml"
@@ -52,11 +52,11 @@ def test_wrong_scenes_are_refused_before_anything_runs(
     assert said.out == ""
     assert said.err.startswith("flexclear: ")
     assert "Traceback" not in said.err
-    for part in told:
+    for part in reported:
         assert part in said.err
 
 
-def test_all_mistakes_of_all_scenes_are_told_at_once(command: Command, tmp_path: Path):
+def test_all_errors_of_all_scenes_are_reported_at_once(command: Command, tmp_path: Path):
     for name in ("one", "two"):
         (tmp_path / f"{name}.toml").write_text(SCENE.replace('"1 kg"', "-1").replace('"1 s"', '"1 kg"') + JOINT)
     err = command("run", tmp_path / "one.toml", tmp_path / "two.toml", "sps4/nothing", code=2).err
@@ -65,10 +65,10 @@ def test_all_mistakes_of_all_scenes_are_told_at_once(command: Command, tmp_path:
 
 
 @pytest.mark.parametrize(
-    "name, told", [("sps4/csk", "did you mean 'sps4/csj'"), ("nowhere/a.toml", "no such file"), (".", "is neither")]
+    "name, reported", [("sps4/csk", "did you mean 'sps4/csj'"), ("nowhere/a.toml", "no such file"), (".", "is neither")]
 )
-def test_scenes_that_are_not_there(command: Command, name: str, told: str):
-    assert told in command("run", name, code=2).err
+def test_scenes_that_are_not_there(command: Command, name: str, reported: str):
+    assert reported in command("run", name, code=2).err
 
 
 def test_scenes_are_named_by_file_or_by_name(command: Command, root: Path):
@@ -123,7 +123,7 @@ def test_cite_names_methods_that_are_used_and_no_others(command: Command):
 
 
 @pytest.mark.parametrize("scene", ["sps4/csj", "sps4/far_csj_cb"])
-def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(command: Command, scene: str):
+def test_cite_separates_the_methods_of_every_run_from_those_that_only_some_need(command: Command, scene: str):
     """All were in one list, with Lyapunov exponents, LU factors and the registers of the processor."""
     said = command("cite", scene).out
     always, _, rest = said.partition("Methods that are used where a run or a command needs them\n")

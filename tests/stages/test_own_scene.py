@@ -1,4 +1,4 @@
-"""A scene of one's own: what `new` writes is right, what is wrong in it is told at once, editors know its keys."""
+"""A scene of one's own: what `new` writes is right, what is wrong in it is reported at once, editors know its keys."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tests.stages.typical_mistakes import MISTAKES, WARNED
 REPORTED = dict(
     re.findall(r"^## (.+)\n((?:.+\n?)+)", (Path(__file__).parent / "typical_mistakes.txt").read_text(), re.MULTILINE)
 )
-#: sweeps are no scenes, though they lie beside them
+#: sweeps are no scenes, though they lie next to them
 SCENES = [p for p in sorted((Path(__file__).parents[2] / "scenes").rglob("*.toml")) if p.parent.name != "sweeps"]
 #: right in itself, but more than `[limits]` allows
 TOO_MUCH = ("far too many rows",)
@@ -130,7 +130,7 @@ def test_members_that_would_all_be_the_same_run_are_refused_before_anything_runs
     assert not fresh.exists()
 
 
-def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path, command: Command):
+def test_errors_of_several_files_are_reported_together_and_as_json(tmp_path: Path, command: Command):
     scene, rod = write("slider-crank", tmp_path)
     scene.write_text(scene.read_text().replace('"0.8 kg"', "-1").replace('"crank.pin"] ', '"crank.pim"] '))
     rod.write_text(rod.read_text().replace('"7850 kg/m^3"', '"7850 kg"'))
@@ -146,7 +146,7 @@ def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path,
     }
 
 
-def test_a_mistake_in_an_extended_scene_is_told_in_its_file(tmp_path: Path, command: Command):
+def test_an_error_in_an_extended_scene_is_reported_in_its_file(tmp_path: Path, command: Command):
     scene, _ = write("slider-crank", tmp_path)
     scene.write_text(scene.read_text().replace('mass = "0.8 kg"', "mass = -1"))
     (tmp_path / "other.toml").write_text('extends = "slider_crank.toml"\n')
@@ -237,8 +237,8 @@ def test_check_looks_whether_the_joints_of_flexible_bodies_fit(tmp_path: Path, c
 def test_check_looks_at_a_recipe_as_a_recipe(tmp_path: Path, command: Command):
     _, rod = write("slider-crank", tmp_path)
     # 200 mm x 12 mm x 8 mm of 7850 kg/m^3
-    told = f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no error"
-    assert told in command("check", rod).out
+    reported = f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no error"
+    assert reported in command("check", rod).out
     text = rod.read_text()
     rod.write_text(
         text.replace("elements = 10", "element = 10").replace('small_end = { x = "200 mm"', "small_end = { x = 1")
@@ -309,7 +309,7 @@ def test_results_are_printed_as_json_for_scripts(command: Command, fresh: Path):
     }
 
 
-def test_datasets_are_told_as_json_with_units_and_without_what_json_lacks():
+def test_datasets_are_printed_as_json_with_units_and_without_what_json_lacks():
     data = xr.Dataset({"f": ("k", [1.0, np.nan], {"units": "Hz"})}, coords={"k": ["a", "b"]}, attrs={"n": np.int64(3)})
     found = json.loads(as_json({"scene": data}))["scene"]
     assert found["attributes"] == {"n": 3}

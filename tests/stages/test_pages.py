@@ -135,7 +135,7 @@ def test_a_motion_runs_and_every_mode_can_be_chosen(desk: Browser):
     assert desk.logs()[0] == []
 
 
-def test_a_page_is_told_to_who_does_not_see_it(desk: Browser):
+def test_a_page_has_texts_for_screen_readers(desk: Browser):
     assert desk.run("return [...document.images].filter((i) => !i.alt).length") == 0
     assert desk.run("return [...document.querySelectorAll('video, canvas')].filter((e) => !e.ariaLabel).length") == 0
     assert desk.run("return [...document.querySelectorAll('h1, h2')].map((h) => h.tagName).join('')") == "H1" + 5 * "H2"

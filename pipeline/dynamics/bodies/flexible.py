@@ -12,7 +12,6 @@ Where bending shortens the body, r also moves along x by a quadratic form of q (
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -29,6 +28,7 @@ from flexclear.pipeline.dynamics.bodies.modal_terms import (
     tensor,
 )
 from flexclear.pipeline.dynamics.bodies.ports import make_ports
+from flexclear.pipeline.dynamics.bodies.rigid import FlexibleBodies
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
@@ -60,29 +60,6 @@ def of_each(body: Callable) -> Callable:
             body(d, k)
 
     return bodies
-
-
-@dataclass(frozen=True)
-class FlexibleBodies:
-    """Kernels of all flexible bodies.
-
-    deform(d): X and U in the interface basis, before all else.  site(d, s), inboard(d, i, ...): of frames on them (see
-    `ports`).  inertia(d): spatial inertias, wrenches and modal forces, modal accelerations taken as zero.
-    mass_matrix(d): modal blocks, right after it.  modal_inertia(d): what these add to the wrenches.  port_load(d, i): a
-    link on a flexible parent loads its moving shapes, too.  modal_forces(d): generalised forces of the modes.
-    modal_rates(d, dy): their accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
-    """
-
-    deform: Callable
-    site: Callable
-    inboard: Callable
-    inertia: Callable
-    mass_matrix: Callable
-    modal_inertia: Callable
-    port_load: Callable
-    modal_forces: Callable
-    modal_rates: Callable
-    energies: Callable
 
 
 def flexible_bodies(shortening: Any = None) -> Callable[[Any], FlexibleBodies]:

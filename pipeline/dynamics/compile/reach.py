@@ -76,7 +76,7 @@ def _needed(scene: Scene) -> int:
 def _composed(parts: Parts, scheme: Scheme, alone: bool) -> frozenset[str]:
     """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
     texts = [*sources.sources(parts, scheme).values(), *sources.kernels(parts).values(), sources.straight(parts, ())]
-    texts += [] if alone else [sources.abreast(parts, (), lanes=2), sources.along(parts, ())]
+    texts += [] if alone else [sources.batched(parts, (), lanes=2), sources.tangent(parts, ())]
     return frozenset().union(*map(_reached, texts))
 
 

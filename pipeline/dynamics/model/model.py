@@ -98,14 +98,10 @@ def filled(
     like: a model with the same links, joints, frames and flexible bodies, whose wiring is this one's, too.
     """
     normals = contacting.resolve(mechanism)
-    site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
+    closing: list[Closure | Coupling] = [*mechanism.closures, *couplings(mechanism)]
+    looped, ordered = wiring.closures(numbering, closing) if like is None else ({}, like.closures)
     touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
-    coupled, gauges = couplings(mechanism), Gauges()
-    if like is None:
-        looped, order = wiring.closures(numbering, site_pairs, coupled)
-        ordered = tuple([*mechanism.closures, *coupled][k] for k in order)
-    else:
-        looped, ordered = {}, like.closures
+    gauges = Gauges()
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
@@ -301,8 +297,7 @@ def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling
     L, weights = mechanism.length, list[float]()
     rounding = LENGTH_ROUNDING * L / mechanism.scene.solver.rtol
     for one in closures:
-        sites = (one.a, one.b) if isinstance(one, Closure) else (one.first.a, one.first.b, one.second.a, one.second.b)
-        part = mechanism.components.of(*(site.link for site in sites))
+        part = mechanism.components.of(*(site.link for both in one.ends for site in both))
         weights.append(max(L / max(mechanism.components.lengths[part], rounding), 1.0))
     return weights
 

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.assembly import assembled, settled
-from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
+from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -87,17 +87,15 @@ def _open(mechanism: Mechanism) -> Mechanism:
 def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> list[Gap]:
     result = []
     for joint in joints:
-        A, B = joint.frames(poses)
-        parts = [demands(joint.edge.kind, A, B), prescribed(joint.edge.kind, A, B, joint.values)]
         away, turned = np.zeros(3), 0.0
-        for values, wrenches in parts:
-            for value, wrench in zip(values, wrenches, strict=True):
+        for demanded in (joint.demands(poses), joint.prescribed(poses)):
+            for value, wrench in zip(*demanded, strict=True):
                 if np.any(wrench[3:]):
                     away = away + value * wrench[3:]
                 else:
                     turned = max(turned, float(abs(value)))
         if np.linalg.norm(away) > CLOSED_POSE * mechanism.length or turned > STRAIGHT:
-            end = B.p + mechanism.origin
+            end = joint.frames(poses)[1].p + mechanism.origin
             result.append(Gap(joint.name, end - away, end, turned))
     return result
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BEARINGS, SLIDER
 from flexclear.pipeline.dynamics.model.components import Floors, Group
 from flexclear.pipeline.dynamics.model.contacts import friction_law
 from flexclear.pipeline.dynamics.model.filling import Filling
 from flexclear.pipeline.dynamics.model.guards import Guard, speeds
-from flexclear.pipeline.dynamics.model.mechanism import Closure, Mechanism
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
@@ -62,18 +61,16 @@ def fill(filling: Filling) -> dict[str, Any]:
     Articulated inertias find what a joint transmits without terms of reactions.
     """
     numbering, closures, articulated = filling.numbering, filling.closures, filling.parts.articulated
-    mechanism, ends, laws = (
-        numbering.mechanism,
-        closure_ends(numbering, closures),
-        filling.parts.kinds("joint_friction"),
-    )
+    mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
+    pairs = [(c, part, *both) for c, one in enumerate(closures) for part, both in enumerate(one.ends)]
+    ends = [(c, part, numbering.site(a), numbering.site(b)) for c, part, a, b in pairs]
     bristle = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
     tables: dict[str, list[Any]] = defaultdict(list)
     for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
         sites = numbering.site(a), numbering.site(b)
         link, reverse = _link(mechanism, name)
-        closure = next((c for c, one in enumerate(closures) if isinstance(one, Closure) and one.name == name), -1)
+        closure = next((c for c, one in enumerate(closures) if one.name == name), -1)
         entries = uncommon(closure_route(numbering, *sites))
         reaction = _terms(numbering, link, ends, articulated) if link >= 0 else _Reaction([], [], [])
         ranges = _add(tables, list(entries), reaction, len(BEARINGS[joint.type]))
@@ -129,7 +126,10 @@ def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
 
 
 def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool) -> _Reaction:
-    """What the reaction of a link's joint consists of; ends: of all closures."""
+    """What the reaction of a link's joint consists of.
+
+    ends: (closure, part, first site, second site) of all closures; a coupling has two parts.
+    """
     mechanism = numbering.mechanism
     beyond = {link}
     for i in range(link + 1, len(mechanism.links)):
@@ -148,12 +148,3 @@ def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]
         if sign:
             loops.append((c, sign, part))
     return _Reaction(momenta, columns, loops)
-
-
-def closure_ends(numbering: Numbering, closures: Sequence[Closure | Coupling]) -> list[tuple[int, int, int, int]]:
-    """(closure, part, first site, second site) of all closures; a coupling has two parts."""
-    ends = []
-    for c, closure in enumerate(closures):
-        sides = [(side.a, side.b) for side, _ in closure.parts] if isinstance(closure, Coupling) else [closure[1:]]
-        ends += [(c, part, numbering.site(a), numbering.site(b)) for part, (a, b) in enumerate(sides)]
-    return ends
