@@ -37,7 +37,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     study.attrs["complete"] = int(params["complete"])
     asis = next(runs[p.key] for p in points if p.key == "as it is")
     study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
-    ensembles = _ensembles(inputs)
+    ensembles = {
+        name.removeprefix("ensemble:"): data
+        for name, data in inputs.items()
+        if name.startswith("ensemble:") and "refused" not in data.attrs
+    }
     # the last one is that at the tightest tolerance
     tightest = next(reversed(ensembles.values()), None)
     split = {q.name: causes_of(q, points, runs, LOCATED, tightest) for q in chosen}
@@ -59,12 +63,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         result |= files("statistics", statistics.table(ensembles, f"Beyond the horizon: {title}"))
         result |= statistics.make("statistics", ensembles, f"Beyond the horizon: {title}")
     return result
-
-
-def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Ensembles that could be made, by what was varied."""
-    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
-    return {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
 
 
 def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> tuple[Any, ...]:

@@ -248,7 +248,8 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
         best = min(choices(one), key=lambda c: c.error, default=NOTHING)
-        cells = (_cell(cheapest(one, target), _absent(study)) for target in TARGETS)
+        best_for = [cheapest(one, target) for target in TARGETS]
+        cells = (f"{c.name} ({c.seconds:.2g} s)" if c is not None else _absent(study) for c in best_for)
         rows.append((str(name), *cells, f"{best.error:.1e}"))
     heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
     return Table(title, heads, tuple(rows), ("In brackets: processor time of the integration of one run.",))
@@ -257,10 +258,6 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
 def _absent(study: xr.Dataset) -> str:
     """What is said of an accuracy that no run of a study has."""
     return "cannot be had" if study.attrs.get("complete", 1) else "not reached yet"
-
-
-def _cell(choice: Choice | None, absent: str) -> str:
-    return absent if choice is None else f"{choice.name} ({choice.seconds:.2g} s)"
 
 
 @dataclass(frozen=True, slots=True)
