@@ -312,7 +312,8 @@ def _joined(
     assert edge is not None
     assert far is not None
     path = edge.kind == PATH
-    inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, str(branch.parent_frame))
+    near = edge.frame_b if branch.reverse else edge.frame_a
+    inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, near)
     joints = chain(edge, branch.reverse, inboard.frame is not None, body.group.flexible)
     here = links[inboard.link].start.of(inboard.place)
     axes, between = np.eye(3), list[Link]()
