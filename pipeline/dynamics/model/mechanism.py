@@ -162,7 +162,7 @@ class Mechanism:
 
     origin: point of the world that the kernels use as theirs, close to the mechanism.  length: size of the mechanism
     [m].
-    components: its parts that fraction no force.
+    components: its parts that share no force.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     choice: which of several ways it was assembled in, and frames moved for that, in words; empty without these.
