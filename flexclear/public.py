@@ -114,9 +114,9 @@ def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models
     take [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets.
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import cost as cost_command
+    from flexclear.commands import answers
 
-    return cost_command.dataset(_loaded(scene), budget, models)
+    return answers.dataset("cost", _loaded(scene), budget, models=models)
 
 
 def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:

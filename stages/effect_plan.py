@@ -124,7 +124,8 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
         mine = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
         return simulation.rebuild(simulation.params(scene), mine)
 
-    own = {name: data for name, data in rigid.items() if _meshed(params["simulate"], name)}
+    bodies = params["simulate"]["scene"]["body"]  # those that are rigid in the scene itself
+    own = {name: data for name, data in rigid.items() if bodies[name.removeprefix(simulation.RIGID)]["type"] == "rigid"}
     scene = simulation.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
     meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
     return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress)
@@ -139,8 +140,3 @@ def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
             if data.sizes["mode"] < inputs[f"bundle/{body}"].sizes["mode"]:
                 fewer.setdefault(int(level), {})[body] = data
     return [fewer[level] for level in sorted(fewer)]
-
-
-def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
-    """Whether a body that a recipe describes is rigid in the scene itself."""
-    return bool(simulate["scene"]["body"][name.removeprefix(simulation.RIGID)]["type"] == "rigid")

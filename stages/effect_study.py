@@ -87,6 +87,7 @@ def _owners(scene: Scene) -> dict[str, list[str]]:
 def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of
     `watched_quantities`."""
+    from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.answers import effect_sizes
     from flexclear.pipeline.post.plotting.table import files
@@ -94,7 +95,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     there = [Effect(*three) for three in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
     points = {
-        frozenset(gone): _point(inputs[f"variant{k}"], params["owners"][k], chosen)
+        frozenset(gone): watched(inputs[f"variant{k}"], params["owners"][k], chosen)
         for k, gone in enumerate(params["variants"])
     }
     progress(None, "comparing")
@@ -105,6 +106,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
 def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``matters.nc``, its table and its chart.  params: see `ranking`.  inputs: ``<effect>:<members>``."""
+    from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.answers import effect_sizes, matters
     from flexclear.pipeline.post.plotting.table import files
@@ -112,7 +114,7 @@ def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     chosen = [Quantity.read(data) for data in params["quantities"]]
 
     def point(name: str, members: int) -> Point:
-        return _point(inputs[f"{name}:{members}"], params["owners"][name], chosen)
+        return watched(inputs[f"{name}:{members}"], params["owners"][name], chosen)
 
     pairs = {name: matters.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
     results = matters.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
@@ -120,11 +122,3 @@ def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
     shown = listed.assign_coords(effect=listed["words"].values)
     return result | effect_sizes.chart("matters", shown, f"What each effect does: {params['title']}")
-
-
-def _point(stored: xr.Dataset, owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> Point:
-    """The point in an artifact of `watched_quantities`."""
-    from flexclear.pipeline.core.artifacts.effect_size import recorded
-    from flexclear.pipeline.core.artifacts.points import unpacked
-
-    return unpacked(stored, recorded(owners, chosen))["point"]

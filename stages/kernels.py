@@ -30,7 +30,6 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
         params={"simulate": simulation.params(scene)},
         inputs=bundles,
         modules=simulation.modules(scene),
-        folder="",
     )
 
 

@@ -46,7 +46,6 @@ def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
         },
         inputs=graph.bodies(),
         modules=simulation.modules(variant),
-        folder="",
     )
 
 
@@ -82,11 +81,3 @@ def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quan
     from flexclear.pipeline.dynamics.record.point import Runner
 
     return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members)).run(scene)
-
-
-def point(stored: xr.Dataset, scene: Scene, chosen: Sequence[Quantity]) -> Point:
-    """The point in an artifact of `run`."""
-    from flexclear.pipeline.core.artifacts.effect_size import recorded
-    from flexclear.pipeline.core.artifacts.points import unpacked
-
-    return unpacked(stored, recorded(scene.owners(), chosen))["point"]

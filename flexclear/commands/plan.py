@@ -263,7 +263,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
     def compared(members: int) -> list[effect_size.Agreement]:
         both = full, planned.planned
         stored = workplace.datasets(*(watched_quantities.task(scene, chosen, members) for scene in both))
-        one, two = (watched_quantities.point(d, scene, chosen) for d, scene in zip(stored, both, strict=True))
+        one, two = (effect_size.watched(d, scene.owners(), chosen) for d, scene in zip(stored, both, strict=True))
         for point, what in ((one, "full"), (two, "planned")):
             if point.refused:
                 raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")

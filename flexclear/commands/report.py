@@ -15,6 +15,7 @@ from flexclear.commands import compare
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import graphs, in_file, pictures
 from flexclear.pipeline.core.artifacts.disk import publish
+from flexclear.pipeline.core.scene.output import rows
 from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.scene.variants import loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
@@ -44,19 +45,16 @@ if TYPE_CHECKING:
 SHOWN_MOTION = ("motion mp4", "motion html", "modes html")
 #: general figures, in this order: caption, and what a reader who does not see them reads
 FIGURES = {
-    "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
-    "reactions.png": (
-        "Reactions and drives",
-        "Magnitude of the force in each joint, and what drives supply, over time",
-    ),
-    "contacts.png": (
-        "Joints with clearance",
-        "Path of the ball or pin in its socket, the gap, and the normal force over time",
-    ),
-    "wear.png": ("Wear of contacts", "Load times sliding way over time, and how deep the surfaces wear over the angle"),
-    "joint_friction.png": ("Friction of ideal joints", "Normal force in the bearings and energy lost, over time"),
-    "watched.png": ("Watched quantities", "What the scene watches, over time"),
-    "energy.png": ("Energy", "Energies over time, and the error of their balance"),
+    name: (caption, alt)
+    for name, caption, alt in rows("""
+motion.png | Motion | Displacement, velocity and rotation of the bodies over time
+reactions.png | Reactions and drives | Magnitude of the force in each joint, and what drives supply, over time
+contacts.png | Joints with clearance | Path of the ball or pin in its socket, the gap, and the normal force over time
+wear.png | Wear of contacts | Load times sliding way over time, and how deep the surfaces wear over the angle
+joint_friction.png | Friction of ideal joints | Normal force in the bearings and energy lost, over time
+watched.png | Watched quantities | What the scene watches, over time
+energy.png | Energy | Energies over time, and the error of their balance
+""")
 }
 #: of a run's attributes, those that say how it was made, and what they are called
 COST = {

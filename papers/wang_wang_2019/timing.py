@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.stages.simulation import bundles, rebuild
 
@@ -135,8 +136,6 @@ def _share(scene: Scene, fraction: float) -> float:
 
 
 def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:
-    from flexclear.pipeline.core.scene.load import edited
-
     return edited(scene, {"accuracy": None, "ensemble": None, **edit})
 
 

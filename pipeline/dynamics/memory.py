@@ -138,11 +138,16 @@ def row_type(rows: Any) -> np.dtype[Any]:
 
 @dataclass(frozen=True)
 class Room:
-    """What an integration method needs of the work space, in rows of the state's length and in floats."""
+    """What an integration method needs of the work space: rows of the state's length, floats, vectors and matrices of
+    that length, and of all oscillators of the modes pairs and quadratures."""
 
     slopes: int
     dense: int
-    memory: int
+    floats: int = 0
+    vectors: int = 0
+    matrices: int = 0
+    oscillations: int = 0
+    quadratures: int = 0
 
 
 # Header of h: sizes --------------------------------------------------------------------------------------------------
@@ -295,7 +300,7 @@ INDEPENDENCE, COLLOCATION = _stretches(
 )
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
-LAST_PIVOT, WANTED_PIVOT = _floats(PIVOT, "last_pivot wanted_pivot")
+LAST_PIVOT, LEAST_PIVOT = _floats(PIVOT, "last_pivot least_pivot")
 #: what a contact does now; bent: what the bristles store
 TOUCH = work(
     "gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3", "n_contacts"
@@ -309,10 +314,21 @@ LAW = work("value rate second_rate", "n_laws")
 LOAD = work("force:3 moment:3 value rate stored power loss", "n_loads")
 #: of loads that bend: speeds along their coordinates, arguments of max, min and abs
 LOAD_BENDS = work("now", "n_load_bends")
-INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _stretches(
+INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE = _stretches(
     "internal:n_internal drive_force:n_drives ledger_rate:n_ledger position_rate:nq+n_drives y:ny y_new:ny y_stage:ny "
-    "slopes:slopes*ny dense:dense*ny memory:memory"
+    "slopes:slopes*ny dense:dense*ny"
 )
+#: what a method knows from step to step (`Room`), up to QUADRATURES
+MEMORY, VECTORS, MATRICES = _stretches("memory:floats vectors:vectors*ny matrices:matrices*ny*ny")
+#: of `integrate.modal_basis`, one oscillator per speed at most: omega^2 [1/s^2], damping [1/s], root of the stiffness
+#: of a mode's spring; the rows of Q^T, K^1/2 P K^1/2 and C, the columns of B, what the springs accelerate
+OSCILLATORS = work("square damping root", "?oscillations*nv")
+SQUARES, OBLONG = "?oscillations*nv*nv", "?oscillations*nv*ny"
+AXES, COUPLING, READING = _stretches(f"axes:{SQUARES} coupling:{SQUARES} reading:{SQUARES}")
+LIFTING, RESPONSE = _stretches(f"lifting:{OBLONG} response:{OBLONG}")
+#: (z, z') of each oscillator; its phi functions in each quadrature, and what four sources add to (z, z') by them,
+#: weights of 1 and Lambda each (`integrate.exponential`)
+OSCILLATIONS, QUADRATURES = work("z rate", "oscillations*nv"), work("phi:10 share:8", "quadratures*nv")
 MAGNITUDE, CORRECTION, LATCHED = _stretches("magnitude:n_groups correction:nv latched:n_contacts")
 #: what the stepper watches of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force;
 #: slip_rate: rate of the sliding speed, 0 where it is not known; event_row: of its last closing; mode0, latched0: mode

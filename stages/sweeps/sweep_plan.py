@@ -144,7 +144,7 @@ class Plan:
 
     @property
     def statistics(self) -> list[str]:
-        """Of `points.SHARES`, those that are asked for."""
+        """Of `points.STATISTICS`, those that are asked for."""
         asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
         return [statistic for statistic, requested in asked.items() if requested]
 
@@ -294,7 +294,6 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
                 "members": requested.sweep.members or 0,
                 "error": requested.sweep.error,
             },
-            folder="",
             modules=modules,
         )
         given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)
@@ -309,7 +308,8 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
         family = families[text].key
         # what decides the bodies is in the family's scene, whose bodies are numbers by now
         rest = {name: value for name, value in point.items() if name not in own}
-        jobs.append(Job(_point_key(family, point), family, rest))
+        content = json.dumps([family, dict(sorted(point.items()))], default=str)
+        jobs.append(Job(hashlib.sha256(content.encode()).hexdigest()[:32], family, rest))
     return replace(requested, families=tuple(families.values()), jobs=tuple(jobs))
 
 
@@ -345,8 +345,3 @@ def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: 
         if where not in own:
             node[int(keys[-1]) if isinstance(node, list) else keys[-1]] = VARIED
     return table
-
-
-def _point_key(family: str, point: Mapping[str, Any]) -> str:
-    text = json.dumps([family, dict(sorted(point.items()))], default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]

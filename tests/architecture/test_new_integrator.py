@@ -16,6 +16,7 @@ MODULE = '''"""Heun's method of order 2, with Euler's as its error estimate."""
 import numpy as np
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
@@ -41,9 +42,8 @@ def make_kernels(evaluate, retract):
 
 METHOD = Method(
     traits=INTEGRATORS["heun"],
-    slopes=4,
+    room=m.Room(4, hermite.ROWS),
     last=2,
-    dense=hermite.ROWS,
     make_kernels=make_kernels,
     staged=True,
     interpolate=hermite.interpolate,
@@ -105,7 +105,7 @@ for solver in ({"rtol": 1e-6}, {"step": 0.004}):
 designs = [(d.group, d.scene.solver) for d in cost_design.wide(own, ("heun",))]
 closure = Sources(Path.cwd()).closure
 print(json.dumps({
-    "schema": scene_schema()["$defs"]["PlainIntegrator"]["properties"]["integrator"]["enum"],
+    "schema": scene_schema()["$defs"]["Solver"]["properties"]["integrator"]["enum"],
     "ends": ends,
     "designs": [[group, solver.rtol, solver.step] for group, solver in designs if solver.integrator == "heun"],
     "looks": LOOKS,

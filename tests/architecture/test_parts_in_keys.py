@@ -29,13 +29,12 @@ def families() -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("package, name", families())
-def test_what_a_family_lists_is_there_and_gives_its_module(package: str, name: str) -> None:
+def test_what_a_family_lists_is_there(package: str, name: str) -> None:
     """Lists that follow from what scenes declare name modules and objects that exist."""
     assert lookup(package, name, where="here") is not None
-    assert effects.Named(package, name, "here").module == module_of(package, name)
 
 
-#: where a part of a family stands among the parts of the code
+#: where a part of a family is among the parts of the code
 CODE = {
     effects.JOINTS: lambda name: Parts((name,), closures=True),
     effects.SURFACES: lambda name: Parts(("free",), surfaces=(name,), forms=("elastic",)),
@@ -154,7 +153,7 @@ DYNAMICS = "flexclear.pipeline.dynamics"
 OTHERS = (
     *("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice"),
     *("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual"),
-    *("specialise.abreast", "run.evaluation.batched_evaluation", "run.evaluation.members", "model.refill"),
+    *("specialise.batched", "run.evaluation.batched_evaluation", "run.evaluation.members", "model.refill"),
 )
 
 

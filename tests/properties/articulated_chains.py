@@ -206,7 +206,7 @@ def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any
     speeds, turns: sizes of random changes of the speeds, and of the positions of a tree of hinges [rad].  number: type
     of the floats.
     """
-    space, f, random = model.arrays.work_space(lambda _: m.Room(2, 0, 0)), model.arrays.f, np.random.default_rng(1)
+    space, f, random = model.arrays.work_space(m.Room(2, 0)), model.arrays.f, np.random.default_rng(1)
     h, n, start = space.h, space.n, initial.start_state(model)
     y, dy = int(h[m.Y]), int(h[m.SLOPES])
     start[model.speeds] += speeds * random.normal(size=model.nv)
@@ -226,7 +226,7 @@ def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any
     keep_independent(model, h, y, dy, w.copy(), n.copy(), rates)
     rates(h.tolist(), f.astype(number), w, n, y, dy)
     drives = w[h[m.DRIVE_FORCE] :][: model.arrays.size(m.N_DRIVES)]
-    lengths = _work_lengths(h, m.Room(2, 0, 0), model.arrays.columns)
+    lengths = _work_lengths(h, m.Room(2, 0), model.arrays.columns)
     return Evaluated(model, space._replace(w=w), w[dy : dy + model.ny], drives, int(n[m.EVALUATION]), lengths)
 
 

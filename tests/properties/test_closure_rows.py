@@ -41,7 +41,7 @@ def dense_factor(envelope: np.ndarray, entries: np.ndarray) -> np.ndarray:
 def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     """L^-1 J^T, the factor of J M^-1 J^T, and accelerations that keep the loops closed; made without a compiler."""
     model = tabulate(build(scene, {}))
-    space = model.arrays.work_space(lambda _: m.Room(2, 0, 0))
+    space = model.arrays.work_space(m.Room(2, 0))
     h, w, y, dy = space.h, space.w, int(space.h[m.Y]), int(space.h[m.SLOPES])
     state = initial.start_state(model)
     state[model.speeds] += np.random.default_rng(4).normal(size=model.nv)

@@ -312,3 +312,11 @@ def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size():
     assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
     assert set(work_precision.make("w", found, "t", (), [curve])) == {"w.png", "w.svg"}
     assert answer.price_list(found, "t", ("said",)).notes[-1] == "said"
+
+
+def test_runs_left_undone_are_named_with_their_reason():
+    study = xr.Dataset(attrs={"undone": "rk4, step 1e-06 s", "given_up": "radau, rtol 1e-09"})
+    budget, method = answer.undone(study)
+    assert budget == "Not run within the budget: rk4, step 1e-06 s."
+    assert "used up its evaluations" in method
+    assert method.endswith("radau, rtol 1e-09.")

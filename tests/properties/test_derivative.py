@@ -38,7 +38,7 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarr
     """Changes of rates and contacts along a random direction: by a complex step of the tape, by its tangent, and by
     kernels that run on numbers with changes."""
     model = tabulate(build(scene, reduced))
-    space, random = model.arrays.work_space(lambda _: m.Room(4, 0, 0)), np.random.default_rng(2)
+    space, random = model.arrays.work_space(m.Room(4, 0)), np.random.default_rng(2)
     h, y = space.h, int(space.h[m.Y])
     dy, vy, vdy = (int(h[m.SLOPES]) + k * model.ny for k in range(3))
     f, w, n, kernel, begin = model.arrays.f, space.w, space.n, rates_kernel(model), initial.start_state(model)

@@ -76,7 +76,7 @@ class Touch:
     def __init__(self, laws: Laws, seed: int, depth: float, slip: float, together: bool = False) -> None:
         random = np.random.default_rng(seed)
         packed = tables_of(laws).arrays
-        h, w, n, _ = packed.work_space(lambda _: m.Room(1, 1, 0))
+        h, w, n, _ = packed.work_space(m.Room(1, 1))
         n[n[m.MODE]] = 1
         turned = rotation_vector_to_matrix(random.normal(size=3))
         self.axis = random.normal(size=3)

@@ -95,7 +95,7 @@ def evaluated(model: Model) -> np.ndarray:
     """Rates of the state some way off the start, by the kernels without a compiler; contacts closed."""
     scope: dict[str, Any] = {}
     exec(sources.straight(model.parts, ()).partition("WIRING")[0], scope)
-    space, random = model.arrays.work_space(lambda _: m.Room(1, 0, 0)), np.random.default_rng(1)
+    space, random = model.arrays.work_space(m.Room(1, 0)), np.random.default_rng(1)
     h, w, n = space.h, space.w, space.n
     y, dy, start = int(h[m.Y]), int(h[m.SLOPES]), initial.start_state(model)
     start[model.speeds] += 0.1 * random.normal(size=model.nv)

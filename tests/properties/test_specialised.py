@@ -78,7 +78,7 @@ def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     model = tabulate(build(load_scene(TREE / "scenes/checks/pendulum.toml"), {}))
     monkeypatch.setattr(tracing, "LONGEST", 10)
     with pytest.raises(UnsuitedError, match="too long"):
-        program(rates_kernel(model), wiring(model.arrays, model.arrays.work_space(lambda _: m.Room(2, 0, 0)).h))
+        program(rates_kernel(model), wiring(model.arrays, model.arrays.work_space(m.Room(2, 0)).h))
 
 
 def description_kernel(model: Model) -> Any:
@@ -119,7 +119,7 @@ def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPa
     """
     monkeypatch.setattr(tracing, "LONGEST", 200_000)
     model = tabulate(build(load_scene(path), {}))
-    space, f = model.arrays.work_space(lambda _: m.Room(2, 0, 0)), model.arrays.f
+    space, f = model.arrays.work_space(m.Room(2, 0)), model.arrays.f
     h, y, dy = space.h, int(space.h[m.Y]), int(space.h[m.SLOPES])
     kernel, described, start = rates_kernel(model), description_kernel(model), initial.start_state(model)
     space.w[y : y + model.ny] = start

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
@@ -28,9 +29,8 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 METHOD = Method(
     traits=INTEGRATORS["kutta3"],
-    slopes=STAGES + 2,
+    room=m.Room(STAGES + 2, hermite.ROWS),
     last=STAGES,
-    dense=hermite.ROWS,
     make_kernels=make_kernels,
     staged=True,
     interpolate=hermite.interpolate,

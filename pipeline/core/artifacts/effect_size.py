@@ -18,11 +18,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import xarray as xr
 from scipy.special import stdtrit
 
-from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.artifacts.points import Point, unpacked
 from flexclear.pipeline.core.numerics.rotations import rotation_between
-from flexclear.pipeline.core.scene.quantity import Quantity, Recorded
+from flexclear.pipeline.core.scene.quantity import CONTACT_REDUCTIONS, Quantity, Recorded
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3
@@ -30,14 +31,11 @@ RARE = 1e-3
 LIKELY = 0.05
 #: fraction of a series over which the spread of members is pooled
 POOLED = 0.05
-#: what is recorded of a quantity to compare it by: the series, and of what impacts make large its extreme, which is
-#: read where it is and not at an output
-OF_KIND = {
-    "peak_force": ("largest",),
-    "impulse": ("final",),
-    "impact_times": ("count", "first", "last"),
-}
+#: what is recorded of a quantity to compare it by, where contacts have it not: the series, and of what impacts make
+#: large its extreme, which is read where it is and not at an output
 OTHERS = ("series", "largest")
+#: a difference is real that is at least so many times what of it may be chance, or error of the runs
+REAL = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +52,11 @@ class Influence:
     def most(self) -> float:
         """The largest difference that is not excluded."""
         return self.difference + self.uncertainty
+
+    @property
+    def real(self) -> bool:
+        """Whether there is a difference, whatever its size."""
+        return self.difference >= REAL * self.uncertainty
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +111,13 @@ def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) 
     return [Recorded(q, r) for q in chosen if q.is_there(owners) for r in _reductions(q)]
 
 
+def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
+    """The point in an artifact of `stages.watched_quantities`."""
+    return unpacked(stored, recorded(owners, chosen))["point"]
+
+
 def _reductions(quantity: Quantity) -> tuple[str, ...]:
-    return ("series",) if quantity.of_place else OF_KIND.get(quantity.kind, OTHERS)
+    return ("series",) if quantity.of_place else tuple(CONTACT_REDUCTIONS.get(quantity.kind, OTHERS))
 
 
 def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
@@ -272,7 +280,7 @@ def size(point: Point, quantity: Quantity) -> float:
     if quantity.kind == "impact_times":
         return float(np.nan_to_num(point.values[f"{name}.last"]))
     if quantity.kind in ("peak_force", "impulse"):
-        return float(np.abs(point.values[f"{name}.{OF_KIND[quantity.kind][0]}"]))
+        return float(np.abs(point.values[f"{name}.{_reductions(quantity)[0]}"]))
     values = _rows(point.values[f"{name}.series"])
     if quantity.kind == "orientation":
         return float(rotation_between(values[:1], values).max())

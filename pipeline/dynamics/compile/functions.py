@@ -30,7 +30,7 @@ from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import reach, sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
-from flexclear.pipeline.dynamics.compile.files import bring, compiled, interpreted, loaded
+from flexclear.pipeline.dynamics.compile.files import SIGNATURES, bring, compiled, interpreted, loaded
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
 from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
 from flexclear.pipeline.dynamics.effects import DEEP, METHOD, Parts, Scheme
@@ -67,14 +67,13 @@ ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESC
 #: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
-_PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_TABLES, _TABLE_AT = (_PLACE,) * 4, (_PLACE, _INTEGER, _INTEGER)
-#: C types of what Python calls, as `calls.SIGNATURES` has them
-PROTOTYPES = {
-    "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, _PLACE, _INTEGER),
-    "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
-}
-LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _PLACE)
+_TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
+
+
+@cache
+def prototype(name: str) -> Any:
+    """The C function type of a compiled function, which Python calls."""
+    return ctypes.CFUNCTYPE(ctypes.c_int64, *(_TYPES[kind] for kind in SIGNATURES[name] if kind != " "))
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
@@ -103,7 +102,7 @@ class Entry:
 
     def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
         """Slope of the state in Y at time t, into the first row of SLOPES."""
-        self._advance(_tables(h, f, w, n), t, repeat, _FLOATS, _TABLE, _TABLE)
+        self._function("advance")(*_tables(h, f, w, n), t, repeat, *_record(_FLOATS, _TABLE, _TABLE))
 
     def advance(
         self,
@@ -121,21 +120,9 @@ class Entry:
         by: what is to call the compiled function, given its address, and a word for each of its arguments but t and
         repeat.
         """
-        self._advance(_tables(h, f, w, n), 0, -1, outputs, rows, events, by)
-
-    def _advance(
-        self,
-        tables: tuple,
-        t: float,
-        repeat: int,
-        outputs: np.ndarray,
-        rows: np.ndarray,
-        events: np.ndarray,
-        by: Callable[[int, list[int]], None] | None = None,
-    ) -> None:
-        record = [place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape]
+        tables, record = _tables(h, f, w, n), _record(outputs, rows, events)
         if by is None:
-            self._function("advance")(*tables, t, repeat, *record)
+            self._function("advance")(*tables, 0, -1, *record)
         else:
             by(self.addresses["advance"], [*tables, *record])
 
@@ -166,12 +153,16 @@ class Entry:
         function = self._known.get(name)
         if function is None:
             address = self.late.address() if name == LATE else self.addresses[name]
-            function = self._known[name] = interpreted[address] if INTERPRETED else PROTOTYPES[name](address)
+            function = self._known[name] = interpreted[address] if INTERPRETED else prototype(name)(address)
         return function
 
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
     return place(h, np.int64), place(f), place(w), place(n, np.int64)
+
+
+def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple:
+    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
 
 
 class Late:

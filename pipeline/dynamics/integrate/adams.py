@@ -12,26 +12,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite, rk4
-from flexclear.pipeline.dynamics.integrate.method import Method, make_attempt, slope
+from flexclear.pipeline.dynamics.integrate.method import Method, make_attempt, slope, vector
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
 from flexclear.pipeline.dynamics.kernels import kernel
 
 LAST = rk4.STAGES
-# memory: number of slopes kept, their distance, then the slopes themselves, the latest first
-COUNT, DISTANCE, KEPT = range(3)
+# floats: number of slopes kept, as vectors, the latest first, and their distance
+COUNT, DISTANCE, FLOATS = range(3)
 MOST_STEPS_BACK = 3
 #: steps whose lengths differ by less than this fraction are alike: rounding of times
 EQUAL_STEPS = 1e-8
-
-
-def memory(h: np.ndarray) -> int:
-    """Floats kept between steps."""
-    return KEPT + MOST_STEPS_BACK * int(h[m.NY])
 
 
 @kernel
@@ -50,13 +43,13 @@ def alike(d, step):
 @kernel
 def keep(d, step):
     """Remember the slope where an accepted step started."""
-    size = d.ny
     if d.memory[COUNT] == 0.0 or not alike(d, step):
         d.memory[COUNT], d.memory[DISTANCE] = 0.0, step
-    for c in range(size):
-        d.memory[KEPT + 2 * size + c] = d.memory[KEPT + size + c]
-        d.memory[KEPT + size + c] = d.memory[KEPT + c]
-        d.memory[KEPT + c] = d.w[slope(d, 0) + c]
+    one, two, three = vector(d, 0), vector(d, 1), vector(d, 2)
+    for c in range(d.ny):
+        d.w[three + c] = d.w[two + c]
+        d.w[two + c] = d.w[one + c]
+        d.w[one + c] = d.slopes[c]
     d.memory[COUNT] = min(d.memory[COUNT] + 1.0, MOST_STEPS_BACK)
 
 
@@ -68,10 +61,10 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     @kernel
     def attempt(d, step):
         """State Y_NEW after a step from Y; False when there is no slope at the predicted state."""
-        o, size, now, predicted = d.at_memory, d.ny, slope(d, 0), slope(d, 1)
+        size, now, predicted = d.ny, slope(d, 0), slope(d, 1)
         if d.memory[COUNT] < MOST_STEPS_BACK or not alike(d, step):
             return runge_kutta_step(d, step)
-        one, two, three = o + KEPT, o + KEPT + size, o + KEPT + 2 * size
+        one, two, three = vector(d, 0), vector(d, 1), vector(d, 2)
         for c in range(size):
             ahead = 55.0 * d.w[now + c] - 59.0 * d.w[one + c]
             ahead += 37.0 * d.w[two + c] - 9.0 * d.w[three + c]
@@ -89,10 +82,8 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 METHOD = Method(
     traits=INTEGRATORS["adams-bashforth-moulton"],
-    slopes=LAST + 2,
+    room=m.Room(LAST + 2, hermite.ROWS, FLOATS, MOST_STEPS_BACK),
     last=LAST,
-    dense=hermite.ROWS,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,
-    memory=memory,
 )

@@ -91,7 +91,7 @@ def make_follow_contacts(
     evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step.
     has_regimes: `regimes` or `no_regimes`.
     """
-    last, spare, interpolate = method.last, method.slopes - 1, method.interpolate
+    last, spare, interpolate = method.last, method.room.slopes - 1, method.interpolate
     maximum = make_maximum(evaluate_at)
 
     @kernel

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_dense, make_stages
@@ -65,9 +66,8 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 METHOD = Method(
     traits=INTEGRATORS["dopri5"],
-    slopes=STAGES + 2,
+    room=m.Room(STAGES + 2, 5),
     last=STAGES,
-    dense=5,
     make_kernels=make_kernels,
     interpolate=interpolate,
     error_order=ERROR_ORDER,

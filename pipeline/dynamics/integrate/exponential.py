@@ -27,8 +27,8 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import modal_basis, phi_functions
-from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, MADE, Method, await_rates, slope
-from flexclear.pipeline.dynamics.integrate.modal_basis import count, damping, lift, read, room, square, turn, work_rate
+from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, MADE, Method, await_rates, slope, vector
+from flexclear.pipeline.dynamics.integrate.modal_basis import count, lift, oscillation, read, turn, work_rate
 from flexclear.pipeline.dynamics.integrate.newton import limit
 from flexclear.pipeline.dynamics.integrate.norms import scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -61,58 +61,24 @@ FORGETTING = 0.3
 #: steps are so long that corrections fall by this factor per sweep, which goes with their square; no less is aimed at
 SWIFT, LEAST_CONTRACTION = 0.1, 0.01
 
-# Memory between steps -------------------------------------------------------------------------------------------------
-# whether the oscillators are those of the present pose, whether there are any, step of the phi functions, length of the
-# step before (0: none), its rate of convergence, length of the step whose dense output is requested, the slowest
-# convergence within the last attempt; of the present one the norm of the last correction, and the slowest convergence
-# that is not forgotten
-BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, CORRECTED, CONVERGING, VECTORS = range(10)
-#: vectors over the state: departures of g from its start at the nodes, and those of the step before
-DEPARTURE, BEFORE = 0, NODES
+# What is kept between steps -------------------------------------------------------------------------------------------
+# floats: whether the oscillators are those of the present pose, whether there are any, step of the phi functions,
+# length of the step before (0: none), its rate of convergence, length of the step whose dense output is requested, the
+# slowest convergence within the last attempt; of the present one the norm of the last correction, and the slowest
+# convergence that is not forgotten
+BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, CORRECTED, CONVERGING, FLOATS = range(10)
+#: vectors: departures of g from its start at the nodes, and those of the step before
+DEPARTURE, BEFORE, VECTORS = 0, NODES, 2 * NODES
 #: pairs (z, z') of all oscillators: of the departures, of the slope at the start and of its state, two to work with
 OF_SLOPE, OF_STATE, TOTAL, SPARE, N_PAIRS = range(NODES, NODES + 5)
 #: sources of a state within the step: the departures and the slope at its start
 SOURCES = NODES + 1
-PHI = 2 * phi_functions.PHI_COUNT
-#: floats of an oscillator in a quadrature: its phi functions, and what each source adds to (z, z') by them
-OF_QUADRATURE = PHI + 2 * SOURCES
-
-
-def memory(h: np.ndarray) -> int:
-    """Floats kept between steps."""
-    size = h[m.NV]
-    vectors, pairs, quadratures = 2 * NODES * h[m.NY], 2 * N_PAIRS * size, N_QUADRATURES * OF_QUADRATURE * size
-    return int(VECTORS + vectors + pairs + quadratures + modal_basis.floats(h))
 
 
 @kernel
-def vector(d, i):
-    """Where w holds vector i over the state."""
-    return d.at_memory + VECTORS + d.ny * i
-
-
-@kernel
-def pair(d, i):
-    """Where w holds pair i of all oscillators."""
-    return vector(d, 2 * NODES) + 2 * room(d) * i
-
-
-@kernel
-def phi(d, j, i):
-    """Where w holds the phi functions of oscillator i in quadrature j."""
-    return pair(d, N_PAIRS) + OF_QUADRATURE * (room(d) * j + i)
-
-
-@kernel
-def share(d, j, i):
-    """Where w holds what the sources add to (z, z') of oscillator i by quadrature j: weights of 1 and Lambda each."""
-    return phi(d, j, i) + PHI
-
-
-@kernel
-def basis(d):
-    """Where w holds the oscillators."""
-    return phi(d, N_QUADRATURES, 0)
+def quadrature(d, j, i):
+    """Row of QUADRATURES of oscillator i in quadrature j."""
+    return d.quadratures[d.nv * j + i]
 
 
 # Exponential quadrature -----------------------------------------------------------------------------------------------
@@ -122,41 +88,40 @@ def find_phi(d, j, step, theta):
 
     Error estimates are of the whole step, as its last node is, whose functions they take.
     """
-    o, tau, whole = basis(d), theta * step, j >= THIRD
+    tau, whole = theta * step, j >= THIRD
     slope_too = 0.0 if whole else 1.0
     for i in range(count(d)):
-        at = phi(d, NODES - 1 if whole else j, i)
         if not whole:
-            phi_functions.phi_functions(d.w, at, d.w[square(d, o, i)] * tau * tau, d.w[damping(d, o, i)] * tau)
-        first = share(d, j, i) + 2 * NODES
-        d.w[first], d.w[first + 1] = slope_too * tau * (d.w[at + 2] - 1.0), slope_too * tau * tau * d.w[at + 3]
+            at = d.at_quadratures + m.QUADRATURES.size * (d.nv * j + i) + m.QUADRATURES.phi
+            phi_functions.phi_functions(d.w, at, d.oscillators[i].square * tau * tau, d.oscillators[i].damping * tau)
+        phi, share = quadrature(d, NODES - 1 if whole else j, i).phi, quadrature(d, j, i).share
+        share[2 * NODES] = slope_too * tau * (phi[2] - 1.0)
+        share[2 * NODES + 1] = slope_too * tau * tau * phi[3]
         for e in range(NODES):
             plain, turned, power = 0.0, 0.0, theta
             for k in range(NODES):
                 power *= theta
                 weight = step * FACTORIALS[k + 1] * power * POLYNOMIALS[j, k, e]
-                plain += weight * (d.w[at + 2 * k + 4] - 1.0 / FACTORIALS[k + 2])
-                turned += weight * d.w[at + 2 * k + 5]
-            d.w[share(d, j, i) + 2 * e], d.w[share(d, j, i) + 2 * e + 1] = plain, tau * turned
+                plain += weight * (phi[2 * k + 4] - 1.0 / FACTORIALS[k + 2])
+                turned += weight * phi[2 * k + 5]
+            share[2 * e], share[2 * e + 1] = plain, tau * turned
 
 
 @kernel
 def combine(d, j):
     """What all sources add by quadrature j, as the pair TOTAL."""
-    o, apart = basis(d), room(d)
     for i in range(count(d)):
-        if d.w[square(d, o, i)] == 0.0:
+        one, share, total = d.oscillators[i], quadrature(d, j, i).share, oscillation(d, TOTAL, i)
+        if one.square == 0.0:
             continue
         z = rate = turned = bent = 0.0
         for e in range(SOURCES):
-            plain, by = d.w[share(d, j, i) + 2 * e], d.w[share(d, j, i) + 2 * e + 1]
-            a, b = d.w[pair(d, e) + i], d.w[pair(d, e) + apart + i]
-            z += plain * a
-            rate += plain * b
-            turned += by * a
-            bent += by * b
-        d.w[pair(d, TOTAL) + i] = z + bent
-        d.w[pair(d, TOTAL) + apart + i] = rate - d.w[square(d, o, i)] * turned - d.w[damping(d, o, i)] * bent
+            plain, by, source = share[2 * e], share[2 * e + 1], oscillation(d, e, i)
+            z += plain * source.z
+            rate += plain * source.rate
+            turned += by * source.z
+            bent += by * source.rate
+        total.z, total.rate = z + bent, rate - one.square * turned - one.damping * bent
 
 
 @kernel
@@ -177,15 +142,15 @@ def add_departures(d, step, theta, j, out):
     for i in range(d.ny):
         d.w[out + i] += wa * d.w[a + i] + wb * d.w[b + i] + wc * d.w[c + i]
     combine(d, j)
-    lift(d, basis(d), pair(d, TOTAL), theta * step, out)
+    lift(d, TOTAL, theta * step, out)
 
 
 @kernel
 def advance_to(d, step, theta, j, out):
     """State at a fraction of the step into w from place out, by quadrature j, whose phi functions are there."""
-    first, tau = slope(d, 0), step * theta
+    tau = step * theta
     for i in range(d.ny):
-        d.w[out + i] = d.y[i] + tau * d.w[first + i]
+        d.w[out + i] = d.y[i] + tau * d.slopes[i]
     add_departures(d, step, theta, j, out)
 
 
@@ -193,16 +158,17 @@ def advance_to(d, step, theta, j, out):
 @kernel
 def depart(d, step, e):
     """Departure of g at node e from its start, by the node's state in Y_STAGE, its slope, and its pair TOTAL."""
-    departure, o, work = vector(d, DEPARTURE + e), basis(d), pair(d, SPARE)
-    read(d, o, d.at_y_stage, work)
-    for i in range(2 * room(d)):
-        d.w[work + i] = d.w[pair(d, OF_STATE) + i] - d.w[work + i]
-    turn(d, o, work)
+    departure, node = vector(d, DEPARTURE + e), slope(d, NODE)
+    read(d, d.at_y_stage, SPARE)
+    for i in range(count(d)):
+        start, now = oscillation(d, OF_STATE, i), oscillation(d, SPARE, i)
+        now.z, now.rate = start.z - now.z, start.rate - now.rate
+    turn(d, SPARE)
     for c in range(d.ny):
-        d.w[departure + c] = d.w[slope(d, NODE) + c] - d.w[slope(d, 0) + c]
-    lift(d, o, work, C[e] * step, departure)
-    d.w[departure + d.nq + d.nv + m.DRIVE_WORK] -= work_rate(d, o, pair(d, TOTAL))
-    read(d, o, departure, pair(d, e))
+        d.w[departure + c] = d.w[node + c] - d.slopes[c]
+    lift(d, SPARE, C[e] * step, departure)
+    d.w[departure + d.nq + d.nv + m.DRIVE_WORK] -= work_rate(d, TOTAL)
+    read(d, departure, e)
 
 
 @kernel
@@ -219,7 +185,7 @@ def predict(d, step):
                 before = vector(d, BEFORE + b)
                 for c in range(d.ny):
                     d.w[departure + c] += rise * d.w[before + c]
-        read(d, basis(d), departure, pair(d, e))
+        read(d, departure, e)
 
 
 @kernel
@@ -272,7 +238,7 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
     @kernel
     def renew(d):
         """The oscillators of the state that has just been evaluated."""
-        find_oscillators(d, basis(d), d.memory[BASIS_KNOWN] > 0.0)
+        find_oscillators(d, d.memory[BASIS_KNOWN] > 0.0)
         d.jacobians += 1
         d.memory[BASIS_HOLDS], d.memory[BASIS_KNOWN], d.memory[PHI_STEP] = 1.0, 1.0, 0.0
 
@@ -289,8 +255,8 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
             find_phi(d, THIRD, step, 1.0)
             find_phi(d, FOURTH, step, 1.0)
             d.memory[PHI_STEP] = step
-        read(d, basis(d), slope(d, 0), pair(d, OF_SLOPE))
-        read(d, basis(d), d.at_y, pair(d, OF_STATE))
+        read(d, d.at_slopes, OF_SLOPE)
+        read(d, d.at_y, OF_STATE)
 
     @kernel
     def visit(d, step, e):
@@ -360,12 +326,10 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
 
 METHOD = Method(
     traits=INTEGRATORS["exponential"],
-    slopes=ROWS,
+    room=m.Room(ROWS, 0, FLOATS, VECTORS, oscillations=N_PAIRS, quadratures=N_QUADRATURES),
     last=LAST,
-    dense=0,
     make_kernels=make_kernels,
     interpolate=interpolate,
     staged=True,
     error_order=ERROR_ORDER,
-    memory=memory,
 )

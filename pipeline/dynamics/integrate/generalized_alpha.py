@@ -32,7 +32,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
-from flexclear.pipeline.dynamics.integrate.method import Method, slope
+from flexclear.pipeline.dynamics.integrate.method import Method, matrix, slope, vector
 from flexclear.pipeline.dynamics.integrate.newton import COLUMN_STEP, converged, limit, lu_factor, lu_solve
 from flexclear.pipeline.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -44,51 +44,22 @@ MOST_ITERATIONS, SLOW_FROM = 10, 4
 #: iterations of the damped kind, and halvings of one correction
 MOST_CORRECTIONS, MOST_HALVINGS = 30, 12
 
-# Memory between steps ------------------------------------------------------------------------------------------------
-# step to which the stored accelerations belong, step of the factors, whether the Jacobian still holds, step before;
-# then vectors of rates, positions, the slope before the last step, matrices
-A_STEP, FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, VECTORS = range(5)
-#: accelerations at the start as stored, rates at the end, accelerations at the start for this step's length,
-#: displacement, residual, Newton's correction, row exchanges of the factors
-OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, CORRECTION, PIVOTS, N_VECTORS = range(8)
-#: change of the rates with speeds and z, with positions, and Newton's matrix
-BY_STATE, BY_POSITION, NEWTON = range(3)
-
-
-def memory(h: np.ndarray) -> int:
-    """Floats kept between steps."""
-    nq, ny = int(h[m.NQ]), int(h[m.NY])
-    return VECTORS + N_VECTORS * (ny - nq) + nq + ny + 3 * (ny - nq) ** 2
+# What is kept between steps ------------------------------------------------------------------------------------------
+# floats: step to which the stored accelerations belong, step of the factors, whether the Jacobian still holds, step
+# before
+A_STEP, FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(5)
+#: vectors of rates: accelerations at the start as stored, rates at the end, accelerations at the start for this step's
+#: length, displacement, residual, Newton's correction, row exchanges of the factors; then room for positions, and the
+#: slope at the start of the step before
+OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, CORRECTION, PIVOTS, POSITIONS, SLOPE_BEFORE, VECTORS = range(10)
+#: matrices: change of the rates with speeds and z, with positions, and Newton's matrix
+BY_STATE, BY_POSITION, NEWTON, MATRICES = range(4)
 
 
 @kernel
 def n_rates(d):
     """Number of unknowns."""
     return d.ny - d.nq
-
-
-@kernel
-def vector(d, k):
-    """Where w holds one of the vectors."""
-    return d.at_memory + VECTORS + n_rates(d) * k
-
-
-@kernel
-def positions(d):
-    """Where w has room for positions."""
-    return vector(d, N_VECTORS)
-
-
-@kernel
-def slope_before(d):
-    """Where w holds the slope at the start of the step before."""
-    return positions(d) + d.nq
-
-
-@kernel
-def matrix(d, k):
-    """Where w holds one of the matrices."""
-    return slope_before(d) + d.ny + n_rates(d) * n_rates(d) * k
 
 
 # Coefficients and linear system --------------------------------------------------------------------------------------
@@ -161,7 +132,7 @@ def predict(d, step):
         now = d.slopes[nq + k]
         a = now + share * (d.w[vector(d, OLD) + k] - now)
         d.w[vector(d, RESCALED) + k] = a
-        d.w[vector(d, NEW) + k] = a + on * (now - d.w[slope_before(d) + nq + k])
+        d.w[vector(d, NEW) + k] = a + on * (now - d.w[vector(d, SLOPE_BEFORE) + nq + k])
     for k in range(d.nv, n_rates(d)):
         d.w[vector(d, NEW) + k] = d.slopes[nq + k]
 
@@ -172,14 +143,14 @@ def keep(d, step):
     for k in range(d.nv):
         d.w[vector(d, OLD) + k] = d.w[vector(d, NEW) + k]
     for c in range(d.ny):
-        d.w[slope_before(d) + c] = d.slopes[c]
+        d.w[vector(d, SLOPE_BEFORE) + c] = d.slopes[c]
     d.memory[A_STEP] = d.memory[LAST_STEP] = step
 
 
 @kernel
 def error(d, step):
     """Norm of the local error, 1 at the tolerance."""
-    size, start, end, before = d.ny, slope(d, 0), slope(d, ITERATE), slope_before(d)
+    size, start, end, before = d.ny, slope(d, 0), slope(d, ITERATE), vector(d, SLOPE_BEFORE)
     out, length = slope(d, ESTIMATE), d.memory[LAST_STEP]
     for c in range(size):
         f0, f1 = d.w[start + c], d.w[end + c]
@@ -209,7 +180,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         seen = d.evaluation == m.OK and finite(d, ahead)
         for c in range(size):
             change = d.w[ahead + c] - d.w[first + c] if seen else 0.0
-            d.w[slope_before(d) + c] = d.w[first + c] - change
+            d.w[vector(d, SLOPE_BEFORE) + c] = d.w[first + c] - change
             if d.nq <= c < d.nq + d.nv:
                 d.w[vector(d, OLD) + c - d.nq] = d.w[first + c] + (alpha_m - alpha_f) * change
         d.memory[A_STEP] = d.memory[LAST_STEP] = step
@@ -243,7 +214,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
             d.w[out + nq + k] = u + step * ((1.0 - gamma) * a + gamma * b)
         for k in range(nv, n_rates(d)):
             d.w[out + nq + k] = d.y[nq + k] + step * d.w[new + k]
-        retract(d, d.at_y, shift, out, positions(d))
+        retract(d, d.at_y, shift, out, vector(d, POSITIONS))
 
     @kernel
     def residual(d, step):
@@ -375,7 +346,7 @@ def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
             change = COLUMN_STEP * d.floors[d.groups[nq + k].group].natural
             for j in range(nv):
                 d.w[shift + j] = change if j == k else 0.0
-            retract(d, y, shift, d.at_y_stage, positions(d))
+            retract(d, y, shift, d.at_y_stage, vector(d, POSITIONS))
             if not column(d, t, slope_there, k, change, matrix(d, BY_POSITION)):
                 return False
         d.jacobians += 1
@@ -387,13 +358,11 @@ def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
 
 METHOD = Method(
     traits=INTEGRATORS["generalized-alpha"],
-    slopes=ROWS,
+    room=m.Room(ROWS, hermite.ROWS, FLOATS, VECTORS, MATRICES),
     last=LAST,
-    dense=hermite.ROWS,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,
     error_order=2,
     steady=1.2,
-    memory=memory,
     parameter=parameter,
 )

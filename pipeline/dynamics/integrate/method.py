@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from flexclear.pipeline.core.scene.integrators import Traits
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -17,6 +15,18 @@ from flexclear.pipeline.dynamics.kernels import kernel
 def slope(d, i):
     """Where w holds row i of SLOPES, the slope of a state."""
     return d.at_slopes + d.ny * i
+
+
+@kernel
+def vector(d, i):
+    """Where w holds row i of VECTORS, of the state's length, which a method keeps."""
+    return d.at_vectors + d.ny * i
+
+
+@kernel
+def matrix(d, i):
+    """Where w holds one of MATRICES, which a method keeps."""
+    return d.at_matrices + d.ny * d.ny * i
 
 
 #: how far an attempt has come: it waits for rates, it is made, it cannot be made
@@ -73,8 +83,9 @@ class Method:
     """An integration method.
 
     traits: what is known of it elsewhere.
-    slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the search for events.
-    last: row of the slope at the step's end.  dense: rows of DENSE.
+    room: what it needs of the work space; of SLOPES the first row is the slope where a step starts, the last is left to
+        the search for events.
+    last: row of the slope at the step's end.
     make_kernels: (evaluate, retract) -> kernels, with a third argument of methods that read more than rates
         (`Traits.reads_all`): an evaluation of which everything is left, with the module that factors the mass matrix.
         evaluate(d, t, y, dy), retract(d, y, displacement, out, scratch) take indices in w. They count their evaluations
@@ -90,26 +101,19 @@ class Method:
     staged: whether it gives `proceed` in place of `attempt`, so that several can proceed together.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
-    memory: floats kept between steps, from the header with the mechanism's sizes.
     parameter: the method's number in the scene's solver table, if it has one.
     stability: reach of the region of stability along the negative real axis, of an explicit method whose last
         stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
     """
 
     traits: Traits
-    slopes: int
+    room: m.Room
     last: int
-    dense: int
     make_kernels: Callable
     interpolate: Callable
     error_order: int = 0
     staged: bool = False
     ends: bool = False
     steady: float = 1.0
-    memory: Callable[[np.ndarray], int] = lambda h: 0
     parameter: Callable[[Any], float] = lambda solver: 0.0
     stability: float | None = None
-
-    def room(self, h: np.ndarray) -> m.Room:
-        """What it needs of the work space, from the header with the mechanism's sizes."""
-        return m.Room(self.slopes, self.dense, self.memory(h))

@@ -35,67 +35,24 @@ POSITION_CHANGE = 1e-9
 
 
 @kernel
-def room(d):
-    """Most oscillators: one per speed."""
-    return d.nv
-
-
-def floats(h: np.ndarray) -> int:
-    """Floats of the work space that a basis takes."""
-    size, ny = int(h[m.NV]), int(h[m.NY])
-    return 3 * size + 3 * size * size + 2 * size * ny
-
-
-# Places; o is where the basis begins ----------------------------------------------------------------------------------
-@kernel
-def square(d, o, i):
-    """Where w holds omega^2 of oscillator i [1/s^2]."""
-    return o + i
-
-
-@kernel
-def damping(d, o, i):
-    """Where w holds the damping of oscillator i [1/s]."""
-    return o + room(d) + i
-
-
-@kernel
-def root(d, o, j):
-    """Where w holds the root of the stiffness of spring j."""
-    return o + 2 * room(d) + j
-
-
-@kernel
-def axes(d, o, i):
-    """Where w holds column i of Q."""
-    return o + room(d) * (3 + i)
-
-
-@kernel
-def matrix(d, o, i):
-    """Where w holds row i of the symmetric matrix."""
-    return o + room(d) * (3 + room(d) + i)
-
-
-@kernel
-def reading(d, o, i):
-    """Where w holds row i of C: weights of the springs."""
-    return o + room(d) * (3 + 2 * room(d) + i)
-
-
-@kernel
-def lifting(d, o, i):
+def lifting(d, i):
     """Where w holds oscillator i's shape, of the state's length: rates of positions, speeds, and two of the work.
 
     Oscillating forces do work on drives whose speed changes within a step: the work at the start's speed, and its rate.
     """
-    return o + room(d) * (3 + 3 * room(d)) + d.ny * i
+    return d.at_lifting + d.ny * i
 
 
 @kernel
-def response(d, o, j):
+def response(d, j):
     """Where w holds what the root of spring j's stiffness accelerates, the drives' power then, and its rate."""
-    return lifting(d, o, room(d) + j)
+    return d.at_response + d.ny * j
+
+
+@kernel
+def oscillation(d, p, i):
+    """(z, z') of oscillator i, pair p of all oscillators."""
+    return d.oscillations[d.nv * p + i]
 
 
 @kernel
@@ -109,102 +66,101 @@ def count(d):
 
 # Functions of the state -----------------------------------------------------------------------------------------------
 @kernel
-def read(d, o, state, out):
-    """C: z, and z' after `room` entries, of what w holds for each variable from index `state` on."""
+def read(d, state, p):
+    """C: pair p of what w holds for each variable from index `state` on."""
     for i in range(count(d)):
-        row, e, z, rate = reading(d, o, i), 0, 0.0, 0.0
+        e, z, rate = d.nv * i, 0.0, 0.0
         for k in range(d.n_flex):
             q, c = state + d.flexes[k].q0, state + d.nq + d.flexes[k].c0
             for j in range(d.flexes[k].n_modes):
-                z += d.w[row + e] * d.w[q + j]
-                rate += d.w[row + e] * d.w[c + j]
+                z += d.reading[e] * d.w[q + j]
+                rate += d.reading[e] * d.w[c + j]
                 e += 1
-        d.w[out + i], d.w[out + room(d) + i] = z, rate
+        pair = oscillation(d, p, i)
+        pair.z, pair.rate = z, rate
 
 
 @kernel
-def lift(d, o, pair, t, out):
-    """Add B, a time t after the pose, of (z, z') to what w holds for each variable from place `out` on.
-
-    z' follows z after `room` entries.
-    """
+def lift(d, p, t, out):
+    """Add B, a time t after the pose, of pair p to what w holds for each variable from place `out` on."""
     nq, nv = d.nq, d.nv
     for i in range(count(d)):
-        if d.w[square(d, o, i)] == 0.0:
+        if d.oscillators[i].square == 0.0:
             continue
-        shape, z, rate = lifting(d, o, i), d.w[pair + i], d.w[pair + room(d) + i]
+        shape, z, rate = lifting(d, i), oscillation(d, p, i).z, oscillation(d, p, i).rate
         for c in range(nq):
             d.w[out + c] += d.w[shape + c] * z
         for c in range(nq, nq + nv):
             d.w[out + c] += d.w[shape + c] * rate
         work = d.w[shape + nq + nv] + t * d.w[shape + nq + nv + 1]
-        d.w[out + nq + nv + m.DRIVE_WORK] += work * (rate + d.w[damping(d, o, i)] * z)
+        d.w[out + nq + nv + m.DRIVE_WORK] += work * (rate + d.oscillators[i].damping * z)
 
 
 @kernel
-def work_rate(d, o, pair):
-    """Rate at which the work that belongs to (z, z') changes because the drives' speeds do."""
+def work_rate(d, p):
+    """Rate at which the work that belongs to pair p changes because the drives' speeds do."""
     total, rates = 0.0, d.nq + d.nv + 1
     for i in range(count(d)):
-        total += d.w[lifting(d, o, i) + rates] * (d.w[pair + room(d) + i] + d.w[damping(d, o, i)] * d.w[pair + i])
+        pair = oscillation(d, p, i)
+        total += d.w[lifting(d, i) + rates] * (pair.rate + d.oscillators[i].damping * pair.z)
     return total
 
 
 @kernel
-def turn(d, o, pair):
-    """Lambda: (z, z') becomes (z', -omega^2 z - d z'), in place."""
+def turn(d, p):
+    """Lambda: (z, z') of pair p becomes (z', -omega^2 z - d z')."""
     for i in range(count(d)):
-        z, rate = d.w[pair + i], d.w[pair + room(d) + i]
-        d.w[pair + i] = rate
-        d.w[pair + room(d) + i] = -d.w[square(d, o, i)] * z - d.w[damping(d, o, i)] * rate
+        one, pair = d.oscillators[i], oscillation(d, p, i)
+        z, rate = pair.z, pair.rate
+        pair.z, pair.rate = rate, -one.square * z - one.damping * rate
 
 
 # Oscillators ----------------------------------------------------------------------------------------------------------
 @kernel
-def couple(d, o, i):
+def couple(d, i):
     """Row i of the symmetric matrix: what the response of mode i's spring does along all modes."""
-    j, b = 0, response(d, o, i) + d.nq
+    j, b = 0, response(d, i) + d.nq
     for k in range(d.n_flex):
         for c in range(d.flexes[k].c0, d.flexes[k].c0 + d.flexes[k].n_modes):
-            d.w[matrix(d, o, i) + j] = d.w[root(d, o, j)] * d.w[b + c]
+            d.coupling[d.nv * i + j] = d.oscillators[j].root * d.w[b + c]
             j += 1
 
 
 @kernel
-def into_axes(d, o, n):
-    """The symmetric matrix in the axes of the pose before, which are nearly its own."""
-    spare = reading(d, o, 0)
+def into_axes(d, n):
+    """The symmetric matrix S in the axes Q of the pose before, which are nearly its own: Q^T S Q, by way of READING."""
+    nv, S, QtS, Qt = d.nv, d.coupling, d.reading, d.axes
     for i in range(n):
         for k in range(n):
             total = 0.0
             for j in range(n):
-                total += d.w[axes(d, o, i) + j] * d.w[matrix(d, o, j) + k]
-            d.w[spare + n * i + k] = total
+                total += Qt[nv * i + j] * S[nv * j + k]
+            QtS[n * i + k] = total
     for i in range(n):
         for k in range(n):
             total = 0.0
             for j in range(n):
-                total += d.w[spare + n * i + j] * d.w[axes(d, o, k) + j]
-            d.w[matrix(d, o, i) + k] = total
+                total += QtS[n * i + j] * Qt[nv * k + j]
+            S[nv * i + k] = total
 
 
 @kernel
-def rotate(w, a, b, n, c, s):
-    """Turn two stretches of w into each other."""
-    for k in range(n):
-        x, y = w[a + k], w[b + k]
-        w[a + k], w[b + k] = c * x - s * y, s * x + c * y
+def rotate(entries, a, b, apart, n, c, s):
+    """Turn n entries from a and from b on, so far apart, into each other."""
+    for k in range(0, apart * n, apart):
+        x, y = entries[a + k], entries[b + k]
+        entries[a + k], entries[b + k] = c * x - s * y, s * x + c * y
 
 
 @kernel
-def diagonalise(d, o, n):
+def diagonalise(d, n):
     """Jacobi's rotations until the symmetric matrix is diagonal, taken along by its axes."""
+    nv, S = d.nv, d.coupling
     for _ in range(SWEEPS):
         turned = False
         for p in range(n - 1):
             for q in range(p + 1, n):
-                P, R = matrix(d, o, p), matrix(d, o, q)
-                mixed, a, b = d.w[P + q], d.w[P + p], d.w[R + q]
+                mixed, a, b = S[nv * p + q], S[nv * p + p], S[nv * q + q]
                 if not abs(mixed) > OFF_DIAGONAL * np.sqrt(max(a * b, 0.0)):
                     continue
                 turned = True
@@ -212,33 +168,30 @@ def diagonalise(d, o, n):
                 t = (1.0 if half >= 0.0 else -1.0) / (abs(half) + np.sqrt(half * half + 1.0))
                 c = 1.0 / np.sqrt(t * t + 1.0)
                 s = t * c
-                rotate(d.w, P, R, n, c, s)
-                for k in range(n):
-                    row = matrix(d, o, k)
-                    x, y = d.w[row + p], d.w[row + q]
-                    d.w[row + p], d.w[row + q] = c * x - s * y, s * x + c * y
-                d.w[P + q] = d.w[R + p] = 0.0
-                rotate(d.w, axes(d, o, p), axes(d, o, q), n, c, s)
+                rotate(S, nv * p, nv * q, 1, n, c, s)
+                rotate(S, p, q, nv, n, c, s)
+                S[nv * p + q] = S[nv * q + p] = 0.0
+                rotate(d.axes, nv * p, nv * q, 1, n, c, s)
         if not turned:
             return
 
 
 @kernel
-def damp(d, o, i):
+def damp(d, i):
     """Damping of oscillator i by the modal damping: the part that does not couple it to others."""
-    total, e = 0.0, 0
+    total, e = 0.0, d.nv * i
     for k in range(d.n_flex):
         n = d.flexes[k].n_modes
         stiffness = d.at_flex_data + d.flexes[k].data0 + 12 * n + n * n
         for j in range(n):
             if d.f[stiffness + j] > 0.0:
-                total += d.w[axes(d, o, i) + e] ** 2 * d.f[stiffness + n + j] / d.f[stiffness + j]
+                total += d.axes[e] ** 2 * d.f[stiffness + n + j] / d.f[stiffness + j]
             e += 1
-    return d.w[square(d, o, i)] * total
+    return d.oscillators[i].square * total
 
 
 def make_responses(tree: Any) -> Callable:
-    """The kernel responses(d, o); tree: what factors the mass matrix, the module `articulated` or `composite`."""
+    """The kernel responses(d); tree: what factors the mass matrix, the module `articulated` or `composite`."""
     forward, backward, inertial_power = tree.forward, tree.backward, tree.drive_power
 
     @kernel
@@ -281,55 +234,54 @@ def make_responses(tree: Any) -> Callable:
         to_modes(d, b)
 
     @kernel
-    def responses(d, o):
+    def responses(d):
         """Responses to the root of each mode's stiffness, and the symmetric matrix."""
         nq, nv, e = d.nq, d.nv, 0
         for i in range(count(d)):
             for k in range(nq, nq + nv + 2):
-                d.w[response(d, o, i) + k] = 0.0
+                d.w[response(d, i) + k] = 0.0
         for k in range(d.n_flex):
             size, c0 = d.flexes[k].n_modes, d.flexes[k].c0
             stiffness = d.at_flex_data + d.flexes[k].data0 + 12 * size + size * size
             for j in range(size):
-                d.w[root(d, o, e)] = np.sqrt(max(d.f[stiffness + j], 0.0))
-                b = response(d, o, e) + nq
-                d.w[b + c0 + j] = d.w[root(d, o, e)]
+                root, b = np.sqrt(max(d.f[stiffness + j], 0.0)), response(d, e) + nq
+                d.oscillators[e].root = d.w[b + c0 + j] = root
                 to_interface(d, b)
                 respond(d, b)
                 e += 1
         for i in range(e):
-            couple(d, o, i)
+            couple(d, i)
 
     return responses
 
 
 def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
-    """The kernel find_oscillators(d, o, known), at the state in Y or Y_NEW that has just been evaluated."""
+    """The kernel find_oscillators(d, known), at the state in Y or Y_NEW that has just been evaluated."""
     responses = make_responses(tree)
 
     @kernel
-    def shapes(d, o, state, n):
+    def shapes(d, state, n):
         """Rows of C and shapes of B, from responses, axes and squares; slow oscillators have none."""
         nq, nv, largest = d.nq, d.nv, 0.0
         for i in range(n):
-            largest = max(largest, d.w[matrix(d, o, i) + i])
+            largest = max(largest, d.coupling[(nv + 1) * i])
         for i in range(n):
-            shape, omega2 = lifting(d, o, i), d.w[matrix(d, o, i) + i]
+            shape, omega2 = lifting(d, i), d.coupling[(nv + 1) * i]
             stiff = omega2 > NOT_STIFF * NOT_STIFF * largest
-            d.w[square(d, o, i)] = omega2 if stiff else 0.0
+            d.oscillators[i].square = omega2 if stiff else 0.0
             for j in range(n):
-                d.w[reading(d, o, i) + j] = d.w[axes(d, o, i) + j] * d.w[root(d, o, j)]
+                d.reading[nv * i + j] = d.axes[nv * i + j] * d.oscillators[j].root
             for c in range(d.ny):
                 d.w[shape + c] = 0.0
             if not stiff:
                 continue
             for j in range(n):
-                part, weight = response(d, o, j), d.w[axes(d, o, i) + j] / omega2
+                part, weight = response(d, j), d.axes[nv * i + j] / omega2
                 for c in range(nq, nq + nv + 2):
                     d.w[shape + c] += weight * d.w[part + c]
         for i in range(n):
             # the responses are used up: room for a displacement, the positions that it leads to, and the change
-            shape, spare, longest = lifting(d, o, i), response(d, o, 0), 0.0
+            shape, spare, longest = lifting(d, i), response(d, 0), 0.0
             for c in range(nv):
                 longest = max(longest, abs(d.w[shape + nq + c]))
             if longest > 0.0:
@@ -340,19 +292,19 @@ def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
                     d.w[shape + c] = d.w[spare + nv + nq + c] * (longest / POSITION_CHANGE)
 
     @kernel
-    def find_oscillators(d, o, known):
+    def find_oscillators(d, known):
         """Fill the basis; known: whether it holds the axes of another pose."""
         size = count(d)
-        responses(d, o)
+        responses(d)
         if known:
-            into_axes(d, o, size)
+            into_axes(d, size)
         else:
             for i in range(size):
                 for j in range(size):
-                    d.w[axes(d, o, i) + j] = 1.0 if i == j else 0.0
-        diagonalise(d, o, size)
-        shapes(d, o, d.state, size)
+                    d.axes[d.nv * i + j] = 1.0 if i == j else 0.0
+        diagonalise(d, size)
+        shapes(d, d.state, size)
         for i in range(size):
-            d.w[damping(d, o, i)] = damp(d, o, i)
+            d.oscillators[i].damping = damp(d, i)
 
     return find_oscillators

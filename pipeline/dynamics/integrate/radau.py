@@ -17,7 +17,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
-from flexclear.pipeline.dynamics.integrate.method import Method, slope
+from flexclear.pipeline.dynamics.integrate.method import Method, matrix, slope, vector
 from flexclear.pipeline.dynamics.integrate.newton import (
     COLUMN_STEP,
     converged,
@@ -65,86 +65,46 @@ MOST_ITERATIONS = 7
 #: corrections that fall slower than this ask for a new Jacobian at the next step
 SLOW_CONVERGENCE = 0.3
 
-# Memory between steps ------------------------------------------------------------------------------------------------
-# step of the factors, whether the Jacobian still holds, length of the step before (0: none); then vectors over the
-# state, three of a kind and four of the polynomial; then the Jacobian, the factors of both systems, and their pivots
-FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, VECTORS = range(4)
-#: kinds of vectors: Z, Z transformed, Newton's corrections of that, polynomial of the step before
-Z, TRANSFORMED, CORRECTION, POLYNOMIAL = range(4)
-N_VECTORS = 13
-#: the linear systems
-REAL, COMPLEX = range(2)
-
-
-def memory(h: np.ndarray) -> int:
-    """Floats kept between steps."""
-    ny = int(h[m.NY])
-    return VECTORS + N_VECTORS * ny + 4 * ny * ny + 2 * ny
-
-
-@kernel
-def stage_vector(d, kind, i):
-    """Where w holds vector i of a kind."""
-    return d.at_memory + VECTORS + d.ny * (3 * kind + i)
-
-
-@kernel
-def jacobian_entry(d, i, k):
-    """Where w holds an entry of the Jacobian."""
-    return d.at_memory + VECTORS + d.ny * N_VECTORS + d.ny * i + k
-
-
-@kernel
-def factors(d, system):
-    """Where w holds the factors of a system."""
-    size = d.ny
-    return jacobian_entry(d, d.ny, 0) + system * size * size
-
-
-@kernel
-def pivots(d, system):
-    """Where w holds the row exchanges of a system's factors, behind one real and one complex matrix."""
-    return factors(d, 3) + d.ny * system
+# What is kept between steps ------------------------------------------------------------------------------------------
+# floats: step of the factors, whether the Jacobian still holds, length of the step before (0: none)
+FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(4)
+#: vectors: three each of Z, of Z transformed and of Newton's corrections of that, four of the polynomial of the step
+#: before; row exchanges of the factors of a real and of a complex system
+Z, TRANSFORMED, CORRECTION, POLYNOMIAL = range(0, 12, 3)
+REAL_PIVOTS, COMPLEX_PIVOTS, VECTORS = range(POLYNOMIAL + 4, POLYNOMIAL + 7)
+#: matrices: the Jacobian, and the factors of both systems, the complex one's imaginary part last
+JACOBIAN, REAL, COMPLEX, MATRICES = 0, 1, 2, 4
 
 
 # Linear systems ------------------------------------------------------------------------------------------------------
 @kernel
 def factorise(d, step):
     """Factors of both systems for a step; False when one is singular."""
-    size, real, rest = d.ny, factors(d, REAL), factors(d, COMPLEX)
+    size, jacobian, real, rest = d.ny, matrix(d, JACOBIAN), matrix(d, REAL), matrix(d, COMPLEX)
     for i in range(size):
-        for k in range(size):
-            entry, o = d.w[jacobian_entry(d, i, k)], size * i + k
-            d.w[real + o] = d.w[rest + o] = -entry
+        for o in range(size * i, size * (i + 1)):
+            d.w[real + o] = d.w[rest + o] = -d.w[jacobian + o]
             d.w[rest + size * size + o] = 0.0
         d.w[real + (size + 1) * i] += MU_REAL / step
         d.w[rest + (size + 1) * i] += MU_REST / step
         d.w[rest + size * size + (size + 1) * i] = MU_IMAG / step
     d.memory[FACTORED_STEP] = step
-    return lu_factor(d.w, real, pivots(d, REAL), size) and lu_factor_complex(d.w, rest, pivots(d, COMPLEX), size)
+    real_pivots, complex_pivots = vector(d, REAL_PIVOTS), vector(d, COMPLEX_PIVOTS)
+    return lu_factor(d.w, real, real_pivots, size) and lu_factor_complex(d.w, rest, complex_pivots, size)
 
 
 @kernel
 def solve_real(d, b):
     """Solve the real system in place for the right-hand side from place b."""
-    lu_solve(d.w, factors(d, REAL), pivots(d, REAL), d.ny, b)
-
-
-@kernel
-def solve_complex(d, b, e):
-    """Solve the complex system in place: real part of the right-hand side from place b, imaginary part from e."""
-    lu_solve_complex(d.w, factors(d, COMPLEX), pivots(d, COMPLEX), d.ny, b, e)
+    lu_solve(d.w, matrix(d, REAL), vector(d, REAL_PIVOTS), d.ny, b)
 
 
 # Collocation polynomial ----------------------------------------------------------------------------------------------
 @kernel
 def coefficient(d, c, k):
     """Coefficient of theta^(k + 1) for state variable c."""
-    return (
-        P[0, k] * d.w[stage_vector(d, Z, 0) + c]
-        + P[1, k] * d.w[stage_vector(d, Z, 1) + c]
-        + P[2, k] * d.w[stage_vector(d, Z, 2) + c]
-    )
+    z, size = vector(d, Z), d.ny
+    return P[0, k] * d.w[z + c] + P[1, k] * d.w[z + size + c] + P[2, k] * d.w[z + 2 * size + c]
 
 
 @kernel
@@ -165,7 +125,7 @@ def extend(d, step):
 @kernel
 def keep(d, step):
     """The polynomial of an accepted step predicts the stages of the next."""
-    write_polynomial(d, stage_vector(d, POLYNOMIAL, 0))
+    write_polynomial(d, vector(d, POLYNOMIAL))
     d.memory[LAST_STEP] = step
 
 
@@ -177,14 +137,14 @@ def begin(d):
 
 # Newton's iteration --------------------------------------------------------------------------------------------------
 @kernel
-def transform(d, matrix, source, target):
-    """Three vectors of one kind as combinations of those of another."""
+def transform(d, T, source, target):
+    """Three vectors of one kind as combinations T of those of another."""
     for c in range(d.ny):
-        a = d.w[stage_vector(d, source, 0) + c]
-        b = d.w[stage_vector(d, source, 1) + c]
-        e = d.w[stage_vector(d, source, 2) + c]
+        a = d.w[vector(d, source) + c]
+        b = d.w[vector(d, source + 1) + c]
+        e = d.w[vector(d, source + 2) + c]
         for i in range(3):
-            d.w[stage_vector(d, target, i) + c] = matrix[i, 0] * a + matrix[i, 1] * b + matrix[i, 2] * e
+            d.w[vector(d, target + i) + c] = T[i, 0] * a + T[i, 1] * b + T[i, 2] * e
 
 
 @kernel
@@ -194,14 +154,14 @@ def predict(d, step):
     Not speeds, whose rates at the start may be far from those of a stiff step. Positions must: at rest where a contact
     begins the first iterate would not touch, and the force, seen by the second one only, would look like divergence.
     """
-    length, o, size = d.memory[LAST_STEP], stage_vector(d, POLYNOMIAL, 0), d.ny
+    length, o, size = d.memory[LAST_STEP], vector(d, POLYNOMIAL), d.ny
     for i in range(3):
         x = 1.0 + C[i] * step / length if length > 0.0 else 0.0
         for c in range(size):
             rise = (d.w[o + 3 * size + c] * x + d.w[o + 2 * size + c]) * x + d.w[o + size + c]
             extrapolated = d.w[o + c] + rise * x - d.y[c]
             along = C[i] * step * d.slopes[c] if c < d.nq else 0.0
-            d.w[stage_vector(d, Z, i) + c] = extrapolated if length > 0.0 else along
+            d.w[vector(d, Z + i) + c] = extrapolated if length > 0.0 else along
     transform(d, T_INVERSE, Z, TRANSFORMED)
 
 
@@ -211,9 +171,9 @@ def residuals(d, step):
     size, first = d.ny, slope(d, 1)
     for c in range(size):
         a, b, e = d.w[first + c], d.w[first + size + c], d.w[first + 2 * size + c]
-        one = d.w[stage_vector(d, TRANSFORMED, 0) + c] / step
-        two = d.w[stage_vector(d, TRANSFORMED, 1) + c] / step
-        three = d.w[stage_vector(d, TRANSFORMED, 2) + c] / step
+        one = d.w[vector(d, TRANSFORMED) + c] / step
+        two = d.w[vector(d, TRANSFORMED + 1) + c] / step
+        three = d.w[vector(d, TRANSFORMED + 2) + c] / step
         for i in range(3):
             total = T_INVERSE[i, 0] * a + T_INVERSE[i, 1] * b + T_INVERSE[i, 2] * e
             if i == 0:
@@ -222,7 +182,7 @@ def residuals(d, step):
                 total -= MU_REST * two - MU_IMAG * three
             else:
                 total -= MU_REST * three + MU_IMAG * two
-            d.w[stage_vector(d, CORRECTION, i) + c] = total
+            d.w[vector(d, CORRECTION + i) + c] = total
 
 
 @kernel
@@ -232,8 +192,8 @@ def correct(d):
     for c in range(d.ny):
         scale = error_scale(d, c)
         for i in range(3):
-            change = d.w[stage_vector(d, CORRECTION, i) + c]
-            d.w[stage_vector(d, TRANSFORMED, i) + c] += change
+            change = d.w[vector(d, CORRECTION + i) + c]
+            d.w[vector(d, TRANSFORMED + i) + c] += change
             total += (change / scale) ** 2
     transform(d, T, TRANSFORMED, Z)
     return np.sqrt(total / (3.0 * d.ny))
@@ -246,7 +206,7 @@ def estimate(d, step, start):
     for c in range(d.ny):
         bent = 0.0
         for i in range(3):
-            bent += E[i] * d.w[stage_vector(d, Z, i) + c]
+            bent += E[i] * d.w[vector(d, Z + i) + c]
         d.w[out + c] = d.w[start + c] + bent / step
     solve_real(d, out)
     return scaled_norm(d, out)
@@ -258,7 +218,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     @kernel
     def jacobian(d):
         """Change of all rates with all variables, at the start of the step; works and losses change none."""
-        size, near = d.ny, slope(d, 1)
+        size, near, J = d.ny, slope(d, 1), matrix(d, JACOBIAN)
         works = d.nq + d.nv
         states = works + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * d.n_contacts
         for c in range(size):
@@ -266,7 +226,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         for k in range(size):
             if works <= k < states:
                 for i in range(size):
-                    d.w[jacobian_entry(d, i, k)] = 0.0
+                    d.w[J + size * i + k] = 0.0
                 continue
             y = d.y[k]
             d.y_stage[k] = y + COLUMN_STEP * (d.floors[d.groups[k].group].natural + abs(y))
@@ -276,8 +236,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             if d.evaluation != m.OK:
                 return False
             for i in range(size):
-                difference = d.w[near + i] - d.slopes[i]
-                d.w[jacobian_entry(d, i, k)] = difference / change
+                d.w[J + size * i + k] = (d.w[near + i] - d.slopes[i]) / change
             d.y_stage[k] = y
         d.jacobians += 1
         d.memory[JACOBIAN_HOLDS], d.memory[FACTORED_STEP] = 1.0, 0.0
@@ -290,15 +249,16 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         for k in range(MOST_ITERATIONS):
             for i in range(3):
                 for c in range(size):
-                    d.y_stage[c] = d.y[c] + d.w[stage_vector(d, Z, i) + c]
+                    d.y_stage[c] = d.y[c] + d.w[vector(d, Z + i) + c]
                 t = d.time + C[i] * step
                 evaluate(d, t, d.at_y_stage, slope(d, i + 1))
                 d.evaluations += 1
                 if d.evaluation != m.OK:
                     return -1.0
             residuals(d, step)
-            solve_real(d, stage_vector(d, CORRECTION, 0))
-            solve_complex(d, stage_vector(d, CORRECTION, 1), stage_vector(d, CORRECTION, 2))
+            solve_real(d, vector(d, CORRECTION))
+            right, imaginary = vector(d, CORRECTION + 1), vector(d, CORRECTION + 2)
+            lu_solve_complex(d.w, matrix(d, COMPLEX), vector(d, COMPLEX_PIVOTS), size, right, imaginary)
             norm = correct(d)
             rate = norm / last_norm if k > 0 else 0.0
             verdict = converged(k, norm, last_norm, d.rtol)
@@ -322,7 +282,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             if rate >= 0.0:
                 d.memory[JACOBIAN_HOLDS] = 1.0 if rate <= SLOW_CONVERGENCE else 0.0
                 for c in range(d.ny):
-                    d.y_new[c] = d.y[c] + d.w[stage_vector(d, Z, 2) + c]
+                    d.y_new[c] = d.y[c] + d.w[vector(d, Z + 2) + c]
                 return True
             d.memory[JACOBIAN_HOLDS] = 0.0
             if fresh:
@@ -348,12 +308,10 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 METHOD = Method(
     traits=INTEGRATORS["radau"],
-    slopes=ROWS,
+    room=m.Room(ROWS, hermite.ROWS, FLOATS, VECTORS, MATRICES),
     last=LAST,
-    dense=hermite.ROWS,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,
     error_order=ERROR_ORDER,
     steady=1.2,
-    memory=memory,
 )

@@ -21,7 +21,7 @@ MOST_LOOKS = 60
 
 def make_evaluate_at(evaluate: Callable, method: Any) -> Callable:
     """The kernel evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step."""
-    interpolate, spare = method.interpolate, method.slopes - 1  # a row of SLOPES that no stage uses
+    interpolate, spare = method.interpolate, method.room.slopes - 1  # a row of SLOPES that no stage uses
 
     @kernel
     def evaluate_at(d, step, theta):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import prod
@@ -49,13 +49,13 @@ class Arrays:
         stretch = self.table(table)
         return stretch.view(np.int64 if _neighbours()[table.place][0] else np.float64).reshape(-1, table.size)
 
-    def work_space(self, room: Callable[[np.ndarray], m.Room]) -> WorkSpace:
+    def work_space(self, room: m.Room) -> WorkSpace:
         """A work space with a copy of h, the ground set and all else zero.
 
-        room: what the integration method needs, from the header.
+        room: what the integration method needs.
         """
         h, end = self.h.copy(), 0
-        lengths = _work_lengths(h, room(h), self.columns)
+        lengths = _work_lengths(h, room, self.columns)
         for index, length in lengths.items():
             h[index] = end
             end += length

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects.stops.model import STOP, End, ends
 from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
 from flexclear.pipeline.dynamics.model.components import Components, components, joined
-from flexclear.pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.dynamics.model.driving import joint_type, prescribed
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,
     Group,
@@ -58,6 +58,17 @@ class Closure(NamedTuple):
     def name(self) -> str:
         """Of the joint."""
         return self.edge.name
+
+    @property
+    def ends(self) -> list[tuple[Site, Site]]:
+        """Pairs of sites between which it acts."""
+        return [(self.a, self.b)]
+
+    @property
+    def rows(self) -> list[tuple[int, int, int]]:
+        """Rows of the table CLOSURE_ROWS."""
+        declared = joint_type(self.edge.kind)
+        return [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
 
 
 class Contact(NamedTuple):

@@ -218,7 +218,8 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.length
     control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
     engine.view(m.INDEPENDENCE)[:] = 0.0
-    engine.view(m.MEMORY)[:] = 0.0  # what a method knows of another run would change this one's last bits
+    for known in range(m.MEMORY, m.QUADRATURES.place + 1):  # of another run it would change this one's last bits
+        engine.view(known)[:] = 0.0
     control[m.FIXED], control[m.PARAMETER] = solver.step or 0.0, engine.method.parameter(solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[m.CAP] = solver.evaluations
