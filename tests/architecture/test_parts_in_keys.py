@@ -154,7 +154,7 @@ DYNAMICS = "flexclear.pipeline.dynamics"
 OTHERS = (
     *("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice"),
     *("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual"),
-    *("specialise.abreast", "run.evaluation.batched_evaluation", "run.evaluation.members", "model.refill"),
+    *("specialise.abreast", "run.evaluation.batched_evaluation", "model.refill"),
 )
 
 
