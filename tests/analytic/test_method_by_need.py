@@ -15,12 +15,13 @@ from flexclear.pipeline.core.artifacts.effect_size import recorded as recorded_q
 from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search
+from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search, by_default
 from flexclear.pipeline.dynamics.run.method_choice.method_selection import Rates, Suit
 from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
 from tests.analytic.mechanism_runs import TREE, bundles
@@ -306,3 +307,25 @@ def test_overdamped_modes_are_followed_as_those_that_ring() -> None:
 def test_it_can_be_said_in_words(given: bool, chosen: bool) -> None:
     asked = {**WANTED, "by_need": given}
     assert load_scene(RINGING, {"accuracy": asked, "solver.integrator": "dopri5"}).by_need() is chosen
+
+
+def refused_below(least: float, run: xr.Dataset) -> xr.Dataset:
+    """What a default search delivers of a run that looser tolerances give alike, and tighter ones not at all."""
+
+    def once(scene: Scene, judges: object) -> xr.Dataset:
+        if scene.solver.rtol < least:
+            raise SolverError("the limit of evaluations is used up")
+        return run
+
+    by_need = SimpleNamespace(best=lambda rtol: "dop853", why=lambda rtol: "", judges=lambda rtol: None)
+    by_need.learn = lambda rtol, name, run: None
+    return by_default(load_scene(TREE / "scenes/checks/pendulum.toml"), once, silent, lambda scene: by_need)
+
+
+def test_a_run_that_none_can_be_compared_with_is_delivered_with_an_unknown_error() -> None:
+    run = simulated(load_scene(TREE / "scenes/checks/pendulum.toml", {"solver.rtol": 1e-6}))
+    delivered = refused_below(1e-5, run)
+    assert delivered.attrs["accuracy_verdict"].startswith("not known")
+    assert delivered.position.identical(run.position)
+    with pytest.raises(SolverError, match="used up"):
+        refused_below(1.0, run)

@@ -128,6 +128,13 @@ class Search:
         fraction = max((errors[q.name] / w for q, w in requested.items()), default=0.0)
         return Attempt(finer, other, errors, fraction) if fraction <= ACCEPTED else attempt
 
+    def uncompared(self, refusal: SolverError) -> Attempt:
+        """The tightest run by default, whose error no other tells; raises the refusal of those where there is none."""
+        if not self.runs or not self.predictable:
+            raise refusal
+        rtol = min(self.runs)
+        return Attempt(rtol, self.runs[rtol], {}, math.inf)
+
     def saves(self, rtol: float, looser: float) -> bool:
         """Whether a run at a looser tolerance is foreseen to be so much cheaper that it is worth to be made.
 
@@ -219,13 +226,14 @@ def _search(search: Search, progress: Progress) -> Attempt:
     rtol = _first(search.scene)
     enough: Attempt | None = None
     nearest: Attempt | None = None
-    too_loose = math.inf
+    too_loose, refusal = math.inf, SolverError("")
     for _ in range(FEW_TRIES if search.predictable else TOLERANCE_TRIES):
         try:
             now = search.attempt(rtol)
-        except SolverError:
+        except SolverError as error:
+            refusal = error
             if rtol <= REFUSED_FOR_GOOD:
-                raise
+                break
             # a tolerance so loose that the run is refused, as its ledger does not close
             too_loose = min(too_loose, rtol)
             rtol = _next(rtol, 1.0 / TIGHTER_AFTER_REFUSAL, enough, too_loose)
@@ -246,7 +254,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
             return enough
         if enough is not None and too_loose < 1.05 * enough.rtol:
             break  # the error jumps between two neighbouring tolerances
-    return enough or nearest  # type: ignore[return-value]
+    return enough or nearest or search.uncompared(refusal)
 
 
 def _first(scene: Scene) -> float:
@@ -267,6 +275,8 @@ def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float
 
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
     """By how much, and why no tolerance helps."""
+    if not best.errors:
+        return "not known: runs at tighter tolerances are refused"
     name = max(requested, key=lambda n: best.errors[n] / requested[n])
     text = (
         f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / requested[name]:.2g} times what is requested"
