@@ -5,6 +5,7 @@ Windows has no module `resource`. What needs it to measure or limit child proces
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -12,6 +13,7 @@ from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from multiprocessing import connection, get_context
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
@@ -98,7 +100,7 @@ class Worker:
 
     def dismiss(self) -> None:
         """End the process, whatever it does."""
-        # first of all: a thread that waits for an answer is told by the end of its line
+        # first of all: the end of its line ends a thread that waits for an answer
         self.process.terminate()
         self.process.join()
         self.line.close()
@@ -111,6 +113,12 @@ def _serve(line: connection.Connection, work: Work, limit: int) -> None:
             parameters = line.recv()
             processes.limit_seconds(None)
             line.send(work(parameters, lambda: processes.limit_seconds(limit)))
+
+
+def as_installed(folder: Path) -> dict[str, str]:
+    """Environment of commands whose results go to a folder, and which keep Python's bytecode, as if installed."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return kept | {"FLEXCLEAR_RESULTS": str(folder / "results"), "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
 
 
 def installed(library: str) -> bool:

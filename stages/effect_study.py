@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.plotting.table import files
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
 
@@ -87,14 +88,13 @@ def _owners(scene: Scene) -> dict[str, list[str]]:
 def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of
     `watched_quantities`."""
-    from flexclear.pipeline.core.scene.quantity import Quantity
+    from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.post.answers import effect_sizes
-    from flexclear.pipeline.post.plotting.table import files
 
     there = [Effect(*three) for three in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
     points = {
-        frozenset(gone): _point(inputs[f"variant{k}"], params["owners"][k], chosen)
+        frozenset(gone): watched(inputs[f"variant{k}"], params["owners"][k], chosen)
         for k, gone in enumerate(params["variants"])
     }
     progress(None, "comparing")
@@ -105,14 +105,13 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
 def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``matters.nc``, its table and its chart.  params: see `ranking`.  inputs: ``<effect>:<members>``."""
-    from flexclear.pipeline.core.scene.quantity import Quantity
+    from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.post.answers import effect_sizes, matters
-    from flexclear.pipeline.post.plotting.table import files
 
     chosen = [Quantity.read(data) for data in params["quantities"]]
 
     def point(name: str, members: int) -> Point:
-        return _point(inputs[f"{name}:{members}"], params["owners"][name], chosen)
+        return watched(inputs[f"{name}:{members}"], params["owners"][name], chosen)
 
     pairs = {name: matters.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
     results = matters.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
@@ -120,11 +119,3 @@ def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
     shown = listed.assign_coords(effect=listed["words"].values)
     return result | effect_sizes.chart("matters", shown, f"What each effect does: {params['title']}")
-
-
-def _point(stored: xr.Dataset, owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> Point:
-    """The point in an artifact of `watched_quantities`."""
-    from flexclear.pipeline.core.artifacts.effect_size import recorded
-    from flexclear.pipeline.core.artifacts.points import unpacked
-
-    return unpacked(stored, recorded(owners, chosen))["point"]

@@ -20,6 +20,10 @@ def root() -> Path:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _results_apart(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """No test reads or writes the results of the project itself; compiled kernels are the user's."""
+def _own_results(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """No test reads or writes the results of the project itself; compiled kernels are the user's.
+
+    Child processes write their compiled modules: without them each start, of hundreds, parses all sources again.
+    """
     os.environ["FLEXCLEAR_RESULTS"] = str(tmp_path_factory.mktemp("results"))
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

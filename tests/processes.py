@@ -18,7 +18,7 @@ PACKAGES = ("flexclear", "papers", "pipeline", "stages")
 def python(
     *arguments: str | Path, cwd: Path = ROOT, succeeds: bool = True, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python in a folder; unless told otherwise, fail with its messages where it fails."""
+    """Run Python in a folder; unless it may fail, raise an error with its messages where it fails."""
     command = [sys.executable, *map(str, arguments)]
     done = subprocess.run(command, cwd=cwd, env=os.environ | environment, capture_output=True, text=True, check=False)
     assert not succeeds or done.returncode == 0, done.stderr[-2000:]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
 import subprocess
 import sys
 import time
@@ -16,6 +15,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.command_parts import IMPORTS, REST
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, spread, table
+from benchmarks.processes import as_installed
 from benchmarks.timing import Times, interleaved, of_children
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
 from flexclear.pipeline.core.system.platforms import cores
@@ -96,9 +96,7 @@ def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "
     """The last line that a command says."""
     program = ["-c", LOOP] if command.loop else ["-m", module]
     arguments = [text.format(repr(command.value * next(fresh))) for text in command.arguments]
-    results = results_root() if command.own else folder / "results"
-    environment = {**os.environ, "FLEXCLEAR_RESULTS": str(results), "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    environment = as_installed(folder) | ({"FLEXCLEAR_RESULTS": str(results_root())} if command.own else {})
     done = subprocess.run(
         [sys.executable, *program, *arguments],
         cwd=TREE,

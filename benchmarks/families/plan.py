@@ -1,4 +1,4 @@
-"""Plans of a family of scenes: does the planned run stay within what is wanted, what does it save, what does it cost?
+"""Plans of a family of scenes: does the planned run meet the accuracy, what does it save, what does it cost?
 
 The full scene, the planned one and the planning are timed alike: processor time of setting up, integrating and
 observing, code and reduced bodies being there. The true error is the difference of the planned run from the full one,
@@ -35,7 +35,7 @@ from flexclear.stages.workplace import check, open_workplace
 
 #: the first of consecutive seeds that were never looked at before, how many, and scenes of each
 SEED, SEEDS, SCENES = 5301, 3, 8
-#: processor time of runs over members that decide whether a plan is within what is wanted [s]
+#: processor time of runs over members that decide whether a plan is within what is requested [s]
 DECIDING = 240.0
 #: a miss by more than this is wrong, and so much may planning cost: of the full run, or a second
 WORST, FRACTION, SECOND = 3.0, 0.2, 1.0

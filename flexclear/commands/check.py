@@ -8,17 +8,18 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import scenes
+from flexclear.commands import scenes, show
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.variants import ideal, loose
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
 from flexclear.stages import meshing, simulation
 from flexclear.stages.graph import Graph
@@ -63,14 +64,14 @@ def command(options: argparse.Namespace) -> int:
     errors: dict[str, FlexclearError] = {}
     warnings: dict[str, InputError] = {}
     for name in options.scenes:
-        mistakes, seen = examined(name, options.set)
+        seen = examined(name, options.set)
         if options.show:
             refused = _show(name, options.set, quiet=options.json)
-            mistakes = mistakes or ([] if refused is None else [refused])
-        errors |= {str(mistake): mistake for mistake in mistakes}
+            seen.errors += [refused] if refused is not None and not seen.errors else []
+        errors |= {str(mistake): mistake for mistake in seen.errors}
         warnings |= {str(warning): warning for warning in seen.warnings}
-        if not mistakes and not options.json and not options.quiet:
-            print(f"{scenes.find_scene(name)}: {seen.summary}; no error")
+        if not seen.errors and not options.json and not options.quiet:
+            print(f"{scenes.find_scene(name)}: {'; '.join(seen.notes)}; no error")
     if options.json:
         records = [_record(mistake, "error") for mistake in errors.values()]
         print(json.dumps([*records, *(_record(warning, "warning") for warning in warnings.values())], indent=2))
@@ -87,8 +88,6 @@ def command(options: argparse.Namespace) -> int:
 
 def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | None:
     """Write the start pose of a scene where one can be drawn; returns why it is refused."""
-    from flexclear.commands import show
-
     try:
         if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
             scene = scenes.loaded(name, settings)
@@ -99,80 +98,82 @@ def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | No
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """What a file is, in words, and what in it looks implausible without being wrong."""
+@dataclass
+class Findings:
+    """errors: what is refused.  warnings: what is doubtful.  notes: what it is, and facts of it, in words."""
 
-    summary: str = ""
-    warnings: tuple[InputError, ...] = ()
+    errors: list[FlexclearError] = field(default_factory=list)
+    warnings: list[InputError] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def attempt(self, check: Callable[[], Any], path: Path | None = None) -> bool:
+        """Run a check; what it raises is collected, located in a file.  Returns whether it passed."""
+        try:
+            with scenes.in_file(path):
+                check()
+        except MISTAKES as error:
+            self.errors += error.errors if isinstance(error, InputErrors) else [error]
+            return False
+        return True
 
 
-def examined(name: str, settings: Sequence[str] = ()) -> tuple[list[FlexclearError], Seen]:
+def examined(name: str, settings: Sequence[str] = ()) -> Findings:
     """All mistakes of a scene, sweep or recipe, and what it is where it can be read.
 
     settings: as `--set` has them; a scene is examined with these changes.
     """
-    try:
-        path = scenes.find_scene(name)
-        kind = kind_of_file(read_toml(path))
-        return _of_scene(path, settings) if kind == SCENE else OTHERS[kind](path)
-    except MISTAKES as error:
-        return _each(error), Seen()
+    seen = Findings()
+    seen.attempt(partial(_examine, name, settings, seen))
+    return seen
 
 
-def _of_scene(path: Path, settings: Sequence[str] = ()) -> tuple[list[FlexclearError], Seen]:
-    errors = list[FlexclearError](dangling(compose(path), scenes.recipe_frames, str(path)))
-    scene = None
-    try:
-        scene = scenes.loaded(str(path), settings)
-    except MISTAKES as error:
-        errors += _each(error)
+def _examine(name: str, settings: Sequence[str], seen: Findings) -> None:
+    path = scenes.find_scene(name)
+    {SCENE: _scene, SWEEP: _sweep, RECIPE: _recipe}[kind_of_file(read_toml(path))](path, settings, seen)
+
+
+def _scene(path: Path, settings: Sequence[str], seen: Findings) -> None:
+    seen.errors += dangling(compose(path), scenes.recipe_frames, str(path))
+    loaded: list[Scene] = []
+    seen.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
     # a recipe that several bodies name is meshed once
-    mesh_of = cache(partial(meshed, limits=Limits() if scene is None else scene.limits))
+    mesh_of = cache(partial(meshed, limits=loaded[0].limits if loaded else Limits()))
     bodies = compose(path).get("body", {}).values()
     for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
-        errors += mesh_of(Path(mesh))[1].errors
-    if scene is None:
-        return _once(errors), Seen()
-    errors += _collect([lambda: Graph(scene).up_to("post")], path)
-    errors += _collect(_laws(scene), path)
-    warnings, summary = scenes.implausibilities(scene, settings), scene.summary()
-    if not errors:
-        findings = computed(scene, mesh_of)
-        errors, warnings = findings.errors, [*warnings, *findings.warnings]
-        summary = "; ".join([summary, *findings.notes])
-    return _once(errors), Seen(summary, tuple(warnings))
+        seen.errors += mesh_of(Path(mesh))[1].errors
+    for scene in loaded:
+        seen.attempt(partial(Graph(scene).up_to, "post"), path)
+        for check in _laws(scene):
+            seen.attempt(check, path)
+        seen.warnings += scenes.implausibilities(scene, settings)
+        seen.notes.append(scene.summary())
+        if not seen.errors:
+            compute(scene, mesh_of, seen)
 
 
-def _once(errors: Iterable[FlexclearError]) -> list[FlexclearError]:
-    return list({str(error): error for error in errors}.values())
-
-
-def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
+def _sweep(path: Path, settings: Sequence[str], seen: Findings) -> None:
     """Its own mistakes and those of its scene."""
     from flexclear.commands import sweep
     from flexclear.stages.sweeps import sweep_plan
 
     requested, scene = sweep.read(path)
-    errors, seen = examined(str(scene.path))
-    if not errors:
-        errors = _collect([lambda: sweep_plan.plan(requested, scene, str(path))])
-    return errors, replace(seen, summary=f"a sweep over {', '.join(requested.vary)} of {scene.name}: {seen.summary}")
+    _examine(str(scene.path), (), seen)
+    if not seen.errors:
+        seen.attempt(lambda: sweep_plan.plan(requested, scene, str(path)))
+    seen.notes = [f"a sweep over {', '.join(requested.vary)} of {scene.name}: {'; '.join(seen.notes)}"]
 
 
-def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
+def _recipe(path: Path, settings: Sequence[str], seen: Findings) -> None:
     """A recipe is examined as where a scene names it, with the limits of a scene that says none."""
-    body, findings = meshed(path)
-    if findings.errors:
-        return _once(findings.errors), Seen()
+    body, of_mesh = meshed(path)
+    seen.errors += of_mesh.errors
+    if seen.errors:
+        return
     table = meshing.params(path)["recipe"]
+    mass = f", mass {float(body.rigid.mass):.6g} kg" if body is not None else ""
     frames = ", ".join(table.get("frames", {})) or "none"
-    text = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
-    text += f", mass {float(body.rigid.mass):.6g} kg" if body is not None else ""
-    return [], Seen(text, tuple(findings.warnings))
-
-
-OTHERS = {SWEEP: _of_sweep, RECIPE: _of_recipe}
+    seen.warnings += of_mesh.warnings
+    seen.notes.append(f"a mesh recipe, {table['shape']['type']}, frames: {frames}{mass}")
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
@@ -191,22 +192,6 @@ def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
             yield check
 
 
-def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[FlexclearError]:
-    """What the checks raise; errors without a file are placed in that of `path`."""
-    errors: list[FlexclearError] = []
-    for check in checks:
-        try:
-            with scenes.in_file(path):
-                check()
-        except MISTAKES as error:
-            errors += _each(error)
-    return errors
-
-
-def _each(error: FlexclearError) -> list[FlexclearError]:
-    return list(error.errors) if isinstance(error, InputErrors) else [error]
-
-
 def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
     record = {"severity": severity, "file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
     if not isinstance(mistake, InputError):
@@ -215,21 +200,6 @@ def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
     file, line = (str(location[0]), location[1]) if location else (None, None)
     place = {"file": file, "line": line, "place": mistake.place}
     return {**record, **place, "problem": mistake.problem, "remedy": mistake.remedy}
-
-
-@dataclass
-class Findings:
-    """errors: what is refused.  warnings: what is doubtful.  notes: facts that a summary adds."""
-
-    errors: list[FlexclearError] = field(default_factory=list)
-    warnings: list[InputError] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    def attempt(self, check: Callable[[], Any], path: Path | None = None) -> bool:
-        """Run a check; what it raises is collected, located in a file.  Returns whether it passed."""
-        wrong = _collect([check], path)
-        self.errors += wrong
-        return not wrong
 
 
 @dataclass(frozen=True)
@@ -245,19 +215,22 @@ class Body:
 MeshOf = Callable[[Path], tuple[Body | None, Findings]]
 
 
-def computed(whole: Scene, mesh_of: MeshOf) -> Findings:
+def compute(whole: Scene, mesh_of: MeshOf, seen: Findings) -> None:
     """Meshes and requested modes of a scene whose recipes can be read, and the mechanism made of them."""
-    seen = Findings()
-    bodies = dict(_bodies(whole, seen, mesh_of))
-    for name, body in whole.flexible().items():
+    bodies: dict[str, Body] = {}
+    for name, path in whole.recipes().items():
+        body, of_mesh = mesh_of(Path(path))
+        seen.errors += of_mesh.errors
+        seen.warnings += of_mesh.warnings
+        bodies |= {name: body} if body is not None else {}
+    for name, part in whole.flexible().items():
         if name in bodies:
-            seen.attempt(partial(_modes, bodies[name], name, body), whole.path)
+            seen.attempt(partial(_modes, bodies[name], name, part), whole.path)
     if seen.errors or set(bodies) != set(whole.recipes()):
-        return seen
+        return
     rigid = {name: body.rigid for name, body in bodies.items()}
     if seen.attempt(partial(_assembled, whole, rigid, seen), whole.path):
         _free_motions(whole, rigid, seen)
-    return seen
 
 
 def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findings]:
@@ -267,16 +240,6 @@ def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findi
     if seen.attempt(partial(meshing.check_size, path, limits or Limits())):
         seen.attempt(lambda: made.extend(_meshed(path, seen)))
     return (made[0] if made else None), seen
-
-
-def _bodies(whole: Scene, seen: Findings, mesh_of: MeshOf) -> Iterator[tuple[str, Body]]:
-    """Bodies with a mesh."""
-    for name, path in whole.recipes().items():
-        body, of_recipe = mesh_of(Path(path))
-        seen.errors += [error for error in of_recipe.errors if error not in seen.errors]
-        seen.warnings += [warning for warning in of_recipe.warnings if warning not in seen.warnings]
-        if body is not None:
-            yield name, body
 
 
 def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
@@ -377,7 +340,6 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) ->
 
     Loads, gears and stops are read for it: what is wrong with them is an error of the scene itself.
     """
-    from flexclear.pipeline.core.scene.variants import ideal, loose
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
 

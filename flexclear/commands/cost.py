@@ -190,7 +190,8 @@ class Study:
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
                 "complete": self._complete and all(self._crawls(design) for design in self.undone),
-                "undone": _listed([design.key for design in self.undone]),
+                "undone": _listed([d.key for d in self.undone if not self._crawls(d)]),
+                "given_up": _listed([d.key for d in self.undone if self._crawls(d)]),
                 "peers": list(self.peers),
             },
             inputs=inputs | self._ensembles,
@@ -300,18 +301,6 @@ def bring(
     return study.drawn()
 
 
-def dataset(scene: Scene, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
-    """The study as a dataset that shows its answer in a notebook; budget: [s], or text such as "2min"."""
-    from flexclear.pipeline.post.answers.answered import answered
-    from flexclear.pipeline.post.cost.answer import sentences
-
-    # in this process: workers would run a caller's script again from its top
-    workplace, given = replace(open_workplace(), jobs=1), BUDGET if budget is None else seconds(budget, "budget")
-    made = bring(scene, workplace, budget=given, models=models)
-    result = made.dataset()
-    return answered(result, sentences(result), made.read("accuracy.png"))
-
-
 def tables(made: Made) -> tuple[str, ...]:
     """Those tables of a study that there are, as Markdown."""
     return tuple(made.text(name) for name in PRINTED if name in made.record.files)
@@ -367,7 +356,6 @@ def _measured(design: cost_design.Design, function: str, more: Mapping[str, obje
         params={"simulate": simulation.params(design.scene, ensemble=ensemble), **more},
         inputs={**_bundles(design), "kernels": compiled},
         modules=simulation.modules(design.scene),
-        folder="",
         exclusive=True,
     )
 

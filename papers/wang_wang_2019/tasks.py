@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from flexclear.papers.wang_wang_2019 import DOCUMENTS, figures, timing
@@ -37,7 +36,7 @@ class Scenes:
     def graph(self, name: str) -> Graph:
         """Graph of ``scenes/<name>.toml``."""
         if name not in self.graphs:
-            self.graphs[name] = Graph(load_scene(scene_file(name)))
+            self.graphs[name] = Graph(load_scene(DATA / "scenes" / f"{name}.toml"))
         return self.graphs[name]
 
     def artifact(self, reference: str) -> Task:
@@ -84,24 +83,32 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
 def bring(workplace: Workplace) -> Outcome:
     """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
     scenes = Scenes()
-    shown = workplace.bring(report_tasks(workplace, scenes))
+    drawn = figure_tasks(workplace, scenes)
+    # what takes longest comes first, with all that it needs: film and times
+    drawn.sort(key=lambda task: all(above.stage != "timing" for above in task.inputs.values()))
+    shown = workplace.bring([*scenes.graph(HEADLINE).of("render").values(), *drawn])
     graphs = [graph for graph in scenes.graphs.values() if graph.simulate in shown.records]
     made = workplace.bring([page_task(workplace, shown.records, graphs)])
     check(made)
     return Outcome({**shown.records, **made.records}, shown.failures)
 
 
-def report_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
-    """All figures, tables and pictures. What takes longest comes first, with all that it needs: film and times."""
-    drawn = figure_tasks(workplace, scenes)
-    times = [task for task in drawn if any(above.stage == "timing" for above in task.inputs.values())]
-    others = [task for task in drawn if task not in times]
-    return [*scenes.graph(HEADLINE).of("render").values(), *times, *others]
-
-
 def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
     """One task for each figure and table."""
-    return [_figure_task(name, entry, scenes) for name, entry in figure_index(workplace).items()]
+    return [
+        Task(
+            stage="figures",
+            scene="report",
+            part=name,
+            run=f"{figures.__name__}:draw",
+            params={"figure": name},
+            inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
+            modules=(module_of(figures.__name__, name),),
+            files={file: TREE / file for file in entry["files"]},
+            folder="tables" if name.startswith("table") else "figures",
+        )
+        for name, entry in figure_index(workplace).items()
+    ]
 
 
 def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
@@ -114,7 +121,6 @@ def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
         run=f"{figures.__name__}:index",
         params={"names": names},
         modules=tuple(dict.fromkeys(module_of(figures.__name__, name) for name in names)),
-        folder="",
     )
     (made,) = workplace.made(task)
     index: dict[str, dict[str, Any]] = json.loads(made.read("index.json"))
@@ -137,23 +143,4 @@ def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list
         },
         files={path.relative_to(TREE).as_posix(): path for pattern in PAGES for path in sorted(TREE.glob(pattern))},
         folder="report",
-    )
-
-
-def scene_file(name: str) -> Path:
-    """Where a scene of the project is."""
-    return DATA / "scenes" / f"{name}.toml"
-
-
-def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
-    return Task(
-        stage="figures",
-        scene="report",
-        part=name,
-        run=f"{figures.__name__}:draw",
-        params={"figure": name},
-        inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
-        modules=(module_of(figures.__name__, name),),
-        files={file: TREE / file for file in entry["files"]},
-        folder="tables" if name.startswith("table") else "figures",
     )

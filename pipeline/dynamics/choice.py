@@ -8,7 +8,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def nothing(d):
+def nothing(*given):
     """Do what the parts do of which a mechanism has none."""
 
 

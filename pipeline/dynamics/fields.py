@@ -55,12 +55,16 @@ class Data:
         self.h, self.f, self.w, self.n = h, f, w, n
 
 
-def _number(offset: int) -> property:
-    def read(row: Stretch) -> Any:
-        return row.array[row.begin + offset]
+def _entry(where: Callable[[Any], tuple[Any, Any]]) -> property:
+    """The entry of an array, which `where` finds with its index."""
 
-    def write(row: Stretch, value: Any) -> None:
-        row.array[row.begin + offset] = value
+    def read(of: Any) -> Any:
+        array, index = where(of)
+        return array[index]
+
+    def write(of: Any, value: Any) -> None:
+        array, index = where(of)
+        array[index] = value
 
     return property(read, write)
 
@@ -79,7 +83,9 @@ def _tuple(offset: int, count: int) -> property:
 def _field(offset: int, shape: tuple[int, ...]) -> property:
     if shape in m.TUPLES:
         return _tuple(offset, m.TUPLES[shape])
-    return property(lambda row: Stretch(row.array, row.begin + offset)) if shape else _number(offset)
+    if shape:
+        return property(lambda row: Stretch(row.array, row.begin + offset))
+    return _entry(lambda row: (row.array, row.begin + offset))
 
 
 def _rows(name: str) -> property:
@@ -104,18 +110,11 @@ def _list(index: int) -> property:
 
 def _float(where: tuple[int, int]) -> property:
     stretch, offset = where
-
-    def write(d: Data, value: Any) -> None:
-        d.w[d.h[stretch] + offset] = value
-
-    return property(lambda d: d.w[d.h[stretch] + offset], write)
+    return _entry(lambda d: (d.w, d.h[stretch] + offset))
 
 
 def _integer(index: int) -> property:
-    def write(d: Data, value: Any) -> None:
-        d.n[index] = value
-
-    return property(lambda d: d.n[index], write)
+    return _entry(lambda d: (d.n, index))
 
 
 _MAKERS: tuple[tuple[Callable[[Any], property], dict[str, Any]], ...] = (

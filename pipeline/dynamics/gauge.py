@@ -13,18 +13,25 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, axis, cross, dot, sca
 
 
 @kernel
+def relative_twist(a, b):
+    """Angular velocity of frame b against frame a, and velocity of its origin there."""
+    omega, r = a.omega, sub(b.origin, a.origin)
+    slide = sub(b.velocity, add(a.velocity, cross(omega, r)))
+    return sub(b.omega, omega), slide
+
+
+@kernel
 def measure(d, g):
     """Coordinate of gauge g, its rate, and the wrench (moment, force) of a unit force along it on the second body."""
     gauge = d.gauges[g]
     a, b = d.site_frames[gauge.a], d.site_frames[gauge.b]
-    F, G, p, omega = a.axes, b.axes, b.origin, a.omega
+    F, G, p = a.axes, b.axes, b.origin
     along = axis(F if gauge.side == 0 else G, gauge.axis)
     if gauge.turning:
         sine = dot(axis(F, gauge.sine_f), axis(G, gauge.sine_g))
         cosine = dot(axis(F, gauge.cosine_f), axis(G, gauge.cosine_g))
-        return np.arctan2(sine, cosine), dot(along, sub(b.omega, omega)), along, ZERO
-    r = sub(p, a.origin)
-    slide = sub(b.velocity, add(a.velocity, cross(omega, r)))
+        return np.arctan2(sine, cosine), dot(along, sub(b.omega, a.omega)), along, ZERO
+    r, (_, slide) = sub(p, a.origin), relative_twist(a, b)
     return dot(along, r), dot(along, slide), cross(p, along), along
 
 
@@ -35,19 +42,13 @@ def internal_rate(d, k):
 
 
 @kernel
-def unwound(d, g, angle, rate):
-    """The angle of gauge g with the full turns that it has made; its state follows the rate."""
-    turn = d.gauges[g].turns
-    d.ledger_rate[internal_rate(d, turn)] = rate
-    return angle + 2.0 * np.pi * np.round((d.internal[turn] - angle) / (2.0 * np.pi))
-
-
-@kernel
 def counted(d, g):
-    """As `measure`, an angle with the full turns that it has made if the gauge counts them."""
+    """As `measure`, an angle with its full turns if the gauge counts them; its state then follows the rate."""
     value, rate, moment, force = measure(d, g)
-    if d.gauges[g].turns >= 0:
-        value = unwound(d, g, value, rate)
+    turn = d.gauges[g].turns
+    if turn >= 0:
+        d.ledger_rate[internal_rate(d, turn)] = rate
+        value += 2.0 * np.pi * np.round((d.internal[turn] - value) / (2.0 * np.pi))
     return value, rate, moment, force
 
 

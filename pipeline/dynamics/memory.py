@@ -299,7 +299,7 @@ COLLOCATION_ROWS = 13
 (COLLOCATION,) = _stretches(f"collocation:{COLLOCATION_ROWS}*ny*?n_closure_rows")
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
-LAST_PIVOT, WANTED_PIVOT = _floats(PIVOT, "last_pivot wanted_pivot")
+LAST_PIVOT, LEAST_PIVOT = _floats(PIVOT, "last_pivot least_pivot")
 #: what a contact does now; bent: what the bristles store
 TOUCH = work(
     "gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3", "n_contacts"

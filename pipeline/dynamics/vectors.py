@@ -195,6 +195,25 @@ def from_quaternion(w, x, y, z):
 
 
 @kernel
+def to_quaternion(R):
+    """Quaternion (w, x, y, z) of a rotation matrix, of any norm and sign, by its largest component (Shepperd 1978)."""
+    xx, yy, zz = R[0], R[4], R[8]
+    w, x, y, z = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz
+    wx, wy, wz = R[7] - R[5], R[2] - R[6], R[3] - R[1]
+    xy, yz, zx = R[1] + R[3], R[5] + R[7], R[2] + R[6]
+    # four times the products of two components, of one with all of them
+    if w >= x and w >= y and w >= z:
+        x, y, z = wx, wy, wz
+    elif x >= y and x >= z:
+        w, y, z = wx, xy, zx
+    elif y >= z:
+        w, x, z = wy, xy, yz
+    else:
+        w, x, y = wz, zx, yz
+    return w, x, y, z
+
+
+@kernel
 def about_z(angle):
     """Rotation matrix of a turn about z [rad]."""
     c, s = np.cos(angle), np.sin(angle)

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from flexclear.commands import scenes as stages
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
@@ -17,6 +18,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.stages.workplace import Workplace, open_workplace
+from tests.properties.mechanisms import simulated
 
 TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
@@ -38,12 +40,10 @@ def _table(value: object) -> object:
 
 
 @cache
-def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
+def run(name: str, overrides: Overrides = (), *, horizon: bool = False) -> xr.Dataset:
     """The run of a scene; overrides as ((place, value), ...), a table as pairs too."""
-    from flexclear.pipeline import dynamics
-
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override={place: _table(value) for place, value in overrides})
-    return dynamics.simulate(scene, bundles(scene), silent)
+    return dynamics.simulate(scene, bundles(scene), silent) if horizon else simulated(scene, bundles(scene))
 
 
 def of_kind(dataset: xr.Dataset, kind: str) -> np.ndarray:

@@ -11,6 +11,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import simulated
 
 CSJ = TREE / "scenes" / "sps4" / "csj.toml"
 FULL = TREE / "scenes" / "sps4" / "far_csj_cb.toml"
@@ -23,24 +24,24 @@ def quiet(fraction, text):
 
 @pytest.fixture(scope="module")
 def reference():
-    return dynamics.simulate(load_scene(CSJ, {"solver.rtol": 1e-14}), {}, quiet)
+    return simulated(load_scene(CSJ, {"solver.rtol": 1e-14}))
 
 
 @pytest.mark.parametrize("requested", [10.0**-k for k in (2, 3, 5, 7, 9)])
-def test_the_delivered_error_is_the_wanted_one(reference, requested):
+def test_the_delivered_error_is_the_requested_one(reference, requested):
     scene = load_scene(CSJ, {"accuracy": {"platform": {"velocity": {"relative": requested}}}})
     run = dynamics.simulate(scene, {}, quiet)
     velocity = parse("platform.velocity", scene.owners())
     size = quantities.scale(reference, velocity)
     delivered = quantities.error(run, reference, velocity) / size
     assert run.attrs["accuracy_verdict"] == "met"
-    # a run is accepted whose estimate is at most what is wanted; estimates are good to some per cent, and at 1e-9 the
+    # a run is accepted whose estimate is at most that; estimates are good to some per cent, and at 1e-9 the
     # reference's own rounding, 4e-10 m/s, is as large as what is compared
     assert delivered < 3.0 * requested
     # nor is it too dear: errors jump from tolerance to tolerance, as impacts do, but a ten times looser one misses, or
     # its energy is refused
     with suppress(SolverError):
-        looser = dynamics.simulate(load_scene(CSJ, {"solver.rtol": 10.0 * run.attrs["accuracy_rtol"]}), {}, quiet)
+        looser = simulated(load_scene(CSJ, {"solver.rtol": 10.0 * run.attrs["accuracy_rtol"]}))
         assert quantities.error(looser, reference, velocity) / size > requested
 
 
@@ -65,7 +66,7 @@ def test_what_cannot_be_had_is_said_with_the_best_there_is(reference):
 
 @pytest.mark.slow
 def test_of_a_chaotic_run_it_is_said_how_long_it_can_be_had():
-    """With an undamped flexible rod beside the clearance, motions part so fast that no tolerance holds to the end."""
+    """With an undamped flexible rod next to the clearance, motions part so fast that no tolerance holds to the end."""
     scene = load_scene(FULL, {"accuracy": {"platform.velocity": {"relative": 1e-8}}})
     verdict = dynamics.simulate(scene, bundles(scene), quiet).attrs["accuracy_verdict"]
     assert "times what is requested" in verdict
@@ -74,15 +75,15 @@ def test_of_a_chaotic_run_it_is_said_how_long_it_can_be_had():
 
 
 @pytest.mark.parametrize(
-    "asked, told",
+    "asked, reported",
     [
         ({"platform.peak_force": "1 N"}, "known: A1.peak_force"),
         ({"platform.position": {"relative": 2.0}}, "less than 1"),
         ({"platform.position": -1.0}, "greater than 0"),
     ],
 )
-def test_wrong_wishes_are_refused_before_any_work(asked, told):
-    with pytest.raises(InputError, match=told):
+def test_wrong_wishes_are_refused_before_any_work(asked, reported):
+    with pytest.raises(InputError, match=reported):
         load_scene(CSJ, {"accuracy": asked})
 
 

@@ -1,4 +1,4 @@
-"""Exact frequencies beside those of a mesh; normal modes of the paper, to every printed digit."""
+"""Exact frequencies next to those of a mesh; normal modes of the paper, to every printed digit."""
 
 from pathlib import Path
 from typing import Any

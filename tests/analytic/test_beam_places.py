@@ -20,7 +20,7 @@ POSES: dict[str, dict[str, Any]] = {
     # a kilometre away, where 1e-16 of the place is 1e-10 of a millimetre
     "far": {"position": [600.0, -700.0, 400.0], "rotation_vector": [0.4, -1.1, 0.7]},
 }
-#: a rod without any symmetry that would leave shapes open: other stiffness in each plane, a ball beside the axis
+#: a rod without any symmetry that would leave shapes open: other stiffness in each plane, a ball next to the axis
 ROD: dict[str, Any] = RECIPE | {
     "theory": "timoshenko",
     "torsion": "quadratic",

@@ -113,7 +113,7 @@ def test_skew_axes_are_the_rod_turned_about_itself() -> None:
     np.testing.assert_allclose(np.abs(a["mode_mode_moment"].values), np.abs(expected), atol=1e-8)
 
 
-def test_inertia_given_apart_enters_the_mass_alone() -> None:
+def test_inertia_given_separately_enters_the_mass_alone() -> None:
     """A general section that lends the rod ten times the spin of its area: torsion falls by the root of ten."""
     plain, heavy = rotated(0.0), rotated(0.0)
     heavy["inertia"] = [10.0 * (plain["second_y"] + plain["second_z"]), plain["second_y"], plain["second_z"]]

@@ -139,6 +139,6 @@ def test_tapered_tube_and_its_mass() -> None:
     assert mass == pytest.approx(RHO * 0.75 * frustum, rel=1e-14)
 
 
-def test_no_closed_form_of_a_uniform_rod_is_shown_beside_a_taper() -> None:
+def test_a_taper_has_no_closed_form_of_a_uniform_rod() -> None:
     modes = solve(taper(CONE, 8), "free-free", 7)
     assert not [name for name in modes.data_vars if str(name).startswith("exact")]

@@ -66,7 +66,9 @@ def test_shares_are_those_of_a_direct_static_solution(
 
 
 @pytest.mark.parametrize("condition, count", BASES)
-def test_a_bundle_tells_its_shares_from_its_own_numbers(rod: xr.Dataset, condition: str, count: int) -> None:
+def test_the_compliance_fractions_of_a_bundle_follow_from_its_own_numbers(
+    rod: xr.Dataset, condition: str, count: int
+) -> None:
     data = bundle.build(rod, solve(rod, condition, count))
     found = core.fractions(core.of_bundle(data), data["compliance_full"].values)
     np.testing.assert_allclose(found, data["compliance_share"].values, rtol=0.0, atol=1e-9)

@@ -107,7 +107,7 @@ def test_a_bushing_resists_beyond_half_a_turn_as_below(share: float, direction: 
     assert np.abs(run.energy_error).max() < 1e-9 * 0.5 * stiffness * largest**2
 
 
-def test_energy_is_kept_while_a_turning_body_passes_half_a_turn_about_changing_axes() -> None:
+def test_energy_is_conserved_while_a_body_passes_half_a_turn_about_changing_axes() -> None:
     """Unequal stiffness moves the axis of rotation: the torque is the slope of one energy on both sides."""
     run = simulate(turning([20.0, 35.0, -30.0], [1e3] * 3 + [2.0, 1.5, 1.0], 1.0))
     size = np.linalg.norm(run.bushing_rotation.values[:, 0], axis=1)

@@ -12,7 +12,7 @@ CLEARANCE, MASS, GRAVITY = 5e-4, 0.36, 9.81
 
 
 def at(angle: float, static: float, dynamic: float, end: str) -> Overrides:
-    """Let go at rest at an angle [rad] beside the lowest point."""
+    """Let go at rest at an angle [rad] next to the lowest point."""
     law = (
         ("law", "lugre"), ("static", static), ("dynamic", dynamic), ("v_stribeck", 1e-3),
         ("bristle_stiffness", 1e5), ("bristle_damping", 20.0),

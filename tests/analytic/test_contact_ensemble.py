@@ -27,7 +27,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engines
 from flexclear.pipeline.post.single_run.series import derive
 from tests.analytic.mechanism_runs import TREE, run
-from tests.properties.mechanisms import joint, rigid
+from tests.properties.mechanisms import joint, rigid, simulated
 from tests.properties.mechanisms import scene as written
 from tests.reference import contact_solutions as exact
 
@@ -45,7 +45,7 @@ def members() -> xr.Dataset:
     return analyses.ensemble(scene(), {}, silent)
 
 
-def test_members_start_the_asked_distance_apart_and_fall_alike() -> None:
+def test_members_start_at_the_requested_distance_and_fall_alike() -> None:
     position = members().position.sel(body="ball").values
     offset = position[:, 0]
     # a displacement from a solution of linear equations, of rounding size here
@@ -56,7 +56,7 @@ def test_members_start_the_asked_distance_apart_and_fall_alike() -> None:
     assert position[:, k, 2] - offset[:, 2] == pytest.approx(np.full(MEMBERS, -0.5 * 9.81 * time[k] ** 2), abs=1e-10)
 
 
-def test_members_tell_impacts_and_their_share_of_the_time() -> None:
+def test_members_record_their_impacts_and_the_fraction_of_time_in_contact() -> None:
     (known,) = (b for b in exact.bounces(1.0, 1e8, 0.7, 9.81, 0.1, END))
     assert members().impact_count.values.tolist() == [[1]] * MEMBERS
     # a micrometre more or less to fall changes the speed by 5e-6 of it, the duration by a fifth of that
@@ -121,7 +121,7 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
 
 
 def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others are told at their next pause; nobody waits for ever."""
+    """The others end at their next pause; nobody waits for ever."""
     monkeypatch.setattr(cores, "cores", lambda: 1)
     proper, begun = trajectory._begin_closed, itertools.count()
 
@@ -136,14 +136,14 @@ def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyP
     assert threading.active_count() == 1
 
 
-def test_of_members_side_by_side_the_first_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_concurrent_members_the_first_that_fails_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cores, "cores", lambda: 2)
     ended = []
 
     def work(k: int, alive: Progress) -> None:
         if k in (1, 3):
             raise SolverError(f"member {k}")
-        while k == 2:  # until it is told that another one has failed
+        while k == 2:  # until another one has failed
             try:
                 alive(None, "")
             except BaseException:
@@ -187,7 +187,7 @@ def carried(**path: Any) -> Scene:
 def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
     """Nanometres apart, after a few impacts: what members and run differ by is the sensitivity of the impacts."""
     asked = carried(actuators=["rail"])
-    known, members = dynamics.simulate(asked, {}, silent), analyses.ensemble(asked, {}, silent)
+    known, members = simulated(asked), analyses.ensemble(asked, {}, silent)
     closings = known.event_kind.values == "closing"
     assert 2 <= closings.sum() < 20
     assert members.impact_count.values.tolist() == [[closings.sum()]] * 2

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import simulate
 from tests.analytic.mechanism_runs import Overrides, of_kind, run
+from tests.properties.mechanisms import simulate
 
 BOUNCE, ROLLING = "checks/bounce", "checks/socket_rolling"
 CLEARANCE, GRAVITY, MASS, STIFFNESS = 0.1, 9.81, 1.0, 1e8
@@ -21,7 +20,7 @@ def thrown_up(beyond: float) -> xr.Dataset:
 
 
 @pytest.mark.parametrize("beyond", [1e-12, 1e-9, 1e-6])
-def test_a_grazing_contact_is_found_however_short_it_is(beyond: float) -> None:
+def test_a_grazing_contact_is_located_however_short_it_is(beyond: float) -> None:
     dataset = thrown_up(beyond)
     (begun,), (ended,) = of_kind(dataset, "closing"), of_kind(dataset, "opening")
     # the gap is located to 1e-13 of the clearance, the speed is the root of twice that share of `beyond`
@@ -41,7 +40,7 @@ def test_a_near_miss_is_no_contact(short: float) -> None:
     assert float(dataset.contact_gap.min()) == pytest.approx(short, abs=0.5 * GRAVITY * 0.5e-3**2)
 
 
-def test_contacts_at_one_time_are_all_found_and_do_not_see_each_other() -> None:
+def test_simultaneous_contacts_are_all_located_and_independent() -> None:
     ball = {"type": "rigid", "mass": MASS, "inertia": [4e-3] * 3, "pose": {}, "frames": {"centre": {}}}
     law = {"law": "lankarani-nikravesh", "restitution": 0.7, "stiffness": STIFFNESS}
     joint = {"type": "clearance-spherical", "clearance": CLEARANCE, "ball_radius": 0.1, "normal": law}
@@ -54,7 +53,7 @@ def test_contacts_at_one_time_are_all_found_and_do_not_see_each_other() -> None:
         "time": {"end": 0.5},
         "output": {"interval": 0.01},
     }
-    dataset, alone = simulate(Scene.model_validate(table), {}, lambda fraction, text: None), run(BOUNCE)
+    dataset, alone = simulate(table), run(BOUNCE)
     begun, known = of_kind(dataset, "closing"), of_kind(alone, "closing")[:2]
     assert sorted(dataset.event_contact.values[begun[:3]]) == sorted(dataset.contact.values)
     assert dataset.event_time.values[begun] == pytest.approx(np.repeat(alone.event_time.values[known], 3), abs=1e-8)
@@ -91,7 +90,7 @@ def test_a_stop_of_the_sliding_within_one_step_is_noted() -> None:
     x = dataset.velocity.sel(body="ball", axis="x").values
     turns = np.flatnonzero(x[1:-1] * x[2:] < 0.0) + 1  # the first output is at rest
     assert len(turns) == 2
-    # beside the start's
+    # next to the start's
     assert len(stops) == len(turns)
     assert len(goes) == len(turns) + 1
     for k, stop, go in zip(turns, stops, goes[1:], strict=True):

@@ -60,7 +60,7 @@ def known_peak(a: float) -> float:
 
 
 @pytest.mark.parametrize("restitution", [0.05, 0.2, 0.5, 0.9])
-def test_peak_force_is_found_however_early_it_comes(restitution: float) -> None:
+def test_the_peak_force_is_located_however_early_it_comes(restitution: float) -> None:
     dataset = run(BOUNCE, normal(law="gonthier", delivered_restitution=restitution))
     a = math.nan
     low, high = 0.0, (1.0 - 1e-12) / restitution

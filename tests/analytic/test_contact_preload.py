@@ -104,7 +104,7 @@ def test_a_start_in_contact_without_a_declared_speed_is_refused() -> None:
         run(PRELOAD, (("joint.contact.initial_approach_speed", None),))
 
 
-def test_slope_of_friction_is_told_as_the_stiffness_that_limits_the_steps() -> None:
+def test_the_slope_of_friction_is_reported_as_the_stiffness_that_limits_the_steps() -> None:
     dataset = run(ROLLING)
     # slope 1.5 mu_s N / v_s over the mass that the contact point feels, 1/m + R^2/I of a solid ball
     pressed = float(dataset.contact_normal_force.max())

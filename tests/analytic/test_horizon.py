@@ -1,10 +1,12 @@
 """The predictability horizon: growth of a small perturbation of the start."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, lasting
+from flexclear.pipeline.core.artifacts.quantities import DIVERGED, PERTURBATION, SEPARATED, lasting, separated_from
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
@@ -14,8 +16,11 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.post.single_run.series import horizon
-from tests.analytic.mechanism_runs import TREE, run
+from tests.analytic import mechanism_runs
+from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import ground, joint, rigid, scene
+
+run = partial(mechanism_runs.run, horizon=True)
 
 
 def test_rigid_clearance_converges_over_the_whole_stroke():
@@ -142,15 +147,50 @@ def test_without_a_free_coordinate_nothing_can_separate(what: str):
 @pytest.mark.parametrize(
     "separated, first",
     [
-        ([0, 1, 1, 0, 0, 0, 0, 0], None),
-        ([0, 1, 1, 0, 1, 1, 1, 1], 4),
-        ([0, 0, 0, 0, 0, 0, 1, 1], 6),
-        ([1, 1, 1, 1, 0, 0, 0, 0], 0),
-        ([0] * 8, None),
+        ([0, 1, 1, 0, 0, 0, 0, 0], []),
+        ([0, 1, 1, 0, 1, 1, 1, 1], [4, 5, 6, 7]),
+        ([0, 0, 0, 0, 0, 0, 1, 1], [6, 7]),
+        ([1, 1, 1, 1, 0, 0, 0, 0], [0, 1]),
+        ([0] * 8, []),
     ],
 )
-def test_a_separation_counts_where_it_lasts(separated: list[int], first: int | None):
-    assert lasting(np.arange(8.0), np.array(separated, dtype=bool), 2.5) == first
+def test_a_separation_counts_where_it_lasts(separated: list[int], first: list[int]):
+    assert lasting(np.arange(8.0), np.array(separated, dtype=bool), 2.5).tolist() == first
+
+
+#: separations of two runs: close, visible, diverged
+CLOSE, VISIBLE, FAR = 0.5 * SEPARATED, 2.0 * SEPARATED, 2.0 * DIVERGED
+
+
+@pytest.mark.parametrize(
+    "separation, first",
+    [
+        ([CLOSE] * 72, None),
+        # a moment of an impact, and an impact that is forgotten after some others
+        ([CLOSE] * 10 + [FAR] + [CLOSE] * 61, None),
+        ([CLOSE] * 10 + [VISIBLE] * 20 + [CLOSE] * 42, None),
+        # visible to the end, but for a moment
+        ([CLOSE] * 10 + [VISIBLE] * 20 + [CLOSE] * 2 + [VISIBLE] * 40, 10),
+        # one that is forgotten, then one that is not
+        ([CLOSE] * 10 + [VISIBLE] * 5 + [CLOSE] * 35 + [VISIBLE] * 22, 50),
+        # what comes after two runs have diverged counts no more
+        ([CLOSE] * 10 + [VISIBLE] * 10 + [FAR] * 5 + [CLOSE] * 47, 10),
+        ([CLOSE] * 10 + [FAR] * 5 + [CLOSE] * 57, 10),
+    ],
+)
+def test_the_horizon_is_where_runs_are_separated_from_then_on(separation: list[float], first: int | None):
+    assert separated_from(np.arange(72.0), np.array(separation), 71.0) == first
+
+
+def test_damped_motion_that_forgets_its_impacts_is_believed_to_the_end():
+    """Visibly separated for 20 ms by one impact, but at tighter tolerances it converges over the whole stroke."""
+    loose, tight = (run("sps4/variants/far_csj_cb_damped", (("solver.rtol", rtol),)) for rtol in (1e-9, 1e-11))
+    for damped in (loose, tight):
+        assert float(damped.horizon) == damped.time.values[-1]
+        assert damped.separation.values.max() > SEPARATED
+    size = float(np.linalg.norm(tight.velocity, axis=-1).max())
+    # 3e-4 here
+    assert np.abs((loose.velocity - tight.velocity).values).max() < 10.0 * SEPARATED * size
 
 
 def test_a_run_without_contacts_has_no_perturbed_run():

@@ -81,8 +81,8 @@ def test_the_perturbed_run_diverges_when_the_ensemble_does() -> None:
 @pytest.mark.slow
 def test_so_it_is_in_sixty_mechanisms() -> None:
     agree, diverged = agreeing(range(60))
-    assert diverged >= 20  # 28 here
-    assert agree >= 54  # 57 here
+    assert diverged >= 20  # 29 here
+    assert agree >= 54  # 56 here
 
 
 # Tangent motions ----------------------------------------------------------------------------------------------------

@@ -7,10 +7,9 @@ import pytest
 import xarray as xr
 
 from flexclear import load_scene
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, run
+from tests.properties.mechanisms import simulated
 from tests.reference import contact_solutions as exact
 
 BOUNCE, CSJ = "checks/bounce", "sps4/csj"
@@ -119,7 +118,7 @@ def without_friction(scene: Scene) -> Scene:
 def pressed_run(integrator: str, rtol: float) -> xr.Dataset:
     solver = {"integrator": integrator, "rtol": rtol}
     scene = without_friction(load_scene(PRESSED, {**SHORT, "solver": solver}))
-    return dynamics.simulate(scene, bundles(scene), silent)
+    return simulated(scene, bundles(scene))
 
 
 def velocity_error(integrator: str, rtol: float) -> float:

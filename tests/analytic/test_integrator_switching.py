@@ -1,4 +1,4 @@
-"""Explicit methods that crawl are noticed and replaced, a fixed step is told; implicit ones step over a stiff mode."""
+"""Explicit methods that crawl are noticed and replaced, fixed steps are reported; implicit ones cross stiff modes."""
 
 from typing import Any
 
@@ -22,11 +22,11 @@ LOOK, HOPELESS = 1000, 1100
 CLOSE = {"members": 2, "perturbation": "1e-12 m"}
 
 
-def run(told: list[str] | None = None, end: str = END, **solver: object) -> xr.Dataset:
-    """The first milliseconds; what is said on the way is appended to `told`."""
+def run(reported: list[str] | None = None, end: str = END, **solver: object) -> xr.Dataset:
+    """The first milliseconds; its progress reports are appended to `reported`."""
     changes = {"time.end": end} | {f"solver.{key}": value for key, value in solver.items()}
     scene = load_scene(TREE / "scenes" / ROLLING, override=changes)
-    said = [] if told is None else told
+    said = [] if reported is None else reported
     return dynamics.simulate(scene, {}, lambda fraction, text: said.append(text) if fraction is None else None)
 
 
@@ -42,11 +42,11 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("integrator, rtol", [("dop853", 1e-10), ("dopri5", 1e-6)])
 def test_an_explicit_method_that_crawls_hands_over_where_it_is(integrator: str, rtol: float) -> None:
     """At tolerances that stability, not accuracy, makes dear."""
-    told: list[str] = []
-    made, known = run(told, integrator=integrator, rtol=rtol), run(integrator="radau", rtol=rtol)
+    reported: list[str] = []
+    made, known = run(reported, integrator=integrator, rtol=rtol), run(integrator="radau", rtol=rtol)
     assert made.attrs["method"] == "radau"
     assert "limited by stability" in made.attrs["switched"]
-    assert any("going on with radau" in text for text in told)
+    assert any("going on with radau" in text for text in reported)
     # what the explicit method did is part of the run: its steps and its rows
     assert made.attrs["stiff_steps"] > 0
     assert known.attrs["stiff_steps"] == 0
@@ -85,7 +85,7 @@ def test_members_of_an_ensemble_hand_over_too() -> None:
 
 
 @pytest.mark.parametrize("step, stable", [("1e-5 s", False), ("1e-6 s", True)])
-def test_a_fixed_step_beyond_stability_is_told(step: str, stable: bool) -> None:
+def test_a_fixed_step_beyond_stability_is_reported(step: str, stable: bool) -> None:
     """The slope of friction has some 4e5 1/s here, and rk4 is stable up to 2.785 over the step."""
     made = run(integrator="rk4", step=step, end="0.3 ms")
     assert ("too long for rk4 to be stable" in made.attrs["warnings"]) is not stable

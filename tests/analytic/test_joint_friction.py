@@ -36,10 +36,10 @@ BRISTLES = {
 }
 #: slopes of the guides of the blocks: above the coefficient of friction, and below
 STEEP, FLAT = np.arctan(0.5), np.arctan(0.1)
-#: guides: length, and how far beside them a force of 50 N pushes; the second one locks, as 2 * 0.2 * 0.15 > 0.04
+#: guides: length, and how far next to them a force of 50 N pushes; the second one locks, as 2 * 0.2 * 0.15 > 0.04
 LENGTH, ARMS, PUSH = 0.04, {"free": 0.05, "locked": 0.15}, 50.0
 RADIUS, MASS, INERTIA = 0.01, 2.0, 0.005
-#: pin of the pendulum beside its mass centre [m]
+#: pin of the pendulum next to its mass centre [m]
 HANGING = 0.15
 #: the cart with a rod on it that friction may jam: masses, angle of the rod, coefficient
 CART, BOB, TILT = 0.1, 1.0, np.radians(30.0)
@@ -68,7 +68,7 @@ def rigid(pose: Table | None = None, frames: Table | None = None, **more: Any) -
 
 
 def workshop(coefficient: float = 0.5) -> Table:
-    """Blocks on slopes, guides pushed beside their axes, a pendulum, wheels, a ball, shaft, cardan joint and cart."""
+    """Blocks on slopes, guides pushed next to their axes, a pendulum, wheels, a ball, shaft, cardan joint and cart."""
     bodies: Table = {"ground": {"type": "ground", "frames": {"steep": guide(STEEP), "flat": guide(FLAT), "O": {}}}}
     bodies["ground"]["frames"] |= {"across": ACROSS, "level": guide(0.0), "cardan": {}}
     bodies["slider"] = rigid(guide(STEEP))

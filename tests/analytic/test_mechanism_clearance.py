@@ -129,8 +129,8 @@ def test_the_scenes_layout_has_table_8s_angle_and_displacement_and_misses_its_ve
 
 
 @pytest.mark.slow
-def test_second_derivation_gives_its_kept_numbers() -> None:
-    """Some minutes: the numbers in csj.json are what the code beside them computes."""
+def test_the_second_derivation_gives_its_stored_numbers() -> None:
+    """Some minutes: the numbers in csj.json are what the code next to them computes."""
     result = simulate(until=0.0165)
     expected = KNOWN["impact_start"]
     assert [i.start for i in result.impacts] == pytest.approx(expected[: len(result.impacts)], abs=1e-8)

@@ -32,8 +32,8 @@ SHORT = {"time.end": "20 ms", "output.interval": "1 ms"}
 WANTED = {"platform.velocity": "0.1 %"}
 
 
-def simulated(scene: Scene, told: list[str] | None = None) -> xr.Dataset:
-    said = [] if told is None else told
+def simulated(scene: Scene, reported: list[str] | None = None) -> xr.Dataset:
+    said = [] if reported is None else reported
     return dynamics.simulate(
         scene, bundles(scene), lambda fraction, text: said.append(text) if fraction is None else None
     )
@@ -56,16 +56,16 @@ def test_forces_of_rounding_are_requested_by_no_default() -> None:
 
 
 def test_ringing_modes_get_the_method_that_follows_them() -> None:
-    told: list[str] = []
+    reported: list[str] = []
     scene = load_scene(RINGING, {**SHORT, "accuracy": WANTED})
-    run = simulated(scene, told)
+    run = simulated(scene, reported)
     assert run.attrs["method"] == "exponential"
     assert "the modes' fastest vibration" in run.attrs["method_reason"]
-    assert run.attrs["method_reason"] in told
+    assert run.attrs["method_reason"] in reported
     velocity = parse("platform.velocity", scene.owners())
     error = quantities.error(run, reference(), velocity) / quantities.scale(reference(), velocity)
     assert run.attrs["accuracy_verdict"] == "met"
-    assert error < 3e-3  # what is wanted, and the estimate's own doubt, as in test_accuracy
+    assert error < 3e-3  # what is requested, and the estimate's own doubt, as in test_accuracy
     # an explicit method is stable with 140 evaluations per millisecond; here some 25 are taken
     assert run.attrs["evaluations"] < 0.5 * reference().attrs["evaluations"]
 
@@ -199,7 +199,7 @@ def test_where_the_explicit_method_is_dear_the_stiff_one_is_tried() -> None:
     assert dear.best(1e-14) == "dop853"
 
 
-def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
+def test_a_run_that_was_handed_over_reports_the_cost_of_its_last_method() -> None:
     early, late = known(exponential=(1e-4, 5e4)), known(exponential=(1e-4, 5e4))
     for suit, left in ((early, (4e4, 0.2)), (late, (4e4, 0.97))):
         suit.expected["exponential"], suit.left = 9e4, left
@@ -208,8 +208,8 @@ def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
     assert "radau" not in late.seen
 
 
-def test_what_becomes_of_a_twin_tells_nothing_of_its_run() -> None:
-    """The twin may be handed on where the run is not, and is made before, beside or after it."""
+def test_the_outcome_of_a_perturbed_run_is_not_reported_as_that_of_the_run() -> None:
+    """The twin may be handed on where the run is not, and is made before, next to or after it."""
     suit = known(exponential=(1e-4, 400.0))
     solver = SimpleNamespace(integrator="exponential")
     engine = SimpleNamespace(model=SimpleNamespace(scene=SimpleNamespace(solver=solver)), start=0.0)
@@ -227,7 +227,7 @@ def looks(*pairs: tuple[float, int], stiff: float = 0.0) -> list[Look]:
     return [Look(time, used, used // 12, int(stiff * used / 12)) for time, used in pairs]
 
 
-def test_a_pace_that_drops_late_is_told_when_that_has_cost_as_much_as_all_before() -> None:
+def test_a_late_drop_of_the_progress_rate_is_reported_when_it_has_cost_as_much_as_all_before() -> None:
     even, late = [(0.1 * k, 100 * k) for k in range(9)], [(0.8 + 1e-6 * k, 800 + 100 * k) for k in range(1, 9)]
     assert pace(looks(*even), 500) == pytest.approx(1000.0)
     assert pace(looks(*even, *late[:7]), 500) < 1e4

@@ -123,7 +123,7 @@ def test_dense_and_sparse_solvers_agree_on_held_functionals(
     # eigenvalues span 1.2e6: the lowest is known to eps times that, 2.6e-10; ten times that
     np.testing.assert_allclose(sparse.values, dense.values, rtol=3e-9)
     for found in (dense, sparse):
-        # what is held moves by rounding only, beside motions of 1 / sqrt(m) = 2
+        # what is held moves by rounding only, next to motions of 1 / sqrt(m) = 2
         assert np.abs(held @ found.shapes).max() < 1e-9
 
 
@@ -155,7 +155,7 @@ def test_modes_up_to_a_share_of_the_mass(rod: xr.Dataset) -> None:
     assert axial == [1, 2]
 
 
-def test_a_mechanism_is_told_from_a_body(body: Flexibility) -> None:
+def test_a_mechanism_is_distinguished_from_a_body(body: Flexibility) -> None:
     """A hinge: the stiffness of a chain whose middle node is cut in two that share their place only."""
     middle = body.model.position[:, 0] < 0.11
     cut = sp.diags_array(middle.astype(float)) @ body.model.stiffness @ sp.diags_array(middle.astype(float))

@@ -24,7 +24,7 @@ from flexclear.pipeline.post.overview import comparison
 from flexclear.pipeline.post.overview.curves import curves
 from tests.analytic import stress_runs
 from tests.properties import mechanisms
-from tests.properties.mechanisms import frame, joint, rigid
+from tests.properties.mechanisms import frame, joint, rigid, simulated
 
 SCENES = Path(__file__).parents[2] / "scenes"
 #: scenes whose parts own all kinds of quantities between them, and how much of each is run
@@ -71,7 +71,7 @@ def driven() -> Scene:
 def run(name: str) -> xr.Dataset:
     if name == FLEXIBLE:
         return stress_runs.run(FLEXIBLE, {"time.end": "2 ms"})
-    return simulate(scene(name), {}, silent)
+    return simulated(scene(name))
 
 
 def names_in(data: xr.Dataset) -> list[str]:

@@ -114,7 +114,7 @@ def shape_of_motion(name: str, number: int) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["four-bar", "Bricard with a line", "Sarrus", "revolute and spherical"])
 def test_the_motion_is_the_same_turned_scaled_and_reordered(name: str) -> None:
-    """From nanometres to kilometres, other trees, other closures, other rows kept."""
+    """From nanometres to kilometres, other trees, other closures, other rows selected."""
     known = shape_of_motion(name, 0)
     assert np.ptp(known, axis=0).max() > 1e-3
     for number in (1, 2):

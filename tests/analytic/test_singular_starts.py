@@ -54,7 +54,7 @@ def test_a_run_leaves_a_singular_pose_along_the_branch_that_its_velocities_belon
         lambda _, y: [y[1], pull * np.sin(y[0])],
         (0.0, 0.5), [0.5 * np.pi, SPEED], "DOP853", t_eval=dataset.time.values, rtol=1e-13, atol=1e-13,
     )  # fmt: skip
-    # rtol 1e-12, and slopes of which rounding beside the pose leaves 1e-11
+    # rtol 1e-12, and slopes of which rounding next to the pose leaves 1e-11
     assert error(dataset, known.y[0]) < 1e-9
     assert np.abs(dataset.energy_error.values).max() < 1e-8 * float(dataset.kinetic.max())
     # the start itself is the limit of its neighbours, whose fourth-order share is below 1e-6

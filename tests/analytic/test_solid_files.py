@@ -85,7 +85,7 @@ def test_materials_and_frames_by_physical_names(tmp_path: Path) -> None:
     np.testing.assert_array_equal(density, np.where(x < 0.05, 7800.0, 2740.0))
 
 
-def test_gmsh_4_names_curves_and_points_beside_its_regions(tmp_path: Path) -> None:
+def test_gmsh_4_names_curves_and_points_as_well_as_regions(tmp_path: Path) -> None:
     """A file as Gmsh 4.15 writes it, whose volume is bounded by surfaces with higher numbers than it has cells."""
     nodes, cells = lattice.cut(*lattice.block(SIZE, (1, 1, 1)), "hex8")
     foot = np.flatnonzero(nodes[:, 0] < 1e-9)[[0, 1, 3, 2]]

@@ -33,7 +33,7 @@ TABLE = {
 
 
 def points() -> tuple[np.ndarray, np.ndarray]:
-    """Six mass points about a centre beside each node: masses (nodes, 6) and places from the node (nodes, 6, 3)."""
+    """Six mass points about a centre next to each node: masses (nodes, 6) and places from the node (nodes, 6, 3)."""
     random = np.random.default_rng(20190702)
     mass = np.repeat(random.uniform(0.01, 0.03, (NODES, 1)) / 6.0, 6, axis=1)
     axes = np.linalg.qr(random.normal(size=(NODES, 3, 3)))[0] * random.uniform(0.002, 0.01, (NODES, 1, 3))
@@ -88,7 +88,7 @@ def test_invariants_are_those_of_the_points(body: xr.Dataset) -> None:
         "mode_mode_moment": np.einsum("p,pki,plj->klij", m, S, S, optimize=True),
     }
     for name, values in expected.items():
-        # what is left of an offset in a matrix of 17 digits: 1e-16 of a mass beside 1e-3 of it
+        # what is left of an offset in a matrix of 17 digits: 1e-16 of a mass next to 1e-3 of it
         np.testing.assert_allclose(data[name].values, values, rtol=0.0, atol=1e-12 * np.abs(values).max(), err_msg=name)
     np.testing.assert_allclose(data["modal_mass"].values, np.eye(14), atol=1e-11)
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.starts import ideal, snapshot
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import simulated
 from tests.properties.test_assembly import loose
 from tests.properties.test_dynamics_start import angles
 
@@ -22,7 +22,7 @@ CHECKS = TREE / "scenes" / "checks"
 
 
 def simulate(scene: Scene) -> xr.Dataset:
-    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
+    return simulated(scene, bundles(scene))
 
 
 # A four-bar, by the rate of a coordinate -----------------------------------------------------------------------------
@@ -174,7 +174,7 @@ def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_
     """The rod of the slider-crank begins as bent as without clearance; a compressed one would hit its pin at once.
 
     Pin and journal touch as deep as carries the force of the twin's joint. Of the two ways in which the twin can be
-    assembled where only the drive says how its crank stands, one is taken, and both are told.
+    assembled where only the drive says how its crank stands, one is taken, and both are reported.
     """
     template = TREE / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
     stop = {"joint": "guide", "upper": "0.4 m", "normal": {"law": "flores", "restitution": 0.5, "stiffness": 1e8}}

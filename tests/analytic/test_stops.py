@@ -106,14 +106,14 @@ def test_what_is_no_stop_is_refused_in_words(text: str, tmp_path: Path) -> None:
     assert [word for word in WRONG[text] if word not in said] == []
 
 
-def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_told() -> None:
+def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_given() -> None:
     place = ("stop.A.upper", "-20 mm")
     with pytest.raises(InputError, match=r"(?s)stop\.A.*0\.02 m beyond -0\.02 m.*initial_approach_speed"):
         run(SCENE, (place,))
-    told = run(SCENE, (place, ("stop.A.initial_approach_speed", "1 m/s"), ("time.end", "10 ms")))
+    reported = run(SCENE, (place, ("stop.A.initial_approach_speed", "1 m/s"), ("time.end", "10 ms")))
     # from 20 mm deep, at 1 m/s
     omega = np.sqrt(2e5 / 2.0)
-    t = told.time.values
+    t = reported.time.values
     known = -0.02 + 0.02 * np.cos(omega * t) + np.sin(omega * t) / omega
     inside = known > -0.02
-    assert told.joint_position.sel(coordinate="A").values[inside] == pytest.approx(known[inside], abs=1e-10)
+    assert reported.joint_position.sel(coordinate="A").values[inside] == pytest.approx(known[inside], abs=1e-10)

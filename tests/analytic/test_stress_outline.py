@@ -65,7 +65,7 @@ def test_bending_of_a_round_rod_peaks_at_M_r_over_I_in_any_plane(angle: float) -
     assert peaks(maps("circle", CIRCLE), forces) == pytest.approx((expected, expected), rel=1e-13)
 
 
-def test_pressure_is_told_by_its_sign() -> None:
+def test_pressure_is_shown_by_its_sign() -> None:
     forces = [-300.0, 0.0, 0.0, 0.0, 12.0, 0.0]
     axial, _ = peaks(maps("circle", CIRCLE), forces)
     assert axial == pytest.approx(-300.0 / CIRCLE.area - 12.0 * R / CIRCLE.second_y, rel=1e-13)
@@ -170,7 +170,7 @@ def at_rest(a: np.ndarray, modes: int, **given: np.ndarray) -> Motion:
 
 
 def test_a_lumped_mass_shows_as_a_jump() -> None:
-    """1 kg in the middle, 10 mm beside the axis, pushed along the rod: N jumps by m a, Mz by m a times the arm."""
+    """1 kg in the middle, 10 mm next to the axis, pushed along the rod: N jumps by m a, Mz by m a times the arm."""
     lump = {"x": 0.12, "mass": 1.0, "com": [0.0, 0.01, 0.0], "inertia": [1e-4, 1e-4, 1e-4]}
     found = reduced(masses={"ball": lump})
     none = np.zeros((1, 2, 3))

@@ -149,7 +149,7 @@ def test_singular_passes_are_recorded_with_time_condition_and_joint(loops: int) 
 
 
 @pytest.mark.parametrize("integrator", ["rk4", "generalized-alpha"])
-def test_each_pass_is_listed_once_however_far_apart_the_rows_before_it(integrator: str) -> None:
+def test_each_pass_is_listed_once_whatever_the_distance_of_the_rows_before_it(integrator: str) -> None:
     """Fixed steps leave none between an output and the step over the pose; the directions turn a lot meanwhile."""
     solver = {"integrator": integrator, "step": 1e-3}
     dataset = simulate(table("four_bars_2", **{"solver": solver, "time.end": 3.0}))

@@ -1,15 +1,15 @@
-"""Scenes that were tried from outside and came out wrong once; each beside its closed form, or refused in words."""
+"""Scenes that were tried from outside and came out wrong once; each next to its closed form, or refused in words."""
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import simulated
 
 TRIED = TREE / "tests" / "reference" / "tried"
 
@@ -19,7 +19,7 @@ def tried(name: str, **override: object) -> Scene:
 
 
 def simulate(scene: Scene) -> xr.Dataset:
-    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
+    return simulated(scene, bundles(scene))
 
 
 @pytest.mark.parametrize("name", ["oblique_door", "upright_door"])

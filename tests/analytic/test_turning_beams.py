@@ -34,7 +34,7 @@ def flapping_and_lagging(gamma: float, **changes: object) -> tuple[np.ndarray, n
 
 @pytest.mark.parametrize("gamma", WRIGHT)
 def test_a_turning_cantilever_has_wrights_frequencies(gamma: int) -> None:
-    """The table is wanted to 1e-3. Sixteen elements and a basis of 20 coordinates leave 3e-4 at most."""
+    """The table is required to 1e-3. Sixteen elements and a basis of 20 coordinates leave 3e-4 at most."""
     flap, lag = flapping_and_lagging(gamma)
     assert flap == pytest.approx(WRIGHT[gamma][0], rel=3e-4)
     assert lag == pytest.approx(WRIGHT[gamma][1], rel=3e-4)
@@ -90,7 +90,7 @@ def spun(case: str, rtol: float = 1e-10) -> xr.Dataset:
 
 @pytest.mark.parametrize("case", SCENES)
 def test_a_beam_spun_up_lags_and_recovers_as_assumed_modes_say(case: str) -> None:
-    """The deflection is wanted to 1 % of its largest; two modal bases of one theory agree to 1e-4."""
+    """The deflection is required to 1 % of its largest; two modal bases of one theory agree to 1e-4."""
     known = np.array(SPIN_UP[case])
     found = spun(case)
     rows = [int(np.argmin(np.abs(found.time.values - t))) for t in known[:, 0]]

@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 
 from flexclear import load_scene
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
@@ -17,7 +16,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
 from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate
+from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate, simulated
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it
 FIRST = 3.798
@@ -33,17 +32,17 @@ def turning(speed: float, gravity: float, **more: Any) -> xr.Dataset:
         "time.end": 1.0,
     }
     scene = load_scene(TREE / "scenes" / "checks" / "spinup_beam.toml", override | more)
-    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
+    return simulated(scene, bundles(scene))
 
 
-def told(run: xr.Dataset) -> list[str]:
+def reported(run: xr.Dataset) -> list[str]:
     return [sentence for sentence in str(run.attrs.get("warnings", "")).split("\n") if sentence]
 
 
 @pytest.mark.slow
-def test_a_beam_that_bends_too_far_is_told_with_how_far() -> None:
+def test_a_beam_that_bends_too_far_is_reported_with_its_deflection() -> None:
     run = turning(0.1, 9.81)
-    bent, turned = told(run)
+    bent, turned = reported(run)
     # the tip seen from the hub, whose x axis the undeformed beam lies along
     arm = run.frame_position.sel(frame="beam.tip").values - run.frame_position.sel(frame="beam.root").values
     angle = 0.1 * run.time.values
@@ -62,18 +61,18 @@ def test_a_beam_that_bends_too_far_is_told_with_how_far() -> None:
 
 @pytest.mark.slow
 def test_a_beam_that_bends_little_and_turns_slowly_has_nothing_to_say() -> None:
-    assert told(turning(0.9 * SPIN * FIRST, 0.1)) == []
+    assert reported(turning(0.9 * SPIN * FIRST, 0.1)) == []
 
 
 @pytest.mark.slow
-def test_a_beam_that_turns_fast_without_stiffening_is_told() -> None:
-    (said,) = told(turning(2.0, 0.1))
+def test_a_beam_that_turns_fast_without_stiffening_is_reported() -> None:
+    (said,) = reported(turning(2.0, 0.1))
     assert "turns at 2 rad/s, 0.53 of its first frequency (3.798 rad/s)" in said
     assert "stiffening = {}" in said
 
 
 @pytest.mark.slow
-def test_a_run_that_ends_as_its_beam_flies_apart_names_the_beam() -> None:
+def test_a_run_that_ends_as_its_beam_diverges_names_the_beam() -> None:
     with pytest.raises(SolverError, match="evaluations is used up") as refusal:
         turning(8.0, 9.81, solver={"evaluations": 300}, **{"time.end": 30.0})
     assert "beam: at t =" in str(refusal.value)
@@ -81,7 +80,7 @@ def test_a_run_that_ends_as_its_beam_flies_apart_names_the_beam() -> None:
     assert "stiffening = {}" in str(refusal.value)
 
 
-def test_what_a_rejected_step_tried_is_not_told() -> None:
+def test_the_values_of_a_rejected_step_are_not_reported() -> None:
     """A run may pause right after one; what is in the work space then is no state of the motion."""
     scene = load_scene(TREE / "scenes" / "checks" / "swinging_rod.toml")
     engine = engine_of(scene, bundles(scene), silent)
@@ -119,9 +118,9 @@ def dropped(depth: float) -> xr.Dataset:
 
 
 @pytest.mark.slow
-def test_a_contact_is_told_when_deep_and_refused_when_the_ball_leaves_through_the_socket() -> None:
-    assert told(dropped(1e-3)) == []
-    (said,) = told(dropped(5e-3))
+def test_a_deep_contact_is_reported_and_a_ball_that_leaves_through_its_socket_refused() -> None:
+    assert reported(dropped(1e-3)) == []
+    (said,) = reported(dropped(5e-3))
     assert "joint j: the surfaces are up to 0.005" in said
     assert "contact laws hold below 0.1" in said
     with pytest.raises(SolverError, match=r"joint j: the surfaces went 0\.0451 m deep .* radius \(0\.02 m\)"):

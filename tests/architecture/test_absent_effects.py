@@ -20,11 +20,11 @@ from flexclear.pipeline.dynamics.compile import functions, reach
 from flexclear.pipeline.dynamics.compile.reach import imported
 from flexclear.pipeline.dynamics.compile.sources import (
     DESCRIBED,
-    abreast,
-    along,
+    batched,
     kernels,
     sources,
     straight,
+    tangent,
 )
 from flexclear.pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS as DECLARED
@@ -139,7 +139,7 @@ def test_parts_are_built_with_their_scene_and_not_one_by_one(root: Path) -> None
     """But for those that stand as defaults in others: to build all seventy takes as long as to import NumPy."""
     number, *built = printed(BUILT, path_of(root, CSJ)).split()
     assert int(number) > 70
-    assert set(built) == {"Scene", "Limits", "Output", "PlainIntegrator", "Pose"}
+    assert set(built) == {"Scene", "Limits", "Output", "Pose", "Solver"}
 
 
 # What is compiled ---------------------------------------------------------------------------------------------------
@@ -252,7 +252,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
 def test_lines_of_generated_files_tell_all_that_they_import(case: str) -> None:
     """As Python's own parser finds it."""
     parts, _ = CASES[case]
-    alone = straight(parts, ((1, 2),)), straight(parts, (), DESCRIBED), abreast(parts, (), 2), along(parts, ())
+    alone = straight(parts, ((1, 2),)), straight(parts, (), DESCRIBED), batched(parts, (), 2), tangent(parts, ())
     for text in (*generated(parts).values(), *alone):
         assert imported(text) == fingerprint.imported(text.encode(), "entry", package=False)[0]
 

@@ -1,7 +1,7 @@
 """The examples of docs/extending.md: a module, and one other place, are all that a new part takes.
 
-Each is installed in a copy of the sources, a scene that names it runs there from the command line, and what it gives is
-compared with a closed form. Uncompiled, because the scenes take some hundred evaluations, and compiling takes longer.
+All are installed in a copy of the sources; a scene that names one runs there from the command line, and what it gives
+is compared with a closed form. Uncompiled, because they take some hundred evaluations, and compiling takes longer.
 """
 
 import re
@@ -42,15 +42,18 @@ def edited(text: str, hunk: str) -> str:
     return text.replace(old, new)
 
 
-def installed(root: Path, tree: Path, name: str) -> Path:
-    """A copy of the sources with the example in it."""
-    copied(tree)
-    shutil.copy(examples(root) / f"{name}.py", tree / PLACES[name])
-    head, *hunks = (examples(root) / f"{name}.diff").read_text().split("@@\n")
-    place = tree / head.removeprefix("--- ").strip()
-    for hunk in hunks:
-        place.write_text(edited(place.read_text(), hunk))
-    return tree
+@pytest.fixture(scope="module")
+def tree(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the sources with all examples in it, which has run their scenes."""
+    folder = copied(tmp_path_factory.mktemp("project"))
+    for name, place in PLACES.items():
+        shutil.copy(examples(root) / f"{name}.py", folder / place)
+        head, *hunks = (examples(root) / f"{name}.diff").read_text().split("@@\n")
+        other = folder / head.removeprefix("--- ").strip()
+        for hunk in hunks:
+            other.write_text(edited(other.read_text(), hunk))
+    flexclear(folder, "run", *map(str, examples(root).glob("*.toml")), "--to", "simulate", "--jobs", "1", "-q")
+    return folder
 
 
 def flexclear(tree: Path, *arguments: str) -> str:
@@ -59,17 +62,15 @@ def flexclear(tree: Path, *arguments: str) -> str:
     return python("-m", "flexclear", *arguments, cwd=tree, **own).stdout
 
 
-def ran(root: Path, tree: Path, name: str) -> xr.Dataset:
-    """The run of the example's scene in a tree that has the example."""
-    scene, out = examples(root) / f"{name}.toml", tree / "run.nc"
-    flexclear(installed(root, tree, name), "run", str(scene), "--to", "simulate", "--out", str(out))
-    with xr.open_dataset(out) as found:
+def ran(tree: Path, name: str) -> xr.Dataset:
+    """The run of the example's scene."""
+    with xr.open_dataset(tree / "results" / "runs" / name / "run.nc") as found:
         return found.load()
 
 
-def test_an_integrator(root: Path, tmp_path: Path) -> None:
+def test_an_integrator(tree: Path) -> None:
     """In n steps the state of a linear system is multiplied by the n-th power of the method's stability polynomial."""
-    run = ran(root, tmp_path, "kutta3")
+    run = ran(tree, "kutta3")
     step, A = 0.005, np.array([[0.0, 1.0], [-100.0, -2.0]])
     R = np.eye(2) + step * A + (step * A) @ (step * A) / 2.0 + np.linalg.matrix_power(step * A, 3) / 6.0
     known = np.array([np.linalg.matrix_power(R, n) @ [0.1, 0.0] for n in range(run.sizes["time"])])
@@ -78,9 +79,9 @@ def test_an_integrator(root: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(run["position"].values[:, 0, 2], known[:, 0], rtol=0.0, atol=1e-12)
 
 
-def test_a_joint_with_two_freedoms(root: Path, tmp_path: Path) -> None:
+def test_a_joint_with_two_freedoms(tree: Path) -> None:
     """Nothing pushes the mass centre sideways, and the energy gives the speed at each angle below the horizontal."""
-    run = ran(root, tmp_path, "pin_in_slot")
+    run = ran(tree, "pin_in_slot")
     mass, arm, inertia, g = 2.0, 0.5, 0.03, 9.81
     place = run["frame_position"].sel(frame="bob.pin").values
     centre, omega = run["position"].values[:, 0], run["angular_velocity"].values[:, 0, 2]
@@ -93,18 +94,18 @@ def test_a_joint_with_two_freedoms(root: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(place[:, 1:], 0.0, rtol=0.0, atol=1e-12)
 
 
-def test_a_normal_law(root: Path, tmp_path: Path) -> None:
+def test_a_normal_law(tree: Path) -> None:
     """The rebound of a free impact under F = K d^n (1 + a d'/v): a (1 + e) + ln((1 - a e)/(1 + a)) = 0."""
-    run = ran(root, tmp_path, "safaeifar_farshidianfar")
+    run = ran(tree, "safaeifar_farshidianfar")
     a = 1.25 * 0.3 / 0.7
     rebound = brentq(lambda e: a * (1.0 + e) + np.log((1.0 - a * e) / (1.0 + a)), 0.1, 0.99, xtol=1e-15)
     # the integrator's tolerance is 1e-10: it leaves 8e-11
     assert run["velocity"].values[-1, 0, 2] == pytest.approx(rebound, rel=1e-8)
 
 
-def test_a_friction_law(root: Path, tmp_path: Path) -> None:
+def test_a_friction_law(tree: Path) -> None:
     """I w' = -mu R N tanh(w R/v_s) gives sinh(w R/v_s) = sinh(w0 R/v_s) exp(-mu N R^2 t/(I v_s))."""
-    run = ran(root, tmp_path, "smooth_coulomb")
+    run = ran(tree, "smooth_coulomb")
     mu, v_s, force, radius, inertia = 0.4, 0.2, 10.0, 0.1, 0.02
     spin = run["angular_velocity"].sel(body="ball").values[:, 1]
     decay = mu * force * radius**2 / (inertia * v_s)
@@ -114,9 +115,9 @@ def test_a_friction_law(root: Path, tmp_path: Path) -> None:
     assert known[-1] < 0.7 * known[0]
 
 
-def test_a_load(root: Path, tmp_path: Path) -> None:
+def test_a_load(tree: Path) -> None:
     """Of m v' = -c v^2: v = v0/(1 + c v0 t/m) along the first direction."""
-    run = ran(root, tmp_path, "quadratic_drag")
+    run = ran(tree, "quadratic_drag")
     speed = 5.0 / (1.0 + 0.4 * 5.0 * run["time"].values / 2.0)
     # the integrator's tolerance is 1e-10
     np.testing.assert_allclose(run["velocity"].values[:, 0], speed[:, None] * [0.6, 0.0, 0.8], rtol=0.0, atol=1e-8)
@@ -124,9 +125,9 @@ def test_a_load(root: Path, tmp_path: Path) -> None:
     assert run["dissipated"].values[-1] == pytest.approx(lost, rel=1e-8)
 
 
-def test_a_law_of_time(root: Path, tmp_path: Path) -> None:
+def test_a_law_of_time(tree: Path) -> None:
     """A cam's slide accelerates by 2 pi h/T^2 sin(2 pi tau), and the drive pushes with m times that."""
-    run = ran(root, tmp_path, "cycloidal")
+    run = ran(tree, "cycloidal")
     tau = np.clip((run["time"].values - 0.1) / 0.3, 0.0, 1.0)
     height = 0.03 * (tau - np.sin(2.0 * np.pi * tau) / (2.0 * np.pi))
     push = 2.0 * 2.0 * np.pi * 0.03 / 0.3**2 * np.sin(2.0 * np.pi * tau)
@@ -135,9 +136,9 @@ def test_a_law_of_time(root: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(run["drive_force"].values[:, 0], push, rtol=0.0, atol=1e-11)
 
 
-def test_a_record_on_request(root: Path, tmp_path: Path) -> None:
+def test_a_record_on_request(tree: Path) -> None:
     """Of free fall: m (3, 0, -g t); recorded with its unit."""
-    run = ran(root, tmp_path, "momentum")
+    run = ran(tree, "momentum")
     t = run["time"].values
     known = 2.0 * np.stack([np.full_like(t, 3.0), np.zeros_like(t), -9.81 * t], axis=1)
     # the integrator's tolerance is 1e-10
@@ -145,8 +146,7 @@ def test_a_record_on_request(root: Path, tmp_path: Path) -> None:
     assert run["momentum"].attrs["units"] == "kg m s-1"
 
 
-def test_a_command(root: Path, tmp_path: Path) -> None:
-    tree = installed(root, tmp_path, "mass")
+def test_a_command(root: Path, tree: Path) -> None:
     scene = examples(root) / "smooth_coulomb.toml"
     shutil.copy(scene, tree / "two.toml")
     (tree / "two.toml").write_text(scene.read_text().replace("smooth-coulomb", "ambrosio").replace("v_smooth", "v1"))

@@ -2,7 +2,8 @@
 
 import ast
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -142,72 +143,47 @@ READERS = {"at_port", "first_moment", "second_moment", "straight", "widest"}
 GIVEN = {"shortening"}
 
 
-def calls_of_kernels(root: Path) -> Iterator[tuple[str, ast.Call]]:
-    """All calls in kernels, by where they are."""
-    for path in sorted((root / "pipeline" / "dynamics").rglob("*.py")):
-        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(function, ast.FunctionDef) and "kernel" in map(ast.unparse, function.decorator_list):
-                for call in ast.walk(function):
-                    if isinstance(call, ast.Call):
-                        yield f"{path.name}: {function.name}: {ast.unparse(call)}", call
+@cache
+def kernels_of(root: Path) -> tuple[tuple[str, ast.FunctionDef], ...]:
+    """All kernels, with the paths of their modules."""
+    return tuple(
+        (str(path.relative_to(root)), found)
+        for path in sorted((root / "pipeline" / "dynamics").rglob("*.py"))
+        for found in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(found, ast.FunctionDef) and "kernel" in map(ast.unparse, found.decorator_list)
+    )
 
 
 def test_no_kernel_that_writes_is_given_an_array_twice(root: Path) -> None:
-    """What it writes into one argument changes nothing that it reads from another: the compiler is told so."""
-    twice = {
-        where
-        for where, call in calls_of_kernels(root)
-        if ast.unparse(call.func) not in READERS | GIVEN | {"data"}
-        for name in "hfwn"
-        if sum(ast.unparse(argument) in (name, f"d.{name}") for argument in call.args) > 1
-    }
-    assert twice == set()
-    pointers = {"h", "f", "w", "n"} | set(m.STRETCHES) | set(m.LISTS) | set(m.NAMED)
-    known = {f"d.{name}" for name in pointers}
-    both = {
-        where
-        for where, call in calls_of_kernels(root)
-        if ast.unparse(call.func) not in READERS | GIVEN
-        if "d" in (given := {ast.unparse(argument) for argument in call.args}) and given & known
-    }
-    assert both == set()
+    """What it writes into one argument changes nothing that it reads from another: the compiler relies on it."""
+    pointers = {f"d.{name}" for name in {"h", "f", "w", "n"} | set(m.STRETCHES) | set(m.LISTS) | set(m.NAMED)}
+    wrong = set[str]()
+    for place, function in kernels_of(root):
+        for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
+            called, given = ast.unparse(call.func), list(map(ast.unparse, call.args))
+            twice = called != "data" and any(sum(one in (name, f"d.{name}") for one in given) > 1 for name in "hfwn")
+            if called not in READERS | GIVEN and (twice or ("d" in given and pointers & set(given))):
+                wrong.add(f"{place}: {function.name}: {ast.unparse(call)}")
+    assert wrong == set()
 
 
 def test_kernels_that_may_be_given_an_array_twice_write_into_none(root: Path) -> None:
-    readers = [
-        found
-        for path in sorted((root / "pipeline" / "dynamics").rglob("*.py"))
-        for found in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(found, ast.FunctionDef) and found.name in READERS
-        if "kernel" in map(ast.unparse, found.decorator_list)
-    ]
+    readers = [found for _, found in kernels_of(root) if found.name in READERS]
     assert {found.name for found in readers} == READERS
     targets = [node for found in readers for node in ast.walk(found) if isinstance(node, ast.Subscript | ast.Attribute)]
     assert all(isinstance(node.ctx, ast.Load) for node in targets)
 
 
-# Each kernel is written once: what is there twice is compiled twice, and mended once --------------------------------
+def test_no_kernel_is_there_twice(root: Path) -> None:
+    """What is there twice is compiled twice, and corrected once.
 
-
-def _kernels(source: str) -> list[tuple[str, str]]:
-    """Name and what it says (arguments and statements, without its text) of each kernel in a module's source.
-
-    One that does nothing also counts by its name: in different places nothing has different reasons.
+    Compared are arguments and statements without docstrings. A kernel that does nothing also counts by its name: in
+    different places nothing has different reasons.
     """
-    found = []
-    for node in ast.walk(ast.parse(source)):
-        if not isinstance(node, ast.FunctionDef) or not any(ast.unparse(d) == "kernel" for d in node.decorator_list):
-            continue
-        begin = 1 if ast.get_docstring(node) is not None else 0
-        body = "\n".join(map(ast.unparse, node.body[begin:]))
-        found.append((node.name, f"({ast.unparse(node.args)}) {body or node.name}"))
-    return found
-
-
-def test_no_kernel_stands_twice(root: Path) -> None:
     places = defaultdict(list)
-    for path in sorted((root / "pipeline" / "dynamics").rglob("*.py")):
-        for name, says in _kernels(path.read_text(encoding="utf-8")):
-            places[says].append(f"{path.relative_to(root)}: {name}")
+    for place, found in kernels_of(root):
+        begin = 1 if ast.get_docstring(found) is not None else 0
+        body = "\n".join(map(ast.unparse, found.body[begin:]))
+        places[f"({ast.unparse(found.args)}) {body or found.name}"].append(f"{place}: {found.name}")
     assert len(places) > 400  # there are some five hundred
     assert {says: where for says, where in places.items() if len(where) > 1} == {}

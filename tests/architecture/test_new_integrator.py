@@ -5,6 +5,7 @@ import subprocess
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -80,42 +81,65 @@ def python(copy: Path) -> Command:
     return partial(processes.python, cwd=copy, succeeds=False, **apart, **interpreted)
 
 
-def asked(python: Command, code: str) -> object:
-    """What code that prints JSON finds in the copy."""
-    done = python("-c", f"import json\n{code}")
+#: all that is asked of the copy, in one process
+ASKED = """
+import json
+from pathlib import Path
+from flexclear.commands import cost_design
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.json_schema import scene_schema
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.dynamics.compile.functions import digest
+from flexclear.pipeline.dynamics.compile.sources import sources
+from flexclear.pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.post.cost.work_precision import LOOKS
+from flexclear.stages import simulation
+
+new, own = load_scene("new.toml"), load_scene("own.toml")
+ends = []
+for solver in ({"rtol": 1e-6}, {"step": 0.004}):
+    scene = load_scene("new.toml", {"solver": {"integrator": "heun", **solver}})
+    run = dynamics.simulate(scene, {}, lambda share, text: None)
+    ends.append([run.attrs["method"], *run.position.sel(body="bob").values[-1].tolist()])
+designs = [(d.group, d.scene.solver) for d in cost_design.wide(own, ("heun",))]
+closure = Sources(Path.cwd()).closure
+print(json.dumps({
+    "schema": scene_schema()["$defs"]["Solver"]["properties"]["integrator"]["enum"],
+    "ends": ends,
+    "designs": [[group, solver.rtol, solver.step] for group, solver in designs if solver.integrator == "heun"],
+    "looks": LOOKS,
+    "keys": [sorted(closure(["flexclear.stages.simulation", *simulation.modules(s)])) for s in (new, own)],
+    "code": CODE,
+}))
+"""
+#: machine code of another integrator, by the digests of its sources
+CODE = """{name: digest(text) for name, text in sources(
+    Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",)), Scheme("dop853")).items()}"""
+IMPORTS = ASKED[: ASKED.index("new, own")]
+
+
+@pytest.fixture(scope="module")
+def found(python: Command) -> dict[str, Any]:
+    """What the copy answers."""
+    done = python("-c", ASKED.replace("CODE", CODE))
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return dict(json.loads(done.stdout))
 
 
-def test_the_schema_of_scenes_knows_it(python: Command) -> None:
-    done = python("-m", "flexclear", "schema")
-    assert done.returncode == 0, done.stderr
-    assert "heun" in json.loads(done.stdout)["$defs"]["PlainIntegrator"]["properties"]["integrator"]["enum"]
+def test_the_schema_of_scenes_knows_it(found: dict[str, Any]) -> None:
+    assert "heun" in found["schema"]
 
 
-def test_a_misspelt_name_is_told_its_name(python: Command) -> None:
+def test_a_misspelt_name_gets_the_nearest_one(python: Command) -> None:
     done = python("-m", "flexclear", "run", "none.toml", "--to", "simulate")
     assert done.returncode == 2
     assert "did you mean 'heun'" in done.stderr
 
 
-def test_a_scene_runs_with_chosen_and_with_fixed_steps(python: Command) -> None:
+def test_a_scene_runs_with_chosen_and_with_fixed_steps(found: dict[str, Any]) -> None:
     """After a quarter of its period the pendulum hangs straight down."""
-    found = asked(
-        python,
-        """
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-ends = {}
-for name, solver in {"chosen": {"rtol": 1e-6}, "fixed": {"step": 0.004}}.items():
-    scene = load_scene("new.toml", {"solver": {"integrator": "heun", **solver}})
-    run = dynamics.simulate(scene, {}, lambda share, text: None)
-    ends[name] = [run.attrs["method"], *run.position.sel(body="bob").values[-1].tolist()]
-print(json.dumps(ends))
-""",
-    )
-    assert isinstance(found, dict)
-    for method, x, y, _ in found.values():
+    for method, x, y, _ in found["ends"]:
         assert method == "heun"
         # fixed steps of order 2 leave some (0.004 s * 4.4 rad/s)^2 / 10 of a radian, chosen ones less; the height is
         # off by half of the square of that
@@ -131,59 +155,23 @@ def test_refusals_name_it_and_its_remedy(copy: Path, python: Command) -> None:
     assert "radau where contacts or friction are stiff" in done.stderr
 
 
-def test_a_cost_study_compares_it(python: Command) -> None:
-    found = asked(
-        python,
-        """
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.commands import cost_design
-designs = cost_design.wide(load_scene("own.toml"), ("heun",))
-print(json.dumps([[d.group, d.scene.solver.integrator, d.scene.solver.rtol, d.scene.solver.step] for d in designs]))
-""",
-    )
-    assert isinstance(found, list)
-    mine = [(group, rtol, step) for group, name, rtol, step in found if name == "heun"]
+def test_a_cost_study_compares_it(found: dict[str, Any]) -> None:
+    mine = found["designs"]
     assert [rtol for group, rtol, _ in mine if group == "tolerance"] == [10.0**-k for k in range(3, 10)]
     assert [step for group, _, step in mine if group == "step"] == [1e-4, 3e-5, 1e-5, 3e-6]
 
 
-def test_figures_tell_it_from_all_others(python: Command) -> None:
-    code = "from flexclear.pipeline.post.cost.work_precision import LOOKS\nprint(json.dumps(LOOKS))"
-    looks = asked(python, code)
-    assert isinstance(looks, dict)
-    assert len({tuple(look) for look in looks.values()}) == len(looks)
-    assert "heun" in looks
+def test_figures_distinguish_it_from_all_others(found: dict[str, Any]) -> None:
+    assert len({tuple(look) for look in found["looks"].values()}) == len(found["looks"])
+    assert "heun" in found["looks"]
 
 
-KEYS = """
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from pathlib import Path
-from flexclear.stages import simulation
-sources = Sources(Path.cwd())
-found = {}
-for name in ("new", "own"):
-    modules = simulation.modules(load_scene(f"{name}.toml"))
-    found[name] = sorted(sources.closure(["flexclear.stages.simulation", *modules]))
-print(json.dumps(found))
-"""
-
-
-def test_keys_hold_its_module_and_what_goes_on_for_it(python: Command) -> None:
-    found = asked(python, KEYS)
-    assert isinstance(found, dict)
-    new, own = (set(found[name]) for name in ("new", "own"))
+def test_keys_hold_its_module_and_what_goes_on_for_it(found: dict[str, Any]) -> None:
+    new, own = map(set, found["keys"])
     package = "flexclear.pipeline.dynamics.integrate"
     assert {f"{package}.heun_euler", f"{package}.radau"} <= new
     assert f"{package}.heun_euler" not in own
 
 
-def test_it_makes_no_other_integrator_compile_anew(python: Command) -> None:
-    code = """
-from flexclear.pipeline.dynamics.compile.functions import digest
-from flexclear.pipeline.dynamics.compile.sources import sources
-from flexclear.pipeline.dynamics.effects import Parts, Scheme
-parts = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
-print(json.dumps({name: digest(text) for name, text in sources(parts, Scheme("dop853")).items()}))
-"""
-    assert asked(python, code) == json.loads(processes.printed(f"import json\n{code}"))
+def test_it_makes_no_other_integrator_compile_anew(found: dict[str, Any]) -> None:
+    assert found["code"] == json.loads(processes.printed(f"{IMPORTS}print(json.dumps({CODE}))"))

@@ -306,7 +306,7 @@ def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path
         scenes._refuse_namesakes(alike)
 
 
-def test_a_path_written_as_on_windows_is_told_how_to_write_it(tmp_path: Path) -> None:
+def test_a_path_written_as_on_windows_is_refused_with_how_to_write_it(tmp_path: Path) -> None:
     for text in ('body.a.mesh = "..\\meshes\\rod.toml"', 'body.a.mesh = "C:\\users\\rod.toml"'):
         (tmp_path / "a.toml").write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=r"a\.toml, line 1: .*\n  hint: write / between folders"):
@@ -315,7 +315,7 @@ def test_a_path_written_as_on_windows_is_told_how_to_write_it(tmp_path: Path) ->
         fc.load_scene("meshes\\rod.toml")
 
 
-def test_a_path_of_windows_is_found_however_toml_writes_it() -> None:
+def test_a_path_of_windows_is_recognised_however_toml_writes_it() -> None:
     path = PureWindowsPath("C:\\mine\\rod.toml")
     written = "a = 'C:\\mine\\rod.toml'\nb = \"C:\\\\mine\\\\rod.toml\"\nc = 'C:/mine/rod.toml'"
     assert set(tomllib.loads(written).values()) == {str(path), path.as_posix()}

@@ -107,7 +107,7 @@ def test_declarations_of_effects_import_no_code(root: Path) -> None:
     )
 
 
-def test_the_table_stands_in_the_order_of_the_arrows(root: Path) -> None:
+def test_the_table_has_the_order_of_the_arrays(root: Path) -> None:
     rows = [bare(name) for name in tabled(root)]
     assert [(a, b) for a, b in drawn(root) if rows.index(a) > rows.index(b)] == []
 
@@ -125,7 +125,7 @@ def test_the_way_of_the_data_leads_through_modules_that_exist(root: Path) -> Non
 #: what stands in backticks and looks like a file or module of the project, but for names in angles and asterisks
 FILE = re.compile(r"[\w.*<>-]+(/[\w.*<>-]+)+/?|[\w*<>]+\.(py|md|toml|json|jsonl)")
 MODULE = re.compile(r"(pipeline|stages|tests|benchmarks)(\.\w+)+")
-#: folders that names below are told from: `model/tree` is `pipeline/dynamics/model/tree.py`
+#: folders that names below begin in: `model/tree` is `pipeline/dynamics/model/tree.py`
 FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs")
 #: first parts of names that are no sources: written by runs, quantities, units, scenes by name, symbols
 ELSEWHERE = {".venv", "results", "sps4", "checks", "mesh", "modes", "bundle", "figures", "tables", "report"}

@@ -29,13 +29,12 @@ def families() -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("package, name", families())
-def test_what_a_family_lists_is_there_and_gives_its_module(package: str, name: str) -> None:
+def test_what_a_family_lists_is_there(package: str, name: str) -> None:
     """Lists that follow from what scenes declare name modules and objects that exist."""
     assert lookup(package, name, where="here") is not None
-    assert effects.Named(package, name, "here").module == module_of(package, name)
 
 
-#: where a part of a family stands among the parts of the code
+#: where a part of a family is among the parts of the code
 CODE = {
     effects.JOINTS: lambda name: Parts((name,), closures=True),
     effects.SURFACES: lambda name: Parts(("free",), surfaces=(name,), forms=("elastic",)),
@@ -104,7 +103,7 @@ def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
             assert {coordinate.part for coordinate in part.COORDINATES} <= set(joints.CHAIN)
 
 
-#: what a scene says beside its joint -> parts of its code, and a module that must be in the key
+#: what a scene says next to its joint -> parts of its code, and a module that must be in the key
 BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
     "stop": (
         {
@@ -154,7 +153,7 @@ DYNAMICS = "flexclear.pipeline.dynamics"
 OTHERS = (
     *("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice"),
     *("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual"),
-    *("specialise.abreast", "run.evaluation.batched_evaluation", "model.refill"),
+    *("specialise.batched", "run.evaluation.batched_evaluation", "model.refill"),
 )
 
 

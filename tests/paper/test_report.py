@@ -74,20 +74,20 @@ def test_an_empty_results_folder_gives_a_page_without_figures(tmp_path):
 
 
 def test_assumptions_are_merged_over_scenes():
-    told = {
+    reported = {
         "a": {"assumptions": json.dumps({"x": REASON, "y": REASON})},
         "b": {"assumptions": json.dumps({"x": REASON})},
     }
-    merged = report.merged_assumptions(told)
+    merged = report.merged_assumptions(reported)
     assert merged == [("x", REASON, ("a", "b")), ("y", REASON, ("a",))]
 
 
-def test_assumptions_that_differ_between_scenes_are_all_kept():
-    told = {
+def test_assumptions_that_differ_between_scenes_are_all_listed():
+    reported = {
         "a": {"assumptions": json.dumps({"x": "assumed: 1"})},
         "b": {"assumptions": json.dumps({"x": "assumed: 2"})},
     }
-    assert [text for _, text, _ in report.merged_assumptions(told)] == ["assumed: 1", "assumed: 2"]
+    assert [text for _, text, _ in report.merged_assumptions(reported)] == ["assumed: 1", "assumed: 2"]
 
 
 def test_paper_page_lists_every_figure_with_its_command(content):

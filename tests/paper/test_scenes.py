@@ -109,10 +109,10 @@ def test_the_papers_eight_scenes_are_there(name: str) -> None:
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_every_part_with_numbers_says_where_they_are_from(name: str) -> None:
     s = scene(name)
-    told = {place.split(".")[0] + "." + place.split(".")[1] for place in s.sources() if "." in place}
+    reported = {place.split(".")[0] + "." + place.split(".")[1] for place in s.sources() if "." in place}
     numbers = {f"body.{n}" for n in s.body} | {f"drive.{n}" for n in s.drive} | {f"load.{n}" for n in s.load}
     numbers |= {f"joint.{n}" for n in s.contacts()}
-    assert numbers <= told
+    assert numbers <= reported
 
 
 @pytest.mark.parametrize("name", MECHANISMS)

@@ -1,4 +1,4 @@
-"""The tables say what the runs say, in the paper's units, beside the paper's own numbers."""
+"""The tables say what the runs say, in the paper's units, next to the paper's own numbers."""
 
 import csv
 import io
@@ -60,7 +60,7 @@ def test_frequencies_that_agree_as_printed_say_so(name):
     assert {row["agrees as printed"] for row in rows(name)} == {"yes"}
 
 
-def test_a_frequency_off_by_one_printed_digit_is_found():
+def test_a_frequency_off_by_one_printed_digit_is_detected():
     square = figure("table04").needs[0]
     data = dict(everything())
     # 1576.805 reads 1576.8; 0.1 Hz more reads 1576.9

@@ -1,20 +1,32 @@
 """Small mechanisms for tests, as scenes in tables of SI numbers."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
 
 Table = dict[str, Any]
 GRAVITY = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}}
 
 
 def simulate(table: Table) -> xr.Dataset:
-    return dynamics.simulate(Scene.model_validate(table), {}, lambda fraction, text: None)
+    return simulated(Scene.model_validate(table))
+
+
+def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset] = MappingProxyType({})) -> xr.Dataset:
+    """The run of a scene without its perturbed run, which takes as long again, and hence without a horizon."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Pair, "perturbed_run", lambda *_: None)
+        return dynamics.simulate(scene, bundles, silent)
 
 
 def body(position: Any, mass: float = 1.0, frames: Table | None = None, **more: Any) -> Table:

@@ -49,8 +49,8 @@ def loop(random: Random, name: str, sliding: Sequence[int] = (), loose: Sequence
         p = random.uniform(-1.0, 1.0, 2)
         if all(np.linalg.norm(p - q) > 0.8 / np.sqrt(len(pairs)) for q in points):
             points.append(p)
-    told = f"{name}, sliding {list(sliding)}, loose {list(loose)}"
-    return planar(random, told, links, pairs, np.array(points), sliding, loose)
+    reported = f"{name}, sliding {list(sliding)}, loose {list(loose)}"
+    return planar(random, reported, links, pairs, np.array(points), sliding, loose)
 
 
 def parallel_cranks(random: Random, cranks: int, angle: float | None = None) -> Mechanism:

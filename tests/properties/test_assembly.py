@@ -55,7 +55,7 @@ def test_a_four_bar_follows_from_its_lengths_on_the_branch_that_is_hinted(
     assert mechanism.choice == ""
 
 
-def test_of_two_ways_that_nothing_chooses_one_is_taken_and_both_are_told() -> None:
+def test_of_two_assemblies_one_is_taken_and_both_are_reported() -> None:
     mechanism = start_of(loose(0.9))
     values = [angles(0.9)[2], other_branch(0.9)[2]]
     taken = turned(mechanism)["rocker"]

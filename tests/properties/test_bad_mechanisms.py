@@ -90,7 +90,7 @@ def test_a_locked_mechanism() -> None:
     assert error.remedy
 
 
-def test_a_joint_whose_frames_are_metres_apart() -> None:
+def test_a_joint_whose_frames_are_at_a_distance_of_metres() -> None:
     table = four_bar()
     table["body"]["beam1"]["pose"] = {"position": (3.0, 1.0, 0.0)}
     error = refusal(table)
@@ -116,7 +116,7 @@ def test_a_joint_whose_axes_point_opposite_ways() -> None:
     assert "same way" in error.problem
 
 
-def test_a_mechanism_that_cannot_be_assembled_tells_the_residual_of_every_joint() -> None:
+def test_a_mechanism_that_cannot_be_assembled_lists_the_residual_of_every_joint() -> None:
     """A stretched pair of rods that would have to be 2 % longer."""
     table = four_bar()
     bodies, joints = table["body"], table["joint"]

@@ -143,7 +143,7 @@ print(hashlib.sha256(b"".join(s.tobytes() for s in shapes)).hexdigest())
 
 
 def test_every_process_gets_the_same_shapes() -> None:
-    """Dense and sparse solver; ARPACK would start from numpy's random state unless told otherwise."""
+    """Dense and sparse solver; ARPACK would start from numpy's random state otherwise."""
     assert len({printed(SHAPES.format(seed=seed)) for seed in (1, 2)}) == 1
 
 
@@ -182,7 +182,7 @@ def gap(values: np.ndarray) -> tuple[int, float]:
     return found
 
 
-def test_rigid_modes_are_told_by_a_gap() -> None:
+def test_rigid_modes_are_separated_by_a_gap() -> None:
     eigen.without_rigid(np.array([0.0, 1e-3, 1e-2, 9e7]), 3)
     with pytest.raises(SolverError, match="expected below a gap"):
         eigen.without_rigid(np.array([0.0, 1e-3, 1e6, 9e7]), 3)  # a mechanism or a missing rigid mode

@@ -82,11 +82,11 @@ def test_refused_points_are_gaps_with_their_reason():
     assert "take another" not in found.attrs["refused"]
 
 
-def test_errors_near_the_reference_cannot_be_told():
+def test_errors_near_that_of_the_reference_are_not_resolved():
     found, *_ = study(uncertainty=1e-7)
-    told = resolved(found, "tolerance").sel(adaptive_integrator="dop853", quantity="slider.position")
-    assert told.sel(rtol=1e-6).item()
-    assert not told.sel(rtol=1e-9).item()
+    reported = resolved(found, "tolerance").sel(adaptive_integrator="dop853", quantity="slider.position")
+    assert reported.sel(rtol=1e-6).item()
+    assert not reported.sel(rtol=1e-9).item()
 
 
 def test_errors_beyond_the_horizon_do_not_count():
@@ -177,7 +177,7 @@ def test_what_cannot_be_had_is_explained():
     assert any("do not agree on the number of impacts" in note for note in other.notes)
 
 
-def test_a_scene_that_is_refused_as_it_stands_has_no_causes():
+def test_a_scene_that_is_refused_as_it_is_has_no_causes():
     _, points, runs = study()
     points.append(Point("as it is", "sampling", {"interval": 0.1}))
     runs["as it is"] = xr.Dataset(attrs={"refused": "no"})
@@ -304,7 +304,7 @@ def test_figures_are_drawn():
     assert set(work_precision.make("w", found, "t", (mark,))) == {"w.png", "w.svg"}
 
 
-def test_other_programs_are_drawn_beside_ours_relative_to_the_same_size():
+def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size():
     found, *_ = study()
     track = {"name": "peer", "note": "n", "seconds": [1.0, 2.0], "error": {"slider.position": [1e-3, 1e-4]}}
     (curve,) = work_precision.peers(found, [track])
@@ -312,3 +312,11 @@ def test_other_programs_are_drawn_beside_ours_relative_to_the_same_size():
     assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
     assert set(work_precision.make("w", found, "t", (), [curve])) == {"w.png", "w.svg"}
     assert answer.price_list(found, "t", ("said",)).notes[-1] == "said"
+
+
+def test_runs_left_undone_are_named_with_their_reason():
+    study = xr.Dataset(attrs={"undone": "rk4, step 1e-06 s", "given_up": "radau, rtol 1e-09"})
+    budget, method = answer.undone(study)
+    assert budget == "Not run within the budget: rk4, step 1e-06 s."
+    assert "used up its evaluations" in method
+    assert method.endswith("radau, rtol 1e-09.")

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from tests.properties.mechanisms import Table, joint, rigid, scene, simulate
+from tests.properties.mechanisms import Table, joint, rigid, scene, simulate, simulated
 
 #: radius of the swing [m] and its rate [rad/s]; the period is 2 pi s
 SWING, RATE = 1.0, 1.0
@@ -43,7 +41,7 @@ def sprung(clearance: float, phase: float, solver: dict[str, Any]) -> Table:
 @pytest.mark.parametrize(
     "solver", [{"rtol": 1e-2}, {"rtol": 1e-3}, {"rtol": 1e-6}, {"rtol": 1e-3, "integrator": "dopri5"}]
 )
-def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
+def test_the_first_touch_is_located_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
     """Steps of order 8 at loose tolerances are longer than the swing takes to and from the wall."""
     run = simulate(sprung(clearance, phase, solver))
     touch = (np.arcsin(clearance / SWING) - phase) / RATE
@@ -55,7 +53,7 @@ def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: floa
 
 @pytest.mark.parametrize("clearance", [1e-4, 1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("solver", [{"rtol": 1e-3}, {"rtol": 1e-10}, {"rtol": 1e-6, "integrator": "dopri5"}])
-def test_the_first_touch_is_found_in_a_step_of_many_clearances(clearance: float, solver: dict[str, Any]) -> None:
+def test_the_first_touch_is_located_in_a_step_of_many_clearances(clearance: float, solver: dict[str, Any]) -> None:
     """A parabola 3 m away is one step: beyond the socket's wall by a fiftieth of the clearance, and out below."""
     gravity, below = 10.0, 0.3 * clearance
     up = np.sqrt(2.0 * gravity * (1.02 * clearance + below))
@@ -108,7 +106,7 @@ def graze(random: Random, rtol: float, unit: float = 0.0, depth: float = 0.0) ->
 def test_closings_approach_and_openings_leave(seed: int) -> None:
     random = Random(seed)
     grazing, _ = graze(random, 10.0 ** random.uniform(-10.0, -3.0))
-    run = dynamics.simulate(grazing, {}, silent)
+    run = simulated(grazing)
     kinds, speeds = run.event_kind.values, run.event_approach_speed.values
     assert np.all(speeds[kinds == "closing"] > 0.0)
     assert np.all(speeds[kinds == "opening"] > 0.0)
@@ -119,7 +117,7 @@ def test_closings_approach_and_openings_leave(seed: int) -> None:
 def test_a_graze_deeper_than_the_tolerance_is_seen_at_its_speed(seed: int) -> None:
     """It meets the plane with the speed that the spring leaves there, sqrt(2 w^2 A d) to first order in d/A."""
     grazing, depth = graze(Random(seed), 1e-13)
-    run = dynamics.simulate(grazing, {}, silent)
+    run = simulated(grazing)
     amplitude = float(np.linalg.norm(grazing.body["b"].pose.position))
     first = float(run.event_approach_speed.values[run.event_kind.values == "closing"][0])
     assert first == pytest.approx(FREQUENCY * np.sqrt(2.0 * amplitude * depth - depth**2), rel=1e-2)
@@ -138,7 +136,7 @@ def test_a_mechanism_of_any_size_bounces_alike(seed: int) -> None:
         joint = grazing.joint["f"]
         law = joint.normal.model_copy(update={"law": "lankarani-nikravesh", "restitution": 0.6})
         lossy = grazing.model_copy(update={"joint": grazing.joint | {"f": joint.model_copy(update={"normal": law})}})
-        run = dynamics.simulate(lossy, {}, silent)
+        run = simulated(lossy)
         runs.append(run.event_approach_speed.values[run.event_kind.values == "closing"] / unit)
     assert len(runs[0]) == len(runs[1]) >= 5
     np.testing.assert_allclose(runs[1], runs[0], rtol=1e-6)

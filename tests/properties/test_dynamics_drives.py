@@ -243,7 +243,7 @@ def test_a_run_is_driven_by_eq_35() -> None:
 IDEAL = Path(__file__).parents[2] / "scenes" / "sps4" / "ideal.toml"
 
 
-def test_breaks_that_only_rounding_sets_apart_are_one():
+def test_breaks_that_differ_by_rounding_are_one():
     """Five strokes of 0.09 s halves: 5 * 0.09 + 0.09 and 6 * 0.09 differ in the last digit."""
     starts = [k * 0.09 for k in range(10)]
     ends = [s + 0.09 for s in starts]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.numerics.rotations import (
     matrix_to_quaternion,
     quaternion_to_matrix,
@@ -16,22 +15,17 @@ from flexclear.pipeline.core.numerics.rotations import (
 )
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, impacts
+from tests.properties.mechanisms import Table, simulate
 
 IDEAL, CSJ, BOUNCE = "sps4/ideal", "sps4/variants/first_csj", "checks/bounce"
 #: about no axis of the scene, and far from where it stands
 TURN, SHIFT = rotation_vector_to_matrix(np.array([0.7, -1.9, 0.4])), np.array([3.0, -2.0, 5.0])
-Table = dict[str, Any]
 
 
 def table_of(name: str, **overrides: object) -> Table:
     """A scene as a table of numbers, every default written out."""
     return load_scene(TREE / "scenes" / f"{name}.toml", overrides).model_dump(exclude_none=True)
-
-
-def simulate(table: Table) -> xr.Dataset:
-    return dynamics.simulate(Scene.model_validate(table), {}, lambda fraction, text: None)
 
 
 # Turning and shifting -----------------------------------------------------------------------------------------------

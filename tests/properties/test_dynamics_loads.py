@@ -114,7 +114,7 @@ def test_the_energy_is_accounted_for() -> None:
     dataset = run()
     exchanged = float(np.abs(dataset.load_work).max() + dataset.dissipated.max() + dataset.kinetic.max())
     assert exchanged > 1.0
-    # integrated beside the motion at rtol 1e-11, some hundred steps
+    # integrated next to the motion at rtol 1e-11, some hundred steps
     assert float(np.abs(dataset.energy_error).max()) < 1e-8 * exchanged
     assert np.all(np.diff(dataset.dissipated) > 0.0)
 

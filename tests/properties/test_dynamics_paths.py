@@ -1,4 +1,4 @@
-"""Frames on given paths: they go there, and the forces told are those that it takes."""
+"""Frames on given paths: they go there, and the reported forces are those that it takes."""
 
 from typing import Any
 

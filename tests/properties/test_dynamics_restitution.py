@@ -118,7 +118,7 @@ def test_delivered_restitution_is_delivered(name: str, asked: float) -> None:
     assert exact.delivered_restitution(law.resolved.numbers.damping) == pytest.approx(asked, rel=1e-9)
     parameter = law.resolved.parameter
     assert parameter is not None
-    # the parameter that is told gives the same factor when it is asked for
+    # the parameter that is reported gives the same factor when it is asked for
     assert NORMAL[name][0](parameter) == pytest.approx(law.resolved.numbers.damping, rel=1e-9, abs=1e-12)
 
 

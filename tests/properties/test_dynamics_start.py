@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate, two_loops
+from tests.properties.mechanisms import body, frame, ground, joint, rigid, scene, simulate, two_loops
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def test_a_flexible_body_thrown_starts_with_the_velocity_of_its_centre_of_mass(
 
 
 def test_velocity_and_spin_of_a_hinged_flexible_rod_agree_about_its_hinge() -> None:
-    """A rod on a ball joint is told its centre's velocity, omega x r: it starts without speeds of deformation."""
+    """A rod on a ball joint is given its centre's velocity, omega x r: it starts without speeds of deformation."""
     omega = np.array([0.0, 4.0, 3.0])
     centre = np.cross(omega, [0.5 * LENGTH, 0.0, 0.0])
     changes = {"time.end": 1e-3, "output.interval": 1e-3, "body.rod.angular_velocity": tuple(omega)}
@@ -102,15 +102,10 @@ def driven(given: float, law: float, **crank: Any) -> dict[str, Any]:
     a, b, c = angles(given)
     pins = {"crank": (0.0, 0.0), "coupler": (CRANK * np.cos(a), CRANK * np.sin(a)), "rocker": (GROUND, 0.0)}
     lengths = {"crank": (CRANK, a), "coupler": (COUPLER, b), "rocker": (ROCKER, c)}
-    bodies: dict[str, Any] = {"world": {"type": "ground", "frames": {"a": {}, "b": {"position": [GROUND, 0.0, 0.0]}}}}
+    bodies: dict[str, Any] = {"world": ground(a=(0.0, 0.0, 0.0), b=(GROUND, 0.0, 0.0))}
     for name, (length, angle) in lengths.items():
-        bodies[name] = {
-            "type": "rigid",
-            "mass": 1.0,
-            "inertia": [1e-3, 1e-3, 1e-3],
-            "pose": {"position": [*pins[name], 0.0], "rotation_vector": [0.0, 0.0, angle]},
-            "frames": {"near": {}, "far": {"position": [length, 0.0, 0.0]}},
-        }
+        pose = frame((*pins[name], 0.0), (0.0, 0.0, angle))
+        bodies[name] = rigid(1.0, 1e-3, {"near": {}, "far": frame((length, 0.0, 0.0))}, pose=pose)
     bodies["crank"] |= crank
     pairs = ("world.a", "crank.near"), ("crank.far", "coupler.near"), ("coupler.far", "rocker.far")
     joints = {f"j{k}": joint("revolute", *pair) for k, pair in enumerate((*pairs, ("world.b", "rocker.near")))}
@@ -171,20 +166,20 @@ def test_whole_turns_contradict_nothing_and_bodies_without_a_pose_go_where_the_d
     assert crank.start.R[:2, 0] == pytest.approx([np.cos(1.5), np.sin(1.5)], abs=1e-14)
 
 
-def test_what_assembly_moves_is_told_with_amounts() -> None:
+def test_the_moves_of_an_assembly_are_reported_with_amounts() -> None:
     mechanism = start_of(driven(1.5, 1.45))
-    (told,) = moved(mechanism, [link.start for link in mechanism.links])
+    (reported,) = moved(mechanism, [link.start for link in mechanism.links])
     before, after = angles(1.5), angles(1.45)
     # three digits are printed
     amounts = dict(zip(("crank", "coupler", "rocker"), np.abs(np.subtract(before, after)), strict=True))
     for name, amount in amounts.items():
-        found = re.search(rf"{name} [^;]*turned by (\S+) rad", told)
+        found = re.search(rf"{name} [^;]*turned by (\S+) rad", reported)
         assert found is not None
         assert float(found[1]) == pytest.approx(amount, rel=5e-3)
-    shift = re.search(r"coupler moved by (\S+) m", told)
+    shift = re.search(r"coupler moved by (\S+) m", reported)
     assert shift is not None
     assert float(shift[1]) == pytest.approx(2.0 * CRANK * np.sin(0.025), rel=5e-3)
-    assert "crank moved" not in told
+    assert "crank moved" not in reported
     assert mechanism.start_residual == pytest.approx(0.05, rel=1e-9)
     fitting = start_of(driven(1.5, 1.5))
     assert moved(fitting, [link.start for link in fitting.links]) == []

@@ -13,6 +13,7 @@ from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import observed
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
+from tests.properties.mechanisms import ground, joint, rigid, scene
 
 ADAPTIVE = [name for name, traits in INTEGRATORS.items() if traits.estimates]
 SOLVERS = [{"integrator": name, "step": 0.004} for name in INTEGRATORS] + [{"integrator": name} for name in ADAPTIVE]
@@ -43,10 +44,10 @@ def test_evaluations_are_counted_and_capped(solver: dict[str, Any]) -> None:
     made = run(double_pendulum(), solver)
     assert made.counters["evaluations"] > made.counters["steps"] > 0
     assert (made.counters["jacobians"] > 0) is INTEGRATORS[solver["integrator"]].implicit
-    with pytest.raises(SolverError, match="limit of 40 evaluations") as told:
+    with pytest.raises(SolverError, match="limit of 40 evaluations") as caught:
         run(double_pendulum(), {**solver, "evaluations": 40})
     # what used them up, and what to do about it
-    assert all(word in str(told.value) for word in (" steps and ", " rejected ", "more evaluations"))
+    assert all(word in str(caught.value) for word in (" steps and ", " rejected ", "more evaluations"))
 
 
 @every_solver
@@ -61,26 +62,16 @@ def test_a_right_hand_side_that_is_no_number_is_refused(solver: dict[str, Any]) 
 
 def driven_pendulum() -> dict[str, Any]:
     """A pendulum hung from a slide that a step law moves until 0.05 s and leaves alone then."""
-    bar = {"type": "rigid", "mass": 1.0, "inertia": [0.02, 0.03, 0.04]}
-    turned = {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}
-    return {
-        "title": "driven pendulum",
-        "body": {
-            "ground": {"type": "ground", "frames": {"rail": {}}},
-            "slide": {**bar, "pose": {}, "frames": {"rail": {}, "pin": {"axes": turned}}},
-            "bob": {**bar, "com": [0.0, 0.1, -0.3], "pose": {}, "frames": {"pin": {"axes": turned}}},
-        },
-        "joint": {
-            "rail": {"type": "prismatic", "between": ["ground.rail", "slide.rail"]},
-            "pin": {"type": "revolute", "between": ["slide.pin", "bob.pin"]},
-        },
-        "drive": {
-            "rail": {"joint": "rail", "law": {"type": "step", "start": [0.0], "end": [0.05], "change": [0.05]}},
-        },
-        "load": GRAVITY,
-        "time": {"end": 0.1},
-        "output": {"interval": 0.1},
+    inertia, turned = [0.02, 0.03, 0.04], {"axes": {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}}
+    bodies = {
+        "ground": ground(rail=(0, 0, 0)),
+        "slide": rigid(1.0, inertia, {"rail": {}, "pin": turned}, pose={}),
+        "bob": rigid(1.0, inertia, {"pin": turned}, com=[0.0, 0.1, -0.3], pose={}),
     }
+    joints = {"rail": joint("prismatic", "ground.rail", "slide.rail"), "pin": joint("revolute", "slide.pin", "bob.pin")}
+    law = {"type": "step", "start": [0.0], "end": [0.05], "change": [0.05]}
+    drive = {"rail": {"joint": "rail", "law": law}}
+    return scene(bodies, joints, end=0.1, drive=drive, load=GRAVITY, output={"interval": 0.1})
 
 
 @pytest.mark.parametrize("integrator", ["rk4", pytest.param("adams-bashforth-moulton", marks=pytest.mark.slow)])
@@ -98,7 +89,7 @@ def test_an_acceleration_that_jumps_at_a_break_costs_no_order() -> None:
     assert np.log2(gone[1] / gone[2]) > 3.5
 
 
-def test_loops_are_kept_closed_and_the_cost_is_told() -> None:
+def test_loops_stay_closed_and_the_cost_is_reported() -> None:
     coarse = {"integrator": "rk4", "step": 0.005}
     loose, tight = (trajectory(spatial_four_bar(), {**coarse, "rtol": rtol}) for rtol in (1e-2, 1e-10))
     assert loose.counters["projections"] == 0

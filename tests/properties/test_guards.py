@@ -71,7 +71,7 @@ def test_a_velocity_that_turns_at_a_distance_above_the_level_passes_nothing() ->
     assert passed((0.3, 0.05, 0.0), (-0.3, 0.05, 0.0)) is not None
 
 
-def test_a_load_reverses_where_it_passes_zero_and_not_beside_it() -> None:
+def test_a_load_reverses_where_it_passes_zero_and_not_near_it() -> None:
     assert passed((0.2, 0.1, 0.0), (-0.1, -0.05, 0.0), level=0.0) == pytest.approx(
         (2.0 / 3.0, 0.0, 1.0, -np.hypot(0.2, 0.1), np.hypot(0.1, 0.05))
     )

@@ -283,7 +283,7 @@ def test_unfinished_work_of_somebody_else_is_not_gone_on_with(tmp_path: Path) ->
     assert Journal(tmp_path, "key").find("piece") is None
 
 
-def test_a_result_that_is_no_dataset_is_told(tmp_path: Path) -> None:
+def test_a_result_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
     store = Store(tmp_path / "results")
     found = store.put("stage", "key", {"nc": b"no netcdf"}, {})
     with pytest.raises(FlexclearError, match="holds no dataset") as caught:

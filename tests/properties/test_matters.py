@@ -77,7 +77,7 @@ def test_an_effect_that_is_not_listed_is_in_no_table():
 def test_the_summary_says_what_changes_by_how_much_and_how_sure_it_is():
     (changed,) = ideal_sentences(study(ideal=Pair(point(0.0), point(0.03), 0)))
     assert "changes by up to <b class='n'>30 mm/s</b>" in changed
-    assert "3 % of its size" in changed
+    assert "3 % of its largest value in the scene" in changed
     (same,) = ideal_sentences(study(ideal=Pair(point(0.0), point(0.0), 0)))
     assert "does not change" in same
     (open_,) = ideal_sentences(study(ideal=Pair(point(0.0, 5e-3), point(0.0), 4)))
@@ -87,7 +87,7 @@ def test_the_summary_says_what_changes_by_how_much_and_how_sure_it_is():
 
 def test_runs_that_scatter_about_an_undecided_mean_are_not_predictable():
     (said,) = ideal_sentences(study(ideal=Pair(point(0.0, 0.5), point(0.0), 4)))
-    assert "4 runs scatter by <b class='n'>500 mm/s</b> (50 % of its size)" in said
+    assert "4 runs scatter by <b class='n'>500 mm/s</b> (50 % of its largest value in the scene)" in said
 
 
 def test_effects_that_the_budget_did_not_reach_are_named_last():

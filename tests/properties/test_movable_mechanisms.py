@@ -70,7 +70,7 @@ def test_many_more_mechanisms_add_their_mobilities(hundred: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["revolute and revolute", "four-bar", "Bennett", "plate on nine rods", "Peaucellier"])
-def test_zeros_stand_far_below_and_the_rest_far_above_the_floor(name: str) -> None:
+def test_zeros_are_far_below_and_the_rest_far_above_the_floor(name: str) -> None:
     """What rounding leaves is measured where it is largest: a thousand sizes away from the origin."""
     random = np.random.default_rng(seed(name))
     setting = replace(movable.any_setting(random), p=(600.0, -500.0, 700.0))
@@ -84,8 +84,8 @@ def test_zeros_stand_far_below_and_the_rest_far_above_the_floor(name: str) -> No
 
 
 @pytest.mark.parametrize("number", range(6))
-def test_a_singular_pose_is_told_from_redundance_however_it_stands(number: int) -> None:
-    """Cranks in one line can go on in parallel or against each other; beside that pose the rank is one higher."""
+def test_a_singular_pose_is_distinguished_from_redundancy_in_any_orientation(number: int) -> None:
+    """Cranks in one line can go on in parallel or against each other; next to that pose the rank is one higher."""
     random = np.random.default_rng(number)
     made = parallel_cranks(random, 2 + number % 2, angle=0.0)
     found = analysed(movable.scene(made, random, movable.any_setting(random)))
@@ -124,7 +124,7 @@ def test_what_cannot_move_is_still_locked(made: Mechanism) -> None:
         assert "remove a joint" in str(caught.value.remedy)
 
 
-def test_hinges_that_hardly_miss_each_other_are_told_so() -> None:
+def test_hinges_that_hardly_miss_each_other_are_reported() -> None:
     """Six digits of an axis: the door is locked by 1e-5 of its size, which is hardly meant."""
     random = np.random.default_rng(3)
     door = coaxial(random, ["revolute", "revolute"], 0)
@@ -148,7 +148,7 @@ def test_axes_written_with_nine_digits_turn_together(digits: int) -> None:
     assert analysed(table).mobility == 1
 
 
-def test_loops_that_almost_close_are_told_what_is_missing() -> None:
+def test_loops_that_almost_close_are_reported_with_what_is_missing() -> None:
     """Bennett's linkage to seven digits cannot be assembled: the message says that digits are missing."""
     random = np.random.default_rng(1)
     table = movable.scene(bennett(random), random, Setting())
@@ -175,7 +175,7 @@ def test_drives_that_redundant_loops_tie_are_still_refused() -> None:
 
 
 def test_a_small_part_of_a_large_machine_keeps_its_own_scale() -> None:
-    """A four-bar of 0.1 mm beside one of 10 m, and one on a body of the other."""
+    """A four-bar of 0.1 mm next to one of 10 m, and one on a body of the other."""
     random = np.random.default_rng(0)
     large = loop(random, "four-bar")
     for base in (movable.WORLD, "link1"):

@@ -38,18 +38,18 @@ def judged(read: Callable[[Path], None], texts: list[str], path: Path, seeds: ra
     wrong, before = [], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for seed in seeds:
         path.write_text(mutant(texts, seed), errors="replace")
-        begun, told = time.process_time(), ""
+        begun, reported = time.process_time(), ""
         try:
             read(path)
         except (InputError, ResourceError) as error:
-            told = str(error)
+            reported = str(error)
         except Exception as error:
             wrong.append(f"{seed}: {type(error).__name__} {str(error)[:200]}")
         seconds = time.process_time() - begun
         if seconds > SECONDS:
             wrong.append(f"{seed}: {seconds:.2f} s")
-        if len(told.encode()) > BYTES or any(not (c.isprintable() or c == "\n") for c in told):
-            wrong.append(f"{seed}: {len(told.encode())} bytes, {told[:200]!r}")
+        if len(reported.encode()) > BYTES or any(not (c.isprintable() or c == "\n") for c in reported):
+            wrong.append(f"{seed}: {len(reported.encode())} bytes, {reported[:200]!r}")
         after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         if after - before > 1024 * MEGABYTES:
             wrong.append(f"{seed}: {(after - before) / 1024:.0f} MB")
@@ -81,9 +81,9 @@ def refusal(path: Path | str) -> str:
         load_scene(path)
     assert time.process_time() - begun < SECONDS
     assert caught.value.exit_code == 2
-    told = str(caught.value)
-    assert len(told.encode()) < BYTES
-    return told
+    reported = str(caught.value)
+    assert len(reported.encode()) < BYTES
+    return reported
 
 
 def test_paths_that_are_no_files_are_refused(tmp_path: Path) -> None:

@@ -114,9 +114,9 @@ def test_a_scene_says_what_a_body_looks_like_and_no_run_depends_on_it():
         "scenes/checks/pendulum.toml", override={f"body.{name}.geometry": SHAPES, f"body.{name}.color": "#CC79A7"}
     )
     assert simulation.params(drawn) == simulation.params(plain)
-    told = rendering.params(drawn, "motion", "html")["bodies"][name]
-    assert told["color"] == "#CC79A7"
-    surface = forms.shapes(told["geometry"], Path("."))
+    reported = rendering.params(drawn, "motion", "html")["bodies"][name]
+    assert reported["color"] == "#CC79A7"
+    surface = forms.shapes(reported["geometry"], Path("."))
     assert surface.points.max(axis=0) == pytest.approx([0.25, 0.01, 0.005], rel=1e-12)
     assert surface.points[:, 0].min() == pytest.approx(-0.02, rel=1e-12)
     assert "bodies" not in rendering.params(plain, "modes", "html")
@@ -147,7 +147,7 @@ def test_a_file_that_is_no_surface_is_refused_in_words(content: bytes, tmp_path:
         forms.read(tmp_path / "part.stl", 1.0)
 
 
-def test_a_shape_file_that_is_not_there_is_told_with_its_place():
+def test_a_missing_shape_file_is_refused_with_its_key():
     scene = load_scene("scenes/checks/pendulum.toml")
     name = next(iter(scene.rigid()))
     there = load_scene(
@@ -201,14 +201,14 @@ def test_a_gltf_file_is_whole_and_moves_every_body(shown: Shown):
     content = make("motion", "gltf", shown)["motion.glb"]
     magic, version, length, size, kind = struct.unpack("<IIIII", content[:20])
     assert (magic, version, length, kind) == (0x46546C67, 2, len(content), 0x4E4F534A)
-    told = json.loads(content[20 : 20 + size])
-    for accessor in told["accessors"]:
-        view = told["bufferViews"][accessor["bufferView"]]
+    reported = json.loads(content[20 : 20 + size])
+    for accessor in reported["accessors"]:
+        view = reported["bufferViews"][accessor["bufferView"]]
         width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
         assert view["byteLength"] == 4 * width * accessor["count"]
-        assert view["byteOffset"] + view["byteLength"] <= told["buffers"][0]["byteLength"]
-    (animation,) = told["animations"]
-    moved = {told["nodes"][c["target"]["node"]]["name"] for c in animation["channels"]}
+        assert view["byteOffset"] + view["byteLength"] <= reported["buffers"][0]["byteLength"]
+    (animation,) = reported["animations"]
+    moved = {reported["nodes"][c["target"]["node"]]["name"] for c in animation["channels"]}
     assert moved == {str(name) for name in shown.run.body.values}
     assert sum(c["target"]["path"] == "weights" for c in animation["channels"]) == 1
 
@@ -226,17 +226,17 @@ def test_a_series_for_paraview_names_files_that_are_there(shown: Shown):
 
 def test_all_modes_of_a_body_are_in_its_page(shown: Shown):
     page = make("modes", "html", shown)["modes.html"].decode()
-    told = json.loads(page.split("<script type='application/json'>")[1].split("</script>")[0])
-    assert len(told["shapes"]) == 7
+    reported = json.loads(page.split("<script type='application/json'>")[1].split("</script>")[0])
+    assert len(reported["shapes"]) == 7
     assert all(
         f"{f:.5g} Hz" in shape["label"]
-        for f, shape in zip(synthetic.bundle().frequency.values, told["shapes"], strict=True)
+        for f, shape in zip(synthetic.bundle().frequency.values, reported["shapes"], strict=True)
         if f > 0
     )
     assert "<title>A scene: modes</title>" in page
 
 
-def test_the_mode_sets_of_several_bodies_stand_beside_each_other():
+def test_the_mode_sets_of_several_bodies_are_shown_next_to_each_other():
     sets = {f"{scene}: rod1": synthetic.bundle() for scene in ("free", "fixed")}
     page = make("modes", "html", Shown(bundles=sets))["modes.html"].decode()
     assert page.count("<div class='viewer'") == 2
@@ -246,10 +246,10 @@ def test_the_mode_sets_of_several_bodies_stand_beside_each_other():
 
 def test_a_joint_is_shown_in_space_with_its_gap_and_force(shown: Shown):
     page = make("joint", "html", shown)["joint.html"].decode()
-    told = json.loads(page.split("<script type='application/json'>")[1].split("</script>")[0])
+    reported = json.loads(page.split("<script type='application/json'>")[1].split("</script>")[0])
     run, name = shown.run, str(shown.run["contact"].values[0])
-    gap, force = (reading["values"] for reading in told["readings"])
-    steps = np.searchsorted(run["time"].values, np.array(told["times"]) - 1e-9)
+    gap, force = (reading["values"] for reading in reported["readings"])
+    steps = np.searchsorted(run["time"].values, np.array(reported["times"]) - 1e-9)
     np.testing.assert_allclose(gap, 1e6 * run["contact_gap"].values[steps, 0], rtol=1e-3)  # four digits are written
     assert max(force) <= float(run["contact_normal_force"].max()) * 1.001
     assert f"{name}: path of the centre" in page
@@ -281,11 +281,11 @@ def swinging() -> tuple[Mechanism, Vibrations]:
 
 
 def test_a_vibrating_pendulum_turns_about_its_pin_and_is_not_drawn_too_far(swinging: tuple[Mechanism, Vibrations]):
-    drawn, told = swinging
-    assert len(told.labels) == 1
+    drawn, reported = swinging
+    assert len(reported.labels) == 1
     pin = drawn.run["frame_position"].values[0, 0]
-    for piece in told.pieces:
-        way, arm = told.scale[0] * piece.moved[0, 0], piece.surface.points - pin
+    for piece in reported.pieces:
+        way, arm = reported.scale[0] * piece.moved[0, 0], piece.surface.points - pin
         np.testing.assert_allclose(np.einsum("ij,ij->i", way, arm), 0.0, atol=1e-12)  # a rotation, linearised
         assert (np.linalg.norm(way, axis=1) <= (vibrations.TURN + 1e-9) * np.linalg.norm(arm, axis=1)).all()
 

@@ -112,15 +112,15 @@ def test_motion_out_of_the_plane_is_spatial():
 
 def test_up_is_against_gravity_and_the_axis_across_runs_to_the_right():
     run = moving(np.array([0.0, 0, -1.0]), np.array([1.0, 0, 0]))
-    told = {"load": {"g": {"type": "gravity", "acceleration": [0, -9.81, 0]}}}
-    found = view(run, told)
+    reported = {"load": {"g": {"type": "gravity", "acceleration": [0, -9.81, 0]}}}
+    found = view(run, reported)
     assert found.planar
     np.testing.assert_allclose(found.up, [0, 1, 0], atol=1e-12)
     assert found.direction[2] > 0.0  # from +z, so that x runs to the right
     assert np.cross(found.up, found.direction)[0] > 0.0
 
 
-def test_a_wanted_direction_is_taken():
+def test_a_requested_direction_is_taken():
     found = view(moving(np.array([0.0, 0, 1]), np.array([1.0, 0, 0])), {}, [2.0, 0.0, 0.0])
     np.testing.assert_allclose(found.direction / np.linalg.norm(found.direction), [1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(found.up, [0, 0, 1], atol=1e-12)

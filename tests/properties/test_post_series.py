@@ -114,7 +114,7 @@ def test_what_happens_between_outputs_is_seen_at_events():
     assert velocity_at_events(struck, moving(grid), "platform", until=0.07)[0] < 1e-7
 
 
-def test_events_that_are_a_hair_apart_are_not_compared():
+def test_nearly_simultaneous_events_are_not_compared():
     """Two accurate runs have the same impact a picosecond apart, between which a contact moves."""
     grid = 1e-4 * np.arange(1801)
     a, b = np.sort(np.append(grid, 0.05587679981)), np.sort(np.append(grid, 0.05587679981 + 1e-12))
@@ -170,7 +170,7 @@ def test_faster_growth_shortens_the_horizon():
     assert len(set(ends)) == 4
 
 
-def test_ensemble_is_told_by_mean_spread_and_quantiles():
+def test_an_ensemble_is_summarised_by_mean_spread_and_quantiles():
     """Evenly spaced members: the quantile q of them lies at the share q of their range."""
     run = synthetic.run("sps4/csj", clearance=True)
     members = synthetic.ensemble(run, members=5, growth=60.0)

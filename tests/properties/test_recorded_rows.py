@@ -1,4 +1,4 @@
-"""What is recorded of a row: the same whatever rows stand beside it, and as independent formulas have it."""
+"""What is recorded of a row: the same whatever rows stand next to it, and as independent formulas have it."""
 
 from dataclasses import fields, replace
 

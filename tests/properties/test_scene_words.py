@@ -71,7 +71,7 @@ SAID = {
 
 
 @pytest.mark.parametrize("text", SAID)
-def test_one_mistake_is_told_once_with_key_and_rule(tmp_path: Path, text: str) -> None:
+def test_one_error_is_reported_once_with_key_and_rule(tmp_path: Path, text: str) -> None:
     (said,) = mistakes(tmp_path, text)
     for words in SAID[text]:
         assert words in said
@@ -87,7 +87,7 @@ def test_one_mistake_is_told_once_with_key_and_rule(tmp_path: Path, text: str) -
         ("phase = 30 deg", 'phase = "30 deg"'),
     ],
 )
-def test_a_quantity_without_quotation_marks_is_told_with_its_line_mended(
+def test_a_quantity_without_quotation_marks_is_reported_with_its_line_corrected(
     tmp_path: Path, written: str, mended: str
 ) -> None:
     (said,) = mistakes(tmp_path, f'[body.b]\ntype = "rigid"\n{written}\n')
@@ -128,6 +128,13 @@ def test_a_line_that_holds_no_quantity_is_left_to_the_reader_of_toml(tmp_path: P
         ("1 h", "time", 3600.0),
         ("600 rpm", "angular velocity", 20.0 * np.pi),
         ("30 deg/s", "angular velocity", np.pi / 6.0),
+        ("1 rev/min", "angular velocity", np.pi / 30.0),
+        ("3 N*mm/deg", "torsional stiffness", 3e-3 * 180.0 / np.pi),
+        ("2 kg·m²", "inertia", 2.0),
+        ("4 g cm^2", "inertia", 4e-7),
+        ("9810 mm/s²", "acceleration", 9.81),
+        ("1 mm/ms^2", "acceleration", 1000.0),
+        ("210000 N/mm^2", "pressure", 2.1e11),
     ],
 )
 def test_units_that_users_of_mechanisms_write(text: str, dimension: str, value: float | None) -> None:
@@ -180,7 +187,7 @@ def test_opposite_to_z_the_frame_turns_about_x() -> None:
 
 
 @pytest.mark.parametrize("other", ["quaternion", "rotation_vector", "axes"])
-def test_an_axis_stands_alone(other: str) -> None:
+def test_an_axis_is_given_alone(other: str) -> None:
     value = {"quaternion": [1, 0, 0, 0], "rotation_vector": [0, 0, 1], "axes": {"z": [0, 0, 1], "x": [1, 0, 0]}}[other]
     with pytest.raises(ValidationError, match="an orientation is given once"):
         Pose.model_validate({"axis": [0, 0, 1], other: value})
@@ -197,7 +204,7 @@ def test_frames_of_recipes_take_an_axis_too() -> None:
 
 
 def lacking(reference: str, interfaces: str) -> str:
-    """What is told of a body of which half the compliance between A and B is missing."""
+    """What is reported of a body of which half the compliance between A and B is missing."""
     names, directions = ["A", "B"], ["x", "y", "z", "rx", "ry", "rz"]
     fraction = xr.DataArray(
         np.full((2, 2, 6), 0.5),
@@ -205,8 +212,8 @@ def lacking(reference: str, interfaces: str) -> str:
         coords={"frame": names, "frame_held": names, "direction": directions},
     )
     attributes = {"reference": reference, "interfaces": interfaces, "count": 12}
-    (told,) = deficits.warnings(xr.Dataset({"compliance_share": fraction}, attrs=attributes), names, "rod")
-    return told
+    (reported,) = deficits.warnings(xr.Dataset({"compliance_share": fraction}, attrs=attributes), names, "rod")
+    return reported
 
 
 def test_the_remedy_for_missing_compliance_is_one_that_the_body_does_not_have() -> None:

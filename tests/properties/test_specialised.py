@@ -258,13 +258,13 @@ def test_equal_wirings_give_equal_code(lanes: int) -> None:
     def where(builder: ir.IRBuilder, array: str) -> ir.AllocaInstr:
         return builder.alloca(ir.DoubleType() if array in "wf" else INT)
 
-    def told() -> str:
+    def reported() -> str:
         model = tabulate(build(load_scene(TREE / "scenes/sps4/csj.toml"), {}))
         made, builder = program(rates_kernel(model), wiring(model.arrays, model.arrays.h)), function()
         Emitter(builder, made, lambda array, place, lane: where(builder, array), lanes, exact=lanes > 1).emit()
         return str(builder.module)
 
-    assert told() == told()
+    assert reported() == reported()
 
 
 def test_friction_of_ideal_joints_is_in_what_steps_evaluate_and_not_in_linear_analyses() -> None:

@@ -61,13 +61,13 @@ def same(name: str, known: xr.Dataset, found: xr.Dataset, R: np.ndarray, shift: 
 def test_turned_and_shifted(name: str) -> None:
     there = simulate(moved(table(name), TURN, SHIFT))
     same(name, original(name), there, TURN, SHIFT)
-    # rounding decides on some steps beside singular poses; error groups that depend on the axes would change many
+    # rounding decides on some steps next to singular poses; error groups that depend on the axes would change many
     assert there.attrs["evaluations"] == pytest.approx(original(name).attrs["evaluations"], rel=0.1)
 
 
 @every_scene
 def test_relabelled(name: str) -> None:
-    """Other names in another order: another tree, other closures, other rows kept."""
+    """Other names in another order: another tree, other closures, other rows selected."""
     old = table(name)
     bodies = {b: f"part{k}" for k, b in enumerate(sorted(old["body"], reverse=True))}
     joints = {j: f"pair{k}" for k, j in enumerate(sorted(old["joint"], reverse=True))}

@@ -113,7 +113,7 @@ def test_a_difference_of_means_within_their_standard_errors_is_chance():
     assert influence(_point(path, spread), _point(near, spread), q, 4).difference == 0.0
     far = path + np.array([1.25 * k * error, 0.0, 0.0])
     found = influence(_point(path, spread), _point(far, spread), q, 4)
-    # sqrt(5^2 - 4^2) = 3 quarters of chance are told apart; roundings only
+    # sqrt(5^2 - 4^2) = 3 quarters of chance are separated; roundings only
     assert found.difference == pytest.approx(0.75 * k * error, rel=1e-10)
     assert found.uncertainty == pytest.approx(k * error, rel=1e-10)
 
@@ -134,7 +134,7 @@ def test_members_that_have_parted_and_agree_at_one_output_by_accident_tell_no_di
         points.append(Point({"a.velocity.series": values}, {}, {"a.velocity.series": spread}, 0))
     a, b = (Point({**p.values, "a.velocity.largest": np.array(1.0)}, {}, p.deviation, 0) for p in points)
     assert influence(a, b, Quantity("a", "velocity"), 3).difference == 0.0
-    # before members part a difference is told as it is
+    # before members part a difference is reported as it is
     early = {"a.velocity.series": np.where(np.arange(600)[:, None] < 200, 1e-9, a.deviation["a.velocity.series"])}
     calm = [Point(p.values, {}, early, 0) for p in (a, b)]
     apart = np.linalg.norm(a.values["a.velocity.series"] - b.values["a.velocity.series"], axis=1)[:180].max()

@@ -163,7 +163,7 @@ def simulate(m: Mechanism, until: float = 0.18, tol: Tolerance | None = None) ->
 
 
 def table(result: Result, every: int = 10) -> dict[str, list[float]]:
-    """The numbers kept for comparison: the impacts, and the platform on each `every`-th grid point."""
+    """The numbers stored for comparison: the impacts, and the platform on each `every`-th grid point."""
     columns = {f"impact_{name}": [getattr(i, name) for i in result.impacts] for name in Impact.__dataclass_fields__}
     columns["time"] = result.time[::every].tolist()
     for name in ("height", "speed", "tilt"):

@@ -72,7 +72,7 @@ def simulate(until: float, rtol: float = 1e-9) -> Result:
 
 
 def table(result: Result, every: int = 2) -> dict[str, list[float]]:
-    """The numbers kept for comparison, on each `every`-th output."""
+    """The numbers stored for comparison, on each `every`-th output."""
     columns: dict[str, list[float]] = {"time": result.time[::every].tolist(), "force": result.force[::every].tolist()}
     for name in ("height", "speed", "tilt"):
         columns[name] = [float(getattr(m, name)) for m in result.platform[::every]]

@@ -19,6 +19,8 @@ from benchmarks.log import Session
 from flexclear.pipeline.core.system.errors import InputError
 
 FAMILIES = {name: page.named(name) for name in families.NAMES}
+#: constants of families that make a measurement longer and better
+SHORT = {"ROUNDS": 2, "TURNS": 2, "EVALUATIONS": 100, "REFERENCE": {"integrator": "dop853", "rtol": 1e-8}}
 PAGES = sorted({family.page for family in FAMILIES.values()})
 
 
@@ -40,7 +42,7 @@ def test_every_module_of_the_families_is_one(root: Path):
     assert {f"{name}.jsonl" for name in FAMILIES} == {path.name for path in log.FOLDER.iterdir()}
 
 
-def test_make_bench_measures_all_that_stands_on_the_page_of_benchmarks(root: Path):
+def test_make_bench_measures_all_families_of_the_page_of_benchmarks(root: Path):
     recipe = (root / "Makefile").read_text().partition("\nbench:")[2].partition("\n\n")[0]
     named = recipe.partition("-m benchmarks ")[2].split()
     assert sorted(named) == sorted(name for name, family in FAMILIES.items() if family.page == "benchmarks.md")
@@ -64,18 +66,18 @@ def test_a_page_says_when_and_where_once(root: Path, name: str):
     text = (root / "docs" / name).read_text()
     sessions = [s for family in page.of_page(name) for s in log.latest(log.FOLDER / f"{family}.jsonl")]
     assert text.count("\nMeasured") == 1
-    told = {page.session_words(s) for s in sessions}
+    reported = {page.session_words(s) for s in sessions}
     lines = [line.removesuffix(".") for line in text.splitlines()]
-    assert all(sum(line.endswith(words) for line in lines) == 1 for words in told)
+    assert all(sum(line.endswith(words) for line in lines) == 1 for words in reported)
     assert text.count("<!-- begin measured -->") == 1
     for said in {s.cpu for s in sessions if s.cpu}:
-        assert text.count(said) == sum(said in words for words in told)
+        assert text.count(said) == sum(said in words for words in reported)
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "stability" else []) for name in FAMILIES]
 )
-def test_what_stands_beside_a_page_is_that_of_the_log(root: Path, name: str):
+def test_files_of_a_page_are_those_of_the_log(root: Path, name: str):
     """Text to the byte; pictures but for how versions of matplotlib round at the edges of lines."""
     family = FAMILIES[name]
     for path, content in family.files(page.records(log.latest(log.FOLDER / f"{name}.jsonl"))).items():
@@ -93,7 +95,8 @@ def test_what_stands_beside_a_page_is_that_of_the_log(root: Path, name: str):
 def test_the_smallest_case_runs_from_end_to_end(root: Path, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     family = FAMILIES[name]
     module, _, _ = families.NAMES[name].partition(":")
-    monkeypatch.setattr(f"benchmarks.families.{module}.ROUNDS", 2, raising=False)
+    for constant, value in SHORT.items():
+        monkeypatch.setattr(f"benchmarks.families.{module}.{constant}", value, raising=False)
     assert main([name, "--only", family.quick, "--into", str(tmp_path)]) == 0
     (session,) = log.read(tmp_path / "log" / f"{name}.jsonl")
     assert session.cpu == log.today().cpu
@@ -119,7 +122,7 @@ def test_the_parts_of_a_solid_s_work_add_up():
     assert "336" in str(solids.FAMILY.show([{"case": "small", **record}]))
 
 
-def test_parts_of_a_command_are_told_apart_in_each_of_its_threads(monkeypatch: pytest.MonkeyPatch):
+def test_parts_of_a_command_are_timed_separately_in_each_thread(monkeypatch: pytest.MonkeyPatch):
     """A part inside of another one in one thread, while a second thread is in a third part."""
     monkeypatch.setattr(command_parts, "_spent", {})
     clock = threading.local()
@@ -157,7 +160,9 @@ def test_options_that_ask_for_nothing_are_refused(options: list[str], words: str
     assert words in capsys.readouterr().err
 
 
-def test_a_system_without_times_of_children_is_told_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+def test_a_system_without_times_of_children_is_refused_in_words(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
     """As on Windows; families that need none run there."""
     monkeypatch.setitem(sys.modules, "resource", None)
     assert main(["commands", "cold", "faults"]) == 0
@@ -198,10 +203,10 @@ def test_the_log_has_machine_and_date_once_and_the_last_of_each_case_counts(tmp_
 
 
 def test_a_page_of_several_sessions_says_which_case_is_whose():
-    told = page.where({"growth": [session(1, "a", "c"), session(2, "b")], "runs": [session(2, "d")]})
-    assert told.startswith("Measured:\n")
-    assert "- growth (a, c): 2026-01-01 on processor 1, python 3" in told
-    assert "- growth (b), runs: 2026-01-02 on processor 2, python 3" in told
+    reported = page.where({"growth": [session(1, "a", "c"), session(2, "b")], "runs": [session(2, "d")]})
+    assert reported.startswith("Measured:\n")
+    assert "- growth (a, c): 2026-01-01 on processor 1, python 3" in reported
+    assert "- growth (b), runs: 2026-01-02 on processor 2, python 3" in reported
     assert page.where({"growth": [session(1, "a")], "runs": [session(1, "d")]}).count("processor 1") == 1
 
 

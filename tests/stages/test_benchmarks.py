@@ -145,9 +145,9 @@ def test_the_peer_s_crash_is_the_outcome_of_a_setting(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(exudyn, "Worker", Process)
     peer = exudyn.Peer(Mechanism("none", growth.four_bars(1), {}), "bar0")
-    told = [peer.run("any", step, SAMPLING).failure for step in (5.0, 1.0, 5.0, 2.0, 5.0, 3.0, 4.0, 5.0)]
+    reported = [peer.run("any", step, SAMPLING).failure for step in (5.0, 1.0, 5.0, 2.0, 5.0, 3.0, 4.0, 5.0)]
     died, late = "its process died (SIGSEGV)", "did not end within 120 s of processor time"
-    assert told == ["", died, "", "", "", late, "no way", ""]
+    assert reported == ["", died, "", "", "", late, "no way", ""]
     assert begun == [[5.0, 1.0], [1.0], [5.0, 2.0], [2.0, 5.0, 3.0], [4.0], [5.0]]
 
 

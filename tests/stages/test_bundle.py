@@ -79,16 +79,16 @@ def test_a_bundle_holds_files_of_any_name_but_none_from_elsewhere(
     assert names == {"mine.toml", "base", "rod.recipe", "body.inp", "parts/a.dat"}
 
 
-def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, command: Command) -> None:
+def test_a_run_that_ends_otherwise_is_reported(scene: Path, tmp_path: Path, command: Command) -> None:
     path, _ = reproduction.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"])
     facts |= {"exit_code": 0, "libraries": {"numpy": "1.0"}}
     path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
-    told = command("doctor", "--repeat", path, code=4)
-    assert "there with 0" in told.out
-    assert "here, 1.0 there" in told.out
+    reported = command("doctor", "--repeat", path, code=4)
+    assert "there with 0" in reported.out
+    assert "here, 1.0 there" in reported.out
 
 
 @pytest.mark.parametrize("name", ["../out.toml", "/out.toml", "files/../../out.toml", "files\\out.toml", "C:/out.toml"])

@@ -25,17 +25,17 @@ def put(store: Store, letter: str, stage: str = "simulate", **facts: str) -> Rec
     return made
 
 
-def test_damage_is_told_and_removed(store: Store, command: Command):
+def test_damage_is_reported_and_removed(store: Store, command: Command):
     for letter in "abc":
         store.show(put(store, letter), f"runs/{letter}", {}, "simulate")
     assert "3 artifacts, 0 faults" in command("cache", "check").out
     store.path("simulate", "a" * 32, "nc").write_bytes(b"b" * 1000)
     path = store.path("simulate", "b" * 32, "json")
     path.write_bytes(path.read_bytes().replace(b'"b"', b'"d"'))
-    told = command("cache", "check", code=4)
-    assert f"{'a' * 32}.nc is corrupt" in told.out
-    assert f"{'b' * 32}.json is no record, or damaged" in told.out
-    assert "never used" in told.err
+    reported = command("cache", "check", code=4)
+    assert f"{'a' * 32}.nc is corrupt" in reported.out
+    assert f"{'b' * 32}.json is no record, or damaged" in reported.out
+    assert "never used" in reported.err
     os.utime(store.path("simulate", "b" * 32, "nc"), (0.0, 0.0))
     command("cache", "prune")
     assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*")) == ["c", "c"]
@@ -85,27 +85,27 @@ def test_points_of_sweeps_are_looked_at_as_well(store: Store, command: Command):
     assert f"sweep/x/{'d' * 32}.nc is corrupt" in command("cache", "check", code=4).out
 
 
-def test_what_an_artifact_was_made_from_is_told(store: Store, command: Command):
+def test_the_inputs_of_an_artifact_are_reported(store: Store, command: Command):
     store.show(put(store, "a"), "runs/x", {"nc": "run.nc"}, "simulate")
     for what in (str(store.root / "runs" / "x" / "run.nc"), "aaaa"):
-        told = command("cache", "explain", what).out
-        assert f"simulate {'a' * 32}" in told
-        assert "parameter c: a" in told
+        reported = command("cache", "explain", what).out
+        assert f"simulate {'a' * 32}" in reported
+        assert "parameter c: a" in reported
     command("cache", "explain", "b", code=2)
     assert "simulate          1 artifacts" in command("cache", "size").out
 
 
-def test_kernels_of_another_build_are_told_and_are_no_damage(store: Store, command: Command):
+def test_kernels_of_another_build_are_counted_and_are_no_damage(store: Store, command: Command):
     """Their sums name other files than source and code; one of this build whose code is another's is damaged."""
     folder = store.root.parent / "kernels" / "abc"
     folder.mkdir(parents=True)
     for name, ends in (("old", (".py", ".nbi")), ("bad", (".py", ".code"))):
         (folder / f"flexclear_{name}.py").write_text("")
         (folder / f"flexclear_{name}.sum").write_bytes(checked({f"flexclear_{name}{end}": "1" for end in ends}))
-    told = command("cache", "check", code=4).out
-    assert "2 compiled kernels, 1 of another build" in told
-    assert "flexclear_bad.py is damaged" in told
-    assert "flexclear_old.py is damaged" not in told
+    reported = command("cache", "check", code=4).out
+    assert "2 compiled kernels, 1 of another build" in reported
+    assert "flexclear_bad.py is damaged" in reported
+    assert "flexclear_old.py is damaged" not in reported
 
 
 def test_results_of_another_processor_are_reported_and_are_fresh():
@@ -150,7 +150,7 @@ def test_the_record_of_a_run_names_its_processor(shown: Path, command: Command):
     assert f"computed by processor: {machine.instruction_set()['processor']}" in said
 
 
-def test_bit_rot_in_a_shown_file_is_found_and_run_shows_it_again(shown: Path, command: Command):
+def test_bit_rot_in_a_shown_file_is_detected_and_run_shows_it_again(shown: Path, command: Command):
     good = shown.read_bytes()
     command("cache", "check")
     rot(shown)

@@ -1,4 +1,4 @@
-"""Ideal twins, rigid bodies from recipes, and runs beside each other."""
+"""Ideal twins, rigid bodies from recipes, and runs next to each other."""
 
 from __future__ import annotations
 
@@ -128,11 +128,11 @@ def test_differences_are_those_of_the_runs():
         (98.4812e-3, 70e-3, "98 ± 70 mm"),
         (1.1044e-4, 2.01e-5, "110 ± 20 µm"),
         (12.34567, 0.0123, "12.346 ± 0.012 m"),
-        (244.5e-6, 250e-6, "240 ± 250 µm"),  # two digits of the error, no exponent beside a prefix
+        (244.5e-6, 250e-6, "240 ± 250 µm"),  # two digits of the error, no exponent next to a prefix
         (1.35906e-6, 4.9e-10, "1.35906 ± 0.00049 µm"),
         (110e-9, 20e-6, "0 ± 20 µm"),  # the unit of what is larger
         (1e-3, 0.0, "1 ± 0 mm"),
-        (1e-3, np.nan, "1 mm"),  # an error that nobody knows is not told
+        (1e-3, np.nan, "1 mm"),  # an unknown error is not printed
         (1e-3, np.inf, "1 ± inf mm"),
     ],
 )

@@ -90,15 +90,15 @@ def test_what_a_second_process_is_compiling_is_left_to_it(files: list[Path], roo
     """And when it dies over it, or is killed, compiled here after all, last."""
     with held(files[0], root) as holder:
         assert not take(files[0], nothing)
-        told: list[Path] = []
+        reported: list[Path] = []
 
         def tell(path: Path) -> None:
-            told.append(path)
+            reported.append(path)
             if path == files[0]:
                 threading.Timer(0.2, holder.kill).start()
 
         bring(files, tell)
-    assert told == [files[1], files[2], files[0]]
+    assert reported == [files[1], files[2], files[0]]
     assert results(files) == [10, 11, 12]
 
 
@@ -160,12 +160,12 @@ def test_a_second_process_that_fails_is_not_missed(
     files: list[Path], monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     monkeypatch.setattr(compiler_process, "COMMAND", command)
-    told: list[Path] = []
+    reported: list[Path] = []
     with compiler_process.second_process(files) as process:
         assert process is not None
         assert process.wait(timeout=PATIENCE) != 0
-        bring(files, told.append)
-    assert told == files
+        bring(files, reported.append)
+    assert reported == files
     assert results(files) == [10, 11, 12]
 
 
@@ -238,12 +238,12 @@ def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, sce
     assert heard == [idle] * len(scenes)
 
 
-def test_code_that_cannot_be_kept_is_compiled_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "file" / "kernels"))
-    told: list[str] = []
-    path = functions._file(folder.writable(kernel_root(), told.append), "test", SOURCE.format(k=3))
-    assert "cannot be kept" in told[0]
+    reported: list[str] = []
+    path = functions._file(folder.writable(kernel_root(), reported.append), "test", SOURCE.format(k=3))
+    assert "cannot be kept" in reported[0]
     with claimed(path, wait=True):
         assert not take(path, nothing)
     assert take(path, lambda _: None)

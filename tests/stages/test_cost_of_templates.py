@@ -57,11 +57,11 @@ def test_the_first_answer_comes_soon_and_its_errors_are_those_of_a_converged_run
     for q in chosen:
         if not q.over_time:
             continue
-        told = float(study["own_error"].sel(quantity=q.name))
+        reported = float(study["own_error"].sel(quantity=q.name))
         true = quantities.error(mine, reference, q, until) / (quantities.scale(reference, q) or 1.0)
-        print(f"{kind} {q.name}: error {told:.2e}, by {other['integrator']} {true:.2e}")
-        assert told <= FACTOR * true + ROUNDING
-        assert true <= FACTOR * told + ROUNDING
+        print(f"{kind} {q.name}: error {reported:.2e}, by {other['integrator']} {true:.2e}")
+        assert reported <= FACTOR * true + ROUNDING
+        assert true <= FACTOR * reported + ROUNDING
 
 
 def _run(scene: Scene, workplace: Workplace, solver: dict[str, Any]) -> xr.Dataset:

@@ -84,7 +84,7 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
     found = study.drawn().dataset()
     solver = {"solver": {"integrator": "radau", "rtol": 1e-12}}
     converged = scenes.run(edited(swing, solver), place)
-    told = 0
+    reported = 0
     for rtol in found["rtol"].values:
         if np.isnan(found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=rtol)).any():
             continue  # too loose: the energy balance does not close
@@ -96,8 +96,8 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
             unsure = float(found.reference_uncertainty.sel(quantity=name))
             if float(here) > 20.0 * unsure:  # of errors near the reference's own nothing is claimed
                 assert 0.5 < error / float(here) < 2.0
-                told += 1
-    assert told >= 3
+                reported += 1
+    assert reported >= 3
 
 
 def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, place: Workplace, study: cost.Study):
@@ -123,7 +123,7 @@ TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.posit
 
 
 @pytest.mark.parametrize(
-    "text, told",
+    "text, reported",
     [
         ("{", "cannot be read"),
         ("[]", "a table of scenes"),
@@ -133,10 +133,10 @@ TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.posit
         ('{"a": [{"name": "x", "seconds": [1], "error": {"q": [1, 2]}}]}', "another number of errors"),
     ],
 )
-def test_a_file_of_peers_that_makes_no_sense_is_refused(tmp_path: Path, text: str, told: str):
+def test_a_file_of_peers_that_makes_no_sense_is_refused(tmp_path: Path, text: str, reported: str):
     file = tmp_path / "peers.json"
     file.write_text(text)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         cost.read_peers(file)
 
 

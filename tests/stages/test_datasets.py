@@ -28,7 +28,7 @@ from flexclear.pipeline.post.single_run.series import derive
 
 #: symbols of UDUNITS-2 that datasets use; a product of them, each with an integer exponent, is a unit
 SYMBOLS = ("kg", "m", "s", "N", "Pa", "J", "W", "Hz", "rad")
-#: dimensions whose entries are told apart by coordinates of other names, or by their place in a matrix alone
+#: dimensions whose entries have coordinates of other names, or an index in a matrix alone
 WITHOUT_INDEX = {"event", "impact", "singular_pass"}
 
 
@@ -45,7 +45,7 @@ def test_every_unit_is_one_that_udunits_reads(name: str) -> None:
     assert {unit for unit in units if not is_udunits(unit)} == set()
 
 
-def test_what_udunits_does_not_read_is_told_apart() -> None:
+def test_texts_that_udunits_does_not_read_are_recognised() -> None:
     assert not any(is_udunits(text) for text in ("kg0.5 m", "m or rad", "N or N m", "sqrt(kg)", "", "m^2"))
 
 
@@ -55,7 +55,7 @@ def test_pages_are_what_the_sources_say() -> None:
 
 @pytest.mark.parametrize("kind", keys.HEADS)
 def test_every_key_has_a_meaning(kind: str) -> None:
-    """In words of its own, beside the name of its unit."""
+    """In words of its own, next to the name of its unit."""
     found = re.findall(r"^## (.+)$|^\| `(\w+)` \| .*? \| (?:needed|-|`.*?`) \| (.*) \|$", keys.page(kind), re.MULTILINE)
     rows = [(key, meaning) for _, key, meaning in found if key]
     assert len(rows) > 15
@@ -147,7 +147,7 @@ def test_units_are_those_of_each_entry_where_some_slide_and_others_turn(root: Pa
 
 
 def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
-    """Read by a child process, as files of others are, to the same values and names; anything else is told."""
+    """Read by a child process, as files of others are, to the same values and names; anything else is refused."""
     run = simulate(load_scene(root / "scenes" / "checks" / "pendulum.toml", {"time.end": 0.01}), {}, silent)
     write_dataset(tmp_path / "mine.nc", run)
     for path in (tmp_path / "mine.nc", str(tmp_path / "mine.nc")):

@@ -12,16 +12,16 @@ from tests.stages.conftest import Command
 
 
 def test_the_doctor_finds_this_place_well(command: Command):
-    told = command("doctor").out
-    assert "WRONG" not in told
-    assert "a free fall of 0.1 s ends at -0.04905 m" in told
+    reported = command("doctor").out
+    assert "WRONG" not in reported
+    assert "a free fall of 0.1 s ends at -0.04905 m" in reported
 
 
 def test_the_doctor_says_what_is_wrong(command: Command, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor, "_self_test", lambda: ("it fell upwards", False))
-    told = command("doctor", code=4)
-    assert "WRONG  self-test  it fell upwards" in told.out
-    assert "not well: self-test" in told.err
+    reported = command("doctor", code=4)
+    assert "WRONG  self-test  it fell upwards" in reported.out
+    assert "not well: self-test" in reported.err
 
 
 @pytest.mark.parametrize("draws, line", [(True, "ok     graphics"), (False, "lacks  graphics")])
@@ -69,7 +69,7 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> 
     assert code() == before
 
 
-def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(tmp_path: Path, command: Command) -> None:
+def test_a_wrong_scene_is_refused_before_anything_is_compiled(tmp_path: Path, command: Command) -> None:
     assert "none.toml" in command("doctor", "--compile", tmp_path / "none.toml", code=2).err
 
 

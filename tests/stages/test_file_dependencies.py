@@ -125,7 +125,7 @@ def test_a_companion_file_counts(
 FILES = {"file body.ele": True, "file body.node": False}
 
 
-def test_equal_recipes_with_other_companions_are_kept_apart(tmp_path: Path, sources: Sources) -> None:
+def test_equal_recipes_with_other_companions_have_different_keys(tmp_path: Path, sources: Sources) -> None:
     """As of one mesh that was morphed: the same cells, other nodes."""
     store = Store(tmp_path / "results")
     tasks = [mesh_task(tetrahedra(tmp_path / name, length)) for name, length in (("a", 1.0), ("b", 2.0))]

@@ -54,7 +54,7 @@ def test_every_module_that_runs_is_in_the_key(root: Path, tmp_path: Path, scene:
 
 
 def test_the_version_is_known_in_a_checkout_on_the_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """There the metadata of an editable installation lies beside the sources, as PKG-INFO."""
+    """There the metadata of an editable installation lies next to the sources, as PKG-INFO."""
     (tmp_path / "some_library.egg-info").mkdir()
     (tmp_path / "some_library.egg-info" / "PKG-INFO").write_text(
         "Metadata-Version: 2.4\nName: some_library\nVersion: 1.2\n"

@@ -28,13 +28,13 @@ def test_the_command_prints_pose_residual_and_mobility_then_the_table(root: Path
     assert float(hertz) == pytest.approx(np.sqrt(9.81) / (2.0 * np.pi), rel=1e-6)
 
 
-def test_what_loops_say_twice_is_told_where_reactions_depend_on_it() -> None:
+def test_redundant_closures_are_reported_where_reactions_depend_on_them() -> None:
     """A four-bar of hinges whose motor is held: three conditions too many, and nothing that could vibrate."""
-    told = {
+    reported = {
         "scene": "four_bar", "time": 0.0, "drives": "held", "residual": 0.0, "iterations": 0, "mobility": 0,
         "motions_without_stiffness": 0, "redundant_closure_rows": 3, "undetermined_reactions": "A, B, C, D",
     }  # fmt: skip
-    still = xr.Dataset(coords={"vibration": np.zeros(0, dtype=int)}, attrs=told)
+    still = xr.Dataset(coords={"vibration": np.zeros(0, dtype=int)}, attrs=reported)
     *_, mobility, repeated, nothing = text(still).splitlines()
     assert mobility == "free motions besides the drives: 0"
     assert repeated.startswith("3 conditions of the closed loops follow from the others, as three do in a planar loop:")
@@ -52,9 +52,9 @@ def test_a_wrong_time_is_refused(root: Path, command: Command, at: str, said: st
 
 
 def test_an_unknown_drive_is_refused(root: Path) -> None:
-    with pytest.raises(FlexclearError, match="there is no such drive") as told:
+    with pytest.raises(FlexclearError, match="there is no such drive") as caught:
         fc.equilibrium(path_of(root, "pendulum"), drives={"motor": 0.1})
-    assert told.value.exit_code == InputError.exit_code
+    assert caught.value.exit_code == InputError.exit_code
 
 
 def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean(root: Path) -> None:

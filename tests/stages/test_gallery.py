@@ -231,15 +231,15 @@ def test_the_gallery_has_fifteen_mechanisms_and_those_that_are_looked_for() -> N
 def test_a_mechanism_answers_what_its_page_says(name: str, root: Path) -> None:
     entry = ENTRIES[name]
     page = (root / "docs" / "gallery.md").read_text()
-    told = re.search(rf"^\*{re.escape(entry.question)}\* (.+)$", page, re.MULTILINE)
-    assert told is not None
+    reported = re.search(rf"^\*{re.escape(entry.question)}\* (.+)$", page, re.MULTILINE)
+    assert reported is not None
     scene = scene_of(entry)
     run = solved(entry, scene, bundles(scene))
     if name in CLOSED_FORMS:
         CLOSED_FORMS[name](run)
     answer = entry.answer(run, scene)
-    assert re.sub(r"[\d.e+-]+", "#", answer) == re.sub(r"[\d.e+-]+", "#", told[1])
-    assert numbers(answer) == pytest.approx(numbers(told[1]), rel=LAST_DIGIT)
+    assert re.sub(r"[\d.e+-]+", "#", answer) == re.sub(r"[\d.e+-]+", "#", reported[1])
+    assert numbers(answer) == pytest.approx(numbers(reported[1]), rel=LAST_DIGIT)
     assert (root / "docs" / "gallery" / f"{name}.png").is_file()
 
 

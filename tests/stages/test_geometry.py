@@ -48,9 +48,9 @@ def test_the_answer_to_leg_1_is_that_of_finite_changes() -> None:
 
 def test_fitted_layouts_have_table_8_s_sensitivities() -> None:
     for numbers in (TAKEN, (0.04, 0.3, 0.24), (0.06, 0.06, 0.36)):
-        told = answer(layouts.fitted(*numbers))
-        assert told.dz * layouts.CLEARANCE == pytest.approx(1e-3 * TABLE8.displacement, rel=1e-9)
-        assert told.dangle * layouts.CLEARANCE == pytest.approx(TABLE8.angle, rel=1e-9)
+        reported = answer(layouts.fitted(*numbers))
+        assert reported.dz * layouts.CLEARANCE == pytest.approx(1e-3 * TABLE8.displacement, rel=1e-9)
+        assert reported.dangle * layouts.CLEARANCE == pytest.approx(TABLE8.angle, rel=1e-9)
 
 
 def test_other_layouts_do_not() -> None:

@@ -211,11 +211,11 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked(monkeypatch: py
         if fraction is not None and fraction > 0.3:
             stopping.request("the time is over")
 
-    with pytest.raises(StoppedError) as told:
+    with pytest.raises(StoppedError) as caught:
         dynamics.simulate(scene, {}, progress)
     monkeypatch.setattr(stopping, "_why", "")
-    assert told.value.exit_code == 4
-    left = told.value.partial
+    assert caught.value.exit_code == 4
+    left = caught.value.partial
     assert left.attrs["complete"] == 0
     assert left.attrs["stopped_at"] == left.time[-1] < whole.time[-1]
     assert left.position.identical(whole.position[: left.sizes["time"]])

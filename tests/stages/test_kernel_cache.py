@@ -37,12 +37,12 @@ def kernel(tmp_path: Path) -> Path:
 def used(path: Path) -> bool:
     """Load it as a new process would, and use it; whether it had to be compiled."""
     loaded.pop(path.stem, None)
-    told: list[Path] = []
-    bring([path], told.append)
+    reported: list[Path] = []
+    bring([path], reported.append)
     scaled = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(loaded[path.stem].address)
     assert scaled(2.0) == 2.0 * 0.123456789
     assert compiled(path)
-    return bool(told)
+    return bool(reported)
 
 
 def parts(path: Path) -> list[Path]:
@@ -56,7 +56,7 @@ def test_what_is_whole_is_fetched(kernel: Path) -> None:
     assert not list(kernel.parent.rglob("*.lock"))
 
 
-def test_every_flipped_bit_and_every_cut_is_found_before_anything_is_loaded(kernel: Path) -> None:
+def test_every_flipped_bit_and_every_cut_is_detected_before_anything_is_loaded(kernel: Path) -> None:
     """Also in the file of digests itself; then it is compiled again, and whole."""
     for k in range(3):
         for name in (part.name for part in parts(kernel)):

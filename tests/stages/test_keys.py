@@ -21,7 +21,6 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.encounters import meet, noted
 from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import (
-    ABOVE,
     TREE,
     Sources,
     code_digest,
@@ -68,7 +67,7 @@ def test_floats_keep_every_digit():
     assert flatten(0.1) != flatten(0.1 + 2**-56)
 
 
-def test_what_json_cannot_say_is_kept_as_text():
+def test_what_json_cannot_express_is_text():
     """A nan or a date in a recipe is for the recipe's check to refuse, in words."""
     assert flatten({"a": float("nan"), "b": datetime.date(2019, 3, 10)}) == [("a", "NaN"), ("b", '"2019-03-10"')]
 
@@ -94,7 +93,7 @@ def test_reasons_are_words():
     assert reasons({}, {"input mesh": "2"}, frozenset({"mesh"})) == []
 
 
-def test_imports_are_found_wherever_they_stand():
+def test_imports_are_collected_from_anywhere_in_a_module():
     text = b"""
 import numpy as np
 from flexclear.pipeline.core.scene import units
@@ -147,7 +146,7 @@ def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: S
     named = {name for module in closure.values() for name in module.own} | {
         n for name in closure for n in parents(name)
     }
-    assert {name for name in named if source_file(root, name) is not None} <= closure.keys() | ABOVE
+    assert {name for name in named if source_file(root, name) is not None} <= closure.keys()
 
 
 def test_a_root_that_does_not_exist_is_an_error(root: Path):
@@ -216,13 +215,13 @@ def test_another_sentence_about_a_value_runs_nothing_again(root: Path, sources: 
     edits = {"body.platform.source.mass": "weighed", "joint.A1.source.clearance": "assumed: measured"}
     before, after = (Graph(load_scene(path, override)) for override in ({}, edits))
     assert changed(keys(before, sources), keys(after, sources)) == {"post"}
-    told = derived_series.origins(after.scene)
-    assert json.loads(told["sources"])["body.platform.mass"] == "weighed"
-    assert json.loads(told["assumptions"])["joint.A1.clearance"] == "assumed: measured"
+    reported = derived_series.origins(after.scene)
+    assert json.loads(reported["sources"])["body.platform.mass"] == "weighed"
+    assert json.loads(reported["assumptions"])["joint.A1.clearance"] == "assumed: measured"
 
 
 def test_another_sentence_in_a_recipe_makes_no_mesh_again(root: Path, copy: Path, sources: Sources):
-    """It is told where a scene's own sentences are."""
+    """It is reported where a scene's own sentences are."""
     recipe = copy / "meshes" / "actuated_rod.toml"
     recipe.write_text(
         recipe.read_text()
@@ -231,9 +230,9 @@ def test_another_sentence_in_a_recipe_makes_no_mesh_again(root: Path, copy: Path
     )
     before, after = graph(root, "sps4/far_cb"), graph(copy, "sps4/far_cb")
     assert changed(keys(before, sources), keys(after, sources)) == {"post"}
-    told = derived_series.origins(after.scene)
-    assert json.loads(told["sources"])["body.rod1.recipe.shape"] == "Table 2"
-    assert json.loads(told["assumptions"])["body.rod1.recipe.material"] == "assumed: aluminium"
+    reported = derived_series.origins(after.scene)
+    assert json.loads(reported["sources"])["body.rod1.recipe.shape"] == "Table 2"
+    assert json.loads(reported["assumptions"])["body.rod1.recipe.material"] == "assumed: aluminium"
 
 
 @pytest.mark.parametrize("source", ["5", "{ density = 3 }", "[1]"])
@@ -377,8 +376,8 @@ def test_a_scene_survives_the_way_through_its_parameters(root: Path):
         if path.parent.name == "sweeps":
             continue
         scene = load_scene(path)
-        told = {"name": scene.name, "limits": scene.limits.written()}  # the context of its task
-        again = simulation.rebuild({**told, **simulation.params(scene, ensemble=True)}, {})
+        reported = {"name": scene.name, "limits": scene.limits.written()}  # the context of its task
+        again = simulation.rebuild({**reported, **simulation.params(scene, ensemble=True)}, {})
         assert again.name == scene.name
         left_out = {"title", "description", "accuracy", "sections", "view"}
         one, other = scene.model_dump(exclude=left_out), again.model_dump(exclude=left_out)

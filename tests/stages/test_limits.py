@@ -36,11 +36,11 @@ def test_a_run_that_memory_cannot_hold_is_refused_at_once(
     monkeypatch.setattr(machine, "memory", lambda: 10**9)
     path = written(tmp_path, SCENE.replace('"0.1 ms"', '"1 us"') + JOINT)
     begun = time.monotonic()
-    told = command("run", path, code=4).err
+    reported = command("run", path, code=4).err
     # loading and estimating; a run of a million rows takes longer on any machine
     assert time.monotonic() - begun < 60.0
-    assert "a run of 1e+06 rows takes about" in told
-    assert "of memory, and 800 MB are allowed" in told
+    assert "a run of 1e+06 rows takes about" in reported
+    assert "of memory, and 800 MB are allowed" in reported
 
 
 def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -57,18 +57,18 @@ def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monk
 def test_rows_and_members_are_limits_that_a_scene_may_raise(tmp_path: Path, fresh: Path, command: Command):
     """What is asked for is right, but too much: exit code 4, as for parts, cells and modes."""
     path = written(tmp_path, SCENE + JOINT)
-    for place, value, told in (
+    for place, value, reported in (
         ("output.interval", "1e-12 s", "more than the 10000000 that limits.rows allows"),
         ("ensemble.members", 200_000, "[ensemble.members]: 200000 are more than the 100000 that limits.members allows"),
     ):
-        assert told in command("run", path, "--set", f"{place}={value!r}", code=4).err
+        assert reported in command("run", path, "--set", f"{place}={value!r}", code=4).err
         with pytest.raises(ResourceError, match=r"^.*limited.toml \["):
             load_scene(path, {place: value})
     limits = {"limits.rows": 10**15, "limits.members": 10**6}
     load_scene(path, limits | {"output.interval": "1e-12 s", "ensemble.members": 200_000})
     raised = load_scene(path, limits | {"output.interval": "1e-12 s"})
-    for told in ({}, {"limits": raised.limits.written()}):  # made again by a stage, which may not be told them
-        assert simulation.rebuild(simulation.params(raised) | told).output.interval == 1e-12
+    for reported in ({}, {"limits": raised.limits.written()}):  # made again by a stage, which may not get them
+        assert simulation.rebuild(simulation.params(raised) | reported).output.interval == 1e-12
     with pytest.raises(ResourceError, match=r"limits\.rows"):
         with_numbers(load_scene(path), {"output.interval": 1e-12})
     (tmp_path / "many.toml").write_text(
@@ -154,7 +154,7 @@ def test_the_estimate_of_a_row_is_what_a_run_takes(root: Path):
         assert 0.5 * measured < estimate < 2.0 * measured
 
 
-def test_a_page_that_the_disk_has_no_room_for_is_told_by_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_page_for_which_the_disk_has_no_room_is_named_by_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The page that was there stays whole."""
 
     def full(path: Path, content: bytes) -> str:

@@ -33,7 +33,9 @@ def test_a_command_looks_for_no_garbage_at_its_end() -> None:
     code = (
         "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count())); import flexclear.commands.__main__"
     )
-    told = f"{code}; flexclear.commands.__main__.main()"  # ends when it has said the version, and has set nothing aside
-    assert int(printed(told, "--version").split()[-1]) > 1000  # objects; there are tens of thousands
+    reported = (
+        f"{code}; flexclear.commands.__main__.main()"  # ends when it has said the version, and has set nothing aside
+    )
+    assert int(printed(reported, "--version").split()[-1]) > 1000  # objects; there are tens of thousands
     # in somebody else's process nothing is changed
     assert int(printed(code)) == 0

@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.quantities import LASTING
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
@@ -39,7 +40,9 @@ def two(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def parting(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Motions count as parted before half of the slider-crank's run is over, and are looked at some hundred times."""
+    """Motions diverge before half of the slider-crank's run is over, and are compared some hundred times."""
+    for name in ("SEPARATED", "DIVERGED"):
+        monkeypatch.setattr(quantities, name, 1e-6)
     monkeypatch.setattr(horizon, "SEPARATED", 1e-6)
     monkeypatch.setattr(trajectory, "SLICE", 100)
 
@@ -87,7 +90,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
 
 
 @pytest.mark.usefixtures("parting", "two")
-def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_perturbed_run_that_has_separated_is_stopped(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not even where it is ahead of the run, whose largest velocity tells what is visible: then it waits."""
     rows: list[float] = []
     enough = Pair._enough
@@ -104,7 +107,7 @@ def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: 
     # the record of it ends where the separation has lasted, wherever the perturbed run was stopped
     assert shown[-1] <= end + 1.2 * LASTING * scene.time.end
     assert np.all(np.diff(shown) > 0.0)
-    assert np.all(run.separation.values[shown >= end] > horizon.SEPARATED)
+    assert np.all(run.separation.values[shown >= end] > quantities.SEPARATED)
 
 
 @pytest.mark.usefixtures("two")
@@ -115,12 +118,12 @@ def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
     monkeypatch.setattr(progress_rate, "TRIAL", 1000)
     monkeypatch.setattr(progress_rate, "HOPELESS", 1100)
     monkeypatch.setattr(trajectory, "SLICE", 100)
-    scene, told = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
+    scene, reported = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
     expected = alone(scene, monkeypatch)
     assert expected.attrs["method"] == "radau"
-    found = dynamics.simulate(scene, {}, lambda fraction, text: told.add(threading.get_ident()))
+    found = dynamics.simulate(scene, {}, lambda fraction, text: reported.add(threading.get_ident()))
     assert found.identical(expected)
-    assert told == {threading.get_ident()}
+    assert reported == {threading.get_ident()}
 
 
 @pytest.mark.parametrize("processors_there", [1, 2])
@@ -140,8 +143,8 @@ def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(
 
 
 @pytest.mark.usefixtures("parting")
-def test_a_twin_that_fails_after_it_has_parted_tells_as_much_as_one_that_does_not(root: Path) -> None:
-    """However far it was followed: beside a slower run it may come to where it fails, and after the run it does not."""
+def test_a_perturbed_run_that_fails_after_its_separation_gives_the_same_horizon(root: Path) -> None:
+    """However far it was followed: next to a slower run it may come to where it fails, after the run it does not."""
     engine = engine_of(check(root, "clearance_slider_crank"), {}, silent)
     start = consistent_start(engine)
 
@@ -156,7 +159,7 @@ def test_a_twin_that_fails_after_it_has_parted_tells_as_much_as_one_that_does_no
             return follow(mine, y, silent, lambda name: mine, None, failing, outputs)
 
         pair = Pair(engine)
-        pair.run(lambda *told: follow(engine, start, silent, lambda name: engine, None, *told))
+        pair.run(lambda *reported: follow(engine, start, silent, lambda name: engine, None, *reported))
         return pair.perturbed_run(start, steps, silent)
 
     whole = twin(2.0 * engine.end)
@@ -219,7 +222,7 @@ def test_where_no_thread_is_to_be_had_the_work_is_done_when_its_result_is_asked_
 
 @pytest.mark.parametrize("stopped", ["run", "twin"])
 def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Asked to stop while the run goes on, or its twin alone: what there is of the run is told."""
+    """Asked to stop while the run goes on, or its twin alone: what there is of the run is returned."""
     monkeypatch.setattr(trajectory, "SLICE", 100)
     monkeypatch.setattr(stopping, "_why", "")
     scene = check(root, "bounce", **{"output.interval": 0.05})
@@ -237,16 +240,16 @@ def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: p
     with monkeypatch.context() as patch:
         if stopped == "twin":
             patch.setattr(Pair, "_enough", late_twin)
-        with pytest.raises(StoppedError) as told:
+        with pytest.raises(StoppedError) as caught:
             dynamics.simulate(scene, {}, progress)
     stopping._why = ""
-    left = told.value.partial
+    left = caught.value.partial
     assert left.attrs["complete"] == 0
     assert left.position.identical(whole.position[: left.sizes["time"]])
     assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")
 
 
-def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) -> None:
+def test_rows_for_comparisons_alone_are_not_in_the_dataset(root: Path) -> None:
     """Ten outputs in the whole run, and comparisons between them."""
     scene = check(root, "bounce", **{"output.interval": 0.1})
     engine = engine_of(scene, {}, silent)
@@ -256,7 +259,7 @@ def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) ->
     assert np.isin(engine.output_times(0.1), run.time.values).all()
 
 
-def test_what_goes_on_meanwhile_is_ended_with_what_it_goes_on_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_concurrent_work_ends_with_its_block(monkeypatch: pytest.MonkeyPatch) -> None:
     processors(monkeypatch, 2)
     ended = threading.Event()
 
@@ -281,7 +284,7 @@ def test_workers_of_another_program_take_no_second_processor() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_what_the_work_raises_is_told_to_who_waits_for_it(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_concurrent_work_raises_reaches_its_caller(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     processors(monkeypatch, count)
 
     def work(alive: Progress) -> int:

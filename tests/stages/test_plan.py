@@ -36,6 +36,7 @@ from flexclear.pipeline.dynamics.run.run import Run, integrate
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, open_workplace
+from tests.properties.mechanisms import frame, joint, rigid
 from tests.stages.conftest import Command
 
 #: of the leg's rod [m, Pa, kg/m^3], and what stands on it [kg]
@@ -92,8 +93,8 @@ def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(tmp_pa
     assert found.influence["ball.force"] == pytest.approx(PLATFORM * GRAVITY, rel=0.05)
 
 
-def test_the_vibration_that_is_told_is_one_that_the_loads_excite(tmp_path: Path):
-    """Loads along an upright leg leave its bending at rounding, which the sudden weight was told to magnify 12 times.
+def test_the_reported_vibration_is_one_that_the_loads_excite(tmp_path: Path):
+    """Loads along an upright leg leave its bending at rounding, which the sudden weight seemed to magnify 12 times.
 
     The bar with a mass at its end has b tan b = (its mass)/(that mass), b = 2 pi f L sqrt(rho/E).
     """
@@ -127,9 +128,9 @@ def test_vibrations_about_a_ramp_and_a_step_have_their_closed_form_amplitudes():
     np.testing.assert_allclose(step, np.broadcast_to(5.0 / omega**2, step.shape), rtol=1e-11)
 
 
-def test_the_elements_that_are_called_for_make_the_error_that_is_wanted(tmp_path: Path):
-    """Of a rod of few elements, beside its reduction on many: the estimated error of a frequency is the true one, and a
-    mesh of as many as called for is as right as was asked for."""
+def test_the_recommended_elements_give_the_requested_error(tmp_path: Path):
+    """The estimated error of a frequency on few elements is the true one; as many elements as recommended give the
+    requested error."""
     leg = load_scene(write("leg", tmp_path)[0])
 
     def reduced(factor: int) -> xr.Dataset:
@@ -248,7 +249,7 @@ def test_where_nothing_is_known_of_methods_a_plan_keeps_that_of_the_scene():
     assert no_dearer(Search(left_open, {"bob.position": 1e-2}), unknown) is unknown
 
 
-def test_a_plan_keeps_a_rod_that_bends_by_more_than_is_wanted_and_drops_one_that_does_not(tmp_path: Path):
+def test_a_plan_retains_a_rod_that_bends_by_more_than_the_accuracy_and_drops_one_that_does_not(tmp_path: Path):
     """The rod shortens by 0.33 um at rest and vibrates about that when it is let go, to twice as much."""
     leg = _tight(_standing_leg(tmp_path))
     moving = edited(leg, {"drive.stroke": load_scene(tmp_path / "leg.toml").drive["stroke"].model_dump(mode="json")})
@@ -268,14 +269,14 @@ def test_the_planned_scene_is_a_file_that_runs_and_verifies(tmp_path: Path, comm
     text = path.read_text().replace('end = "0.12 s"', 'end = "10 ms"').replace('integrator = "radau"\nrtol = 1e-5', "")
     path.write_text(text + '\n[accuracy]\nplatform.position = "1 mm"\n')
     out = tmp_path / "planned.toml"
-    told = command("plan", path, "-q", "--jobs", "1", "--out", out).out
-    assert "may be left out" in told
+    reported = command("plan", path, "-q", "--jobs", "1", "--out", out).out
+    assert "may be left out" in reported
     planned = load_scene(out)
     assert planned.accuracy is None
     assert 'extends = "leg.toml"' in out.read_text()
-    told = command("run", path, "-q", "--jobs", "1", "--planned", "--verify").out
-    assert "| platform.position |" in told
-    assert "met" in told
+    reported = command("run", path, "-q", "--jobs", "1", "--planned", "--verify").out
+    assert "| platform.position |" in reported
+    assert "met" in reported
 
 
 def test_bad_plans_are_refused_in_words(tmp_path: Path, command: Command, results: Path):
@@ -323,20 +324,14 @@ def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path, command: Command)
 
 
 def test_what_nothing_couples_to_what_is_asked_for_is_not_integrated(tmp_path: Path):
-    """A pendulum beside the leg moves by itself: the leg's motion is the same without it, to the last tolerance."""
+    """A pendulum next to the leg moves by itself: the leg's motion is the same without it, to the last tolerance."""
     leg = _tight(load_scene(write("leg", tmp_path)[0]))
-    rigid = variants.without(leg, [e for e in variants.effects(leg) if e.name.startswith("body.")])
-    parts = rigid.model_dump(mode="json", exclude_none=True)
-    bob = {
-        "type": "rigid",
-        "mass": 1.0,
-        "inertia": [0.01, 0.01, 0.01],
-        "pose": {"position": [0.1, 0.0, 0.0]},
-        "frames": {"pivot": {"position": [-0.1, 0.0, 0.0]}},
-    }
-    hinge = {"type": "spherical", "between": ["ground.base", "bob.pivot"]}
+    stiff = variants.without(leg, [e for e in variants.effects(leg) if e.name.startswith("body.")])
+    parts = stiff.model_dump(mode="json", exclude_none=True)
+    bob = rigid(1.0, 0.01, {"pivot": frame((-0.1, 0.0, 0.0))}, pose=frame((0.1, 0.0, 0.0)))
+    hinge = joint("spherical", "ground.base", "bob.pivot")
     scene = edited(
-        rigid,
+        stiff,
         {
             "body": parts["body"] | {"bob": bob},
             "joint": parts["joint"] | {"hinge": hinge},
@@ -367,14 +362,14 @@ def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(tmp_pat
     shown = np.random.default_rng(0).standard_normal((3, G.shape[0])) @ G
     expected = -shown @ np.linalg.pinv(G)
     adjoint, free = lever.adjoint(shown)
-    # the shift that makes the factors exist, 1e-13 of the largest squared singular value, beside the smallest
+    # the shift that makes the factors exist, 1e-13 of the largest squared singular value, next to the smallest
     values = np.linalg.svd(G, compute_uv=False)
     shift = SQUARED_RANK * (values[0] / values[values > 1e-8 * values[0]][-1]) ** 2
     assert np.abs(adjoint - expected).max() < 100.0 * shift * np.abs(expected).max()
     assert free < 1e-6 * np.abs(shown).max()
 
 
-def test_a_scene_that_cannot_be_run_as_it_stands_has_no_plan(tmp_path: Path, results: Path):
+def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, results: Path):
     """Thrown about by its drive at 1e9 rad/s^2 the rod turns faster than it vibrates; rigid, it could."""
     scene = load_scene(write("slider-crank", tmp_path)[0])
     law = {"type": "polynomial", "coefficients": [0.0, 0.0, 1e9]}

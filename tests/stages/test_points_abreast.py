@@ -59,7 +59,9 @@ def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return made
 
 
-def test_points_are_the_same_to_the_last_bit_whoever_is_beside_them(root: Path, evaluations_abreast: list[int]) -> None:
+def test_points_are_the_same_to_the_last_bit_whichever_are_evaluated_with_them(
+    root: Path, evaluations_abreast: list[int]
+) -> None:
     """More of them than lanes, in each other numbers, also of the laws of time and of the method; of all lengths."""
     ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.5})
     points: list[dict[str, Any]] = [{"joint.contact.normal.restitution": e} for e in (0.5, 0.6, 0.7, 0.8)]
@@ -132,7 +134,7 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
     """Where they take many evaluations and there are many of them; they still end together."""
 
     def handed_out(evaluations: int, count: int = 200) -> tuple[list[int], list[bool], float]:
-        busy, sizes, told = [0.0, 0.0], list[int](), list[bool]()
+        busy, sizes, reported = [0.0, 0.0], list[int](), list[bool]()
 
         def submit(family: str, packed: bytes, points: list[Any], alone: bool, abreast: bool) -> Any:
             from concurrent.futures import Future
@@ -140,7 +142,7 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
             seconds = 0.1 * len(points)
             busy[busy.index(min(busy))] += seconds
             sizes.append(len(points))
-            told.append(abreast)
+            reported.append(abreast)
             future: Future[Any] = Future()
             future.set_result(([Point({}, {}, {}, evaluations) for _ in points], seconds))
             return future
@@ -148,10 +150,10 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
         jobs = [sweep_engine.Job(str(n), "family", {}) for n in range(count)]
         sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
         assert sum(sizes) == count
-        return sizes, told, sum(busy) / max(busy)
+        return sizes, reported, sum(busy) / max(busy)
 
-    sizes, told, together = handed_out(evaluations=100_000)
-    assert told == [False] + [True] * (len(sizes) - 1)  # the first tells how many it takes
+    sizes, reported, together = handed_out(evaluations=100_000)
+    assert reported == [False] + [True] * (len(sizes) - 1)  # the first tells how many it takes
     assert all(size % sweep_engine.POINTS_TOGETHER == 0 for size in sizes[1:-4])
     assert max(sizes) >= 4 * sweep_engine.POINTS_TOGETHER
     assert together >= 1.85  # found 2.00
@@ -160,7 +162,7 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
     assert not any(handed_out(evaluations=10_000_000, count=16)[1])  # eight for each of two, but for the first
 
 
-def test_the_run_that_tells_a_points_error_takes_the_model_over(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_run_for_a_points_error_reuses_its_model(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model is made from scratch, for the first run of the first point."""
     paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "2 ms"})
     proper, made = alike.engines, list[float]()

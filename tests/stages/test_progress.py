@@ -76,20 +76,20 @@ def test_the_rest_is_estimated_by_the_later_pace_where_that_changes():
     assert " 40% 9 min " in screen.getvalue().splitlines()[-1]
 
 
-def test_a_stretch_that_gets_slow_is_told_before_it_ends():
+def test_a_slow_stretch_is_reported_before_it_ends():
     """Less than a sample's share is done in it, and what is left grows with each look."""
     monitor, screen, clock = watched(terminal=True)
     name = monitor.begin("a", "simulate")
-    told = []
+    reported = []
     for now, fraction in [*((float(k), k / 50) for k in range(11)), (100.0, 0.201), (1000.0, 0.202)]:
         clock.now = now
         monitor.update(name, fraction, "")
-        told.append(screen.getvalue().split("\r\033[K")[-1])
-    assert told[10].endswith("20% 40.0 s left")
+        reported.append(screen.getvalue().split("\r\033[K")[-1])
+    assert reported[10].endswith("20% 40.0 s left")
     # ten samples of 1 s and 0.02 fade to sum 0.8^k = 3.57 of one, and the one that goes on counts whole:
     # (3.57 + 90) s for 3.57 0.02 + 0.001, of which 0.799 is left; then (3.57 + 990) s for 3.57 0.02 + 0.002
-    assert told[11].endswith("20% 17 min 12 s left")
-    assert told[12].endswith("20% 180 min 1 s left")
+    assert reported[11].endswith("20% 17 min 12 s left")
+    assert reported[12].endswith("20% 180 min 1 s left")
 
 
 def test_a_single_task_is_not_counted():
@@ -121,7 +121,7 @@ def test_durations_read_well(seconds: float, text: str):
     assert duration(seconds) == text
 
 
-def test_tasks_of_one_label_are_told_apart():
+def test_tasks_of_one_label_are_numbered():
     """Two copies of a scene that differ in its mesh have a task 'mesh rod1' each."""
     monitor, _, _ = watched(terminal=False)
     first, second = monitor.begin("a", "mesh rod1"), monitor.begin("a", "mesh rod1")
@@ -139,8 +139,8 @@ def _usual_log() -> Iterator[None]:
     write_to(None)
 
 
-def test_the_loggers_level_says_how_much_is_told():
-    told = {}
+def test_the_loggers_level_sets_how_much_is_reported():
+    reported = {}
     for level in (logging.WARNING, logging.INFO, logging.DEBUG):
         LOG.setLevel(level)
         monitor, screen, clock = watched(terminal=True)
@@ -149,12 +149,12 @@ def test_the_loggers_level_says_how_much_is_told():
             clock.now += 1.0
             monitor.update(name, fraction, "")
         monitor.say("a: warning: something")
-        told[level] = screen.getvalue()
-    assert told[logging.WARNING] == "flexclear: a: warning: something\n"
-    assert "\r" in told[logging.INFO]
-    assert told[logging.INFO].endswith("flexclear: a: warning: something\n")
-    assert "\r" not in told[logging.DEBUG]
-    assert told[logging.DEBUG].count("a: simulate") == 3
+        reported[level] = screen.getvalue()
+    assert reported[logging.WARNING] == "flexclear: a: warning: something\n"
+    assert "\r" in reported[logging.INFO]
+    assert reported[logging.INFO].endswith("flexclear: a: warning: something\n")
+    assert "\r" not in reported[logging.DEBUG]
+    assert reported[logging.DEBUG].count("a: simulate") == 3
 
 
 def test_a_notebook_rewrites_its_line_without_codes_of_terminals():

@@ -33,15 +33,15 @@ def test_modes_are_shown_without_a_run(results: Path, command: Command):
 
 
 @pytest.mark.parametrize(
-    "words, told",
+    "words, reported",
     [
         (["--what", "joint", "--format", "gltf"], "as png, gif, mp4, html"),
         (["--what", "modes", "--format", "png", "--at", "1 ms"], "belongs to --what vibrations"),
         (["--what", "vibrations", "--at", "1 kg"], "--at 1 kg"),
     ],
 )
-def test_what_cannot_be_shown_so_is_refused(words: list[str], told: str, results: Path, command: Command):
-    assert told in command("render", SCENE, *words, code=2).err
+def test_what_cannot_be_shown_so_is_refused(words: list[str], reported: str, results: Path, command: Command):
+    assert reported in command("render", SCENE, *words, code=2).err
     assert not results.exists()
 
 

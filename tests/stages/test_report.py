@@ -29,14 +29,14 @@ def test_figures_share_the_tasks_of_a_scene():
     assert scenes.artifact("sps4/csj:run") is scenes.artifact("sps4/csj:post").inputs["run"]
 
 
-def test_time_is_measured_beside_other_tasks_and_over_all_scenes_of_a_folder():
+def test_time_is_measured_concurrently_and_over_all_scenes_of_a_folder():
     timing = Scenes().timing("sps4")
     assert not timing.exclusive
     assert {"sps4/ideal", "sps4/far_csj_cb"} <= timing.params.keys()
     assert "sps4/far_csj_cb:bundle/rod1" in timing.inputs
 
 
-def test_what_only_the_timing_runs_on_is_compiled_beside_other_tasks_and_once_for_each_topology():
+def test_kernels_for_the_timing_alone_are_compiled_concurrently_and_once_per_topology():
     ahead = [task for name, task in Scenes().timing("sps4").inputs.items() if name.startswith("kernels/")]
     # rigid or flexible, with or without clearance, by the paper's method and by a damped one
     assert len(ahead) == 4 * 2
@@ -48,7 +48,7 @@ def test_what_only_the_timing_runs_on_is_compiled_beside_other_tasks_and_once_fo
 
 
 @pytest.mark.parametrize(
-    "reference, told",
+    "reference, reported",
     [
         ("sps4/csj:runn", "did you mean 'run'"),
         ("sps4/csj:bundle/rod1", "there is no bundle of 'rod1'"),
@@ -57,6 +57,6 @@ def test_what_only_the_timing_runs_on_is_compiled_beside_other_tasks_and_once_fo
         ("nowhere:timing", "there are no scenes"),
     ],
 )
-def test_references_that_lead_nowhere_are_refused(reference: str, told: str):
-    with pytest.raises(InputError, match=told):
+def test_references_that_lead_nowhere_are_refused(reference: str, reported: str):
+    with pytest.raises(InputError, match=reported):
         Scenes().artifact(reference)

@@ -34,9 +34,9 @@ def test_every_scene_can_be_shown(scene: str, root: Path):
     assert names >= bodies | set(loaded.joint) | set(loaded.drive)
     for part in seen.view.drawn.parts:
         assert np.isfinite(part.surface.points).all()
-    told = page_view(seen.view)
-    assert len(told["labels"]) == len(seen.view.marks)
-    assert np.isfinite([label["at"] for label in told["labels"]]).all()
+    reported = page_view(seen.view)
+    assert len(reported["labels"]) == len(seen.view.marks)
+    assert np.isfinite([label["at"] for label in reported["labels"]]).all()
 
 
 def test_nothing_that_compiles_is_imported(root: Path):
@@ -69,8 +69,8 @@ def test_the_command_writes_where_it_runs(
     monkeypatch.chdir(tmp_path)
     said = command("show", root / "scenes/checks/pendulum.toml")
     page = (tmp_path / "pendulum_start.html").read_text(encoding="utf-8")
-    told = json.loads(re.search(r"<script type='application/json'>(.*?)</script>", page, re.DOTALL)[1])  # type: ignore[index]
-    assert {label["text"] for label in told["labels"]} == {"bob", "hinge"}
+    reported = json.loads(re.search(r"<script type='application/json'>(.*?)</script>", page, re.DOTALL)[1])  # type: ignore[index]
+    assert {label["text"] for label in reported["labels"]} == {"bob", "hinge"}
     assert (tmp_path / "pendulum_start.png").exists() == gl.works()
     assert "pendulum_start.html" in said.out
 

@@ -156,7 +156,7 @@ def recorded(case: Case, **outcome: Any) -> Record:
     return {"case": case.name, "sweep": atlas.sweep(case.name), "parameters": vars(case.of), **found}
 
 
-def test_the_page_counts_refusals_apart_and_quotes_them():
+def test_the_page_counts_and_quotes_refusals():
     made = [case for case in atlas.cases(7, 6) if atlas.sweep(case.name) in ("clearance", "speed", "random")]
     records = [recorded(case) for case in made]
     records[0] |= {"verdict": REFUSED, "reason": "at t = 0.1 s: the step shrank"}

@@ -69,7 +69,7 @@ def test_equal_datasets_give_equal_bytes(tmp_path: Path):
     assert write_dataset(tmp_path / "three.nc", dataset(51)) != one.strip()
 
 
-def test_every_flipped_bit_is_found(store: Store, said: list[str]):
+def test_every_flipped_bit_is_detected(store: Store, said: list[str]):
     record = put(store)
     path = store.path("simulate", KEY, "nc")
     whole = path.read_bytes()
@@ -135,7 +135,7 @@ except ResourceError as error:
 
 
 @pytest.mark.parametrize("kind, limit", [("nc", 0), ("nc", 300_000), ("png", 5_000)])
-def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path, kind: str, limit: int):
+def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path: Path, kind: str, limit: int):
     """A limit on the size of files answers a write as a full disk does: with an error from the system."""
     results = tmp_path / "results"
     done = python("-c", FULL, Path(__file__).parent, results, str(limit), kind, succeeds=False)
@@ -164,7 +164,7 @@ for limit in sorted(limits):
         netcdf.write(folder / f"{limit}.nc", data)
     except (OSError, RuntimeError):
         continue
-    sys.exit(f"nothing was told of a limit of {limit} of {size} bytes")
+    sys.exit(f"nothing was reported of a limit of {limit} of {size} bytes")
 resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
 netcdf.write(folder / "again.nc", data)
 assert (folder / "again.nc").read_bytes() == (folder / "whole.nc").read_bytes()
@@ -172,7 +172,7 @@ assert (folder / "again.nc").read_bytes() == (folder / "whole.nc").read_bytes()
 
 
 @pytest.mark.parametrize("compressed", [1 << 26, 0])
-def test_the_library_tells_of_every_byte_that_it_cannot_write(tmp_path: Path, compressed: int):
+def test_the_library_reports_every_byte_that_it_cannot_write(tmp_path: Path, compressed: int):
     """What it writes is not read back: wherever a disk ends, it raises an error."""
     printed(TOO_SMALL, Path(__file__).parent, tmp_path, str(compressed))
 
@@ -180,7 +180,7 @@ def test_the_library_tells_of_every_byte_that_it_cannot_write(tmp_path: Path, co
 def test_a_disk_that_takes_no_more_when_it_is_forced_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Network disks may tell only then that they are full; the file is forced by a thread beside its digest."""
+    """Network disks may tell only then that they are full; the file is forced by a thread next to its digest."""
     path = tmp_path / "a.nc"
     digest = write_dataset(path, dataset(9))
 
@@ -254,8 +254,8 @@ def test_what_is_shown_shares_no_bytes_with_the_cache(store: Store, said: list[s
     store.show(record, "runs/tiny", {"nc": "run.nc"}, "simulate")
     assert shown.read_bytes() == kept.read_bytes()
     assert shown.with_name("run.edited.nc").read_bytes() == kept.read_bytes() + b"edited"
-    (told,) = said
-    assert "run.nc was edited; the edit is stored as run.edited.nc" in told
+    (reported,) = said
+    assert "run.nc was edited; the edit is stored as run.edited.nc" in reported
 
 
 def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Store, said: list[str]):
@@ -305,27 +305,29 @@ def test_what_the_dead_left_is_swept_and_what_is_held_stays(store: Store):
     assert not (folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp").exists()
 
 
-def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.fixture
+def forced(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Files and folders in the order in which they are forced to the disk."""
+    found: list[Path] = []
+    real = os.fsync
+
+    def noted(handle: int) -> None:
+        found.append(Path(os.readlink(f"/proc/self/fd/{handle}")))
+        real(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    return found
+
+
+def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, forced: list[Path]):
     """The folder is forced to the disk after the file has got its name there."""
-    forced: list[str] = []
-    real = os.fsync
-    monkeypatch.setattr(
-        os, "fsync", lambda handle: (forced.append(os.readlink(f"/proc/self/fd/{handle}")), real(handle))
-    )
     publish(tmp_path / "a.bin", b"content")
-    assert forced[0].endswith(".tmp")
-    assert forced[1:] == [str(tmp_path)]
+    assert forced[0].suffix == ".tmp"
+    assert forced[1:] == [tmp_path]
 
 
-def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(
-    store: Store, monkeypatch: pytest.MonkeyPatch
-):
+def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(store: Store, forced: list[Path]):
     """Each takes milliseconds of a disk, and an artifact is what has a record."""
-    forced: list[Path] = []
-    real = os.fsync
-    monkeypatch.setattr(
-        os, "fsync", lambda handle: (forced.append(Path(os.readlink(f"/proc/self/fd/{handle}"))), real(handle))
-    )
     store.put("simulate", KEY, {"nc": dataset()}, {})
     folder = store.path("simulate", KEY, "nc").parent
     assert [path.parent for path in forced[:2]] == [folder, folder]

@@ -13,7 +13,6 @@ from scipy.special import ellipk
 import flexclear as fc
 from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
@@ -28,6 +27,7 @@ from flexclear.pipeline.post.overview.sweep_figures import figures
 from flexclear.stages.simulation import modules
 from flexclear.stages.sweeps import sweep_plan
 from tests.processes import printed
+from tests.properties.mechanisms import simulated
 
 GRAVITY = 9.81
 
@@ -82,7 +82,7 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
     values = [0.6, 0.8]
     found = fc.sweep(path, {"joint.contact.normal.restitution": values}, keep, workers=1)
     for k, value in enumerate(values):
-        one = dynamics.simulate(load_scene(path, override={"joint.contact.normal.restitution": value}), {}, silent)
+        one = simulated(load_scene(path, override={"joint.contact.normal.restitution": value}))
         here, velocity = found.isel({"joint.contact.normal.restitution": k}), one["velocity"].sel(body="ball").values
         closing = (one["event_kind"] == "closing") & (one["event_approach_speed"] > 1e-4)
         speed, t = np.linalg.norm(velocity, axis=1), one["time"].values
@@ -122,7 +122,7 @@ def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
     assert (found["evaluations"] > 0).all()
 
 
-def test_the_error_that_is_told_is_the_error(root: Path):
+def test_the_reported_error_is_the_error(root: Path):
     """The oscillator's closed form says how far off a value is; the difference from the tighter run says the same."""
     keep = ["mass.position.final"]
     found = fc.sweep(
@@ -137,9 +137,9 @@ def test_the_error_that_is_told_is_the_error(root: Path):
     decay, omega = 4.0 / 4.0, np.sqrt(k / 2.0 - 1.0)
     exact = 0.25 + 0.1 * np.exp(-decay) * (np.cos(omega) + decay / omega * np.sin(omega))
     off = np.abs(found["mass.position.final"].values[:, 2] - exact)
-    told = found["mass.position.final.error"].values[:, 2]
+    reported = found["mass.position.final.error"].values[:, 2]
     # the tighter run is not exact: it leaves a hundredth, and where errors cancel more
-    assert told == pytest.approx(off, rel=0.5)
+    assert reported == pytest.approx(off, rel=0.5)
     assert (off > 1e-12).all()
 
 
@@ -245,7 +245,7 @@ def test_what_cannot_be_is_refused_before_anything_runs(
     assert asked == []
 
 
-def test_what_turns_is_told_in_the_units_of_turning(root: Path):
+def test_rotations_are_reported_in_units_of_rotation(root: Path):
     def units(scene: str, *keep: str) -> list[str]:
         table = {"scene": scene, "vary": {"time.end": [0.1, 0.2]}, "keep": keep}
         plan = sweep_plan.plan(read_sweep(table, "sweep"), load_scene(root / f"scenes/checks/{scene}.toml"), "sweep")

@@ -81,7 +81,7 @@ def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tm
         assert np.isnan(left["bob.velocity.largest"].values[~done]).all()
 
 
-def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
+def test_an_absent_scheduler_is_refused_in_words(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["sweep", str(pendulum(tmp_path, 2)), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     said = capsys.readouterr().err
     assert "--scheduler tcp://127.0.0.1:9" in said
@@ -106,22 +106,22 @@ class Mortal:
     def renew(self) -> None:
         self.renewed += 1
 
-    def run(self, told: list[int]) -> None:
+    def run(self, reported: list[int]) -> None:
         jobs = [sweep_engine.Job(str(n), "family", {"n": n}) for n in range(40)]
         engine = sweep_engine.Engine(self.submit, lambda: 2, renew=self.renew)
-        engine.run(jobs, {"family": b""}, lambda found, _: told.extend(point.evaluations for _, point in found))
+        engine.run(jobs, {"family": b""}, lambda found, _: reported.extend(point.evaluations for _, point in found))
 
 
 def test_points_that_are_lost_with_a_process_are_run_again():
-    told, pool = list[int](), Mortal(recovers=True)
-    pool.run(told)
-    assert sorted(told) == list(range(40))
+    reported, pool = list[int](), Mortal(recovers=True)
+    pool.run(reported)
+    assert sorted(reported) == list(range(40))
     assert pool.renewed == 1
 
 
 def test_a_process_that_dies_while_it_starts_is_renewed_as_well():
     """What was to be written to it is a broken pipe then, not a broken pool."""
-    told, pool = list[int](), Mortal(recovers=True)
+    reported, pool = list[int](), Mortal(recovers=True)
     pool.given = 4  # its own deaths are over
     submit, refused = pool.submit, [BrokenPipeError(32, "Broken pipe")]
 
@@ -131,17 +131,17 @@ def test_a_process_that_dies_while_it_starts_is_renewed_as_well():
         return submit(*given)
 
     pool.submit = broken_once  # type: ignore[method-assign]
-    pool.run(told)
-    assert sorted(told) == list(range(40))
+    pool.run(reported)
+    assert sorted(reported) == list(range(40))
     assert pool.renewed == 1
     assert not refused
 
 
 def test_processes_that_keep_dying_end_the_sweep_in_words():
-    told, pool = list[int](), Mortal(recovers=False)
+    reported, pool = list[int](), Mortal(recovers=False)
     with pytest.raises(ResourceError, match="memory full"):
-        pool.run(told)
-    assert told
+        pool.run(reported)
+    assert reported
     assert pool.renewed == sweep_engine.LOSSES
 
 

@@ -61,7 +61,7 @@ def test_outside_of_a_command_they_end_with_the_call() -> None:
 
 
 @pytest.mark.parametrize("end", [fail, stop])
-def test_workers_of_what_failed_or_was_stopped_are_not_kept(end: Callable[[], None]) -> None:
+def test_workers_of_failed_or_stopped_work_are_not_reused(end: Callable[[], None]) -> None:
     with workers.reused():
         first = one()
         end()

@@ -66,7 +66,7 @@ def test_equal_results_stop_the_chain(project: Project):
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
 
 
-def test_a_corrupt_artifact_is_told_in_one_line_and_rebuilt(here: Project):
+def test_a_corrupt_artifact_is_reported_in_one_line_and_rebuilt(here: Project):
     here.run("run", "tiny/ideal")
     path = here.artifact("simulate")
     whole = path.read_bytes()
@@ -193,8 +193,8 @@ def test_out_copies_the_run(here: Project):
 
 def test_progress_goes_to_stderr_and_what_was_written_to_stdout(here: Project):
     done = here.run("run", "tiny/ideal")
-    told = "run.nc (the run), post.nc (derived from it)"
-    assert done.stdout == f"{here.results.relative_to(here.folder)}/runs/tiny/ideal: {told}\n"
+    reported = "run.nc (the run), post.nc (derived from it)"
+    assert done.stdout == f"{here.results.relative_to(here.folder)}/runs/tiny/ideal: {reported}\n"
     assert "flexclear: [0/2] tiny/ideal: simulate" in done.stderr.splitlines()
     json.loads(here.run("schema").stdout)
 
@@ -207,7 +207,7 @@ def _wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def test_two_files_of_one_name_are_told_apart_or_refused(here: Project):
+def test_two_files_of_one_name_are_distinguished_or_refused(here: Project):
     """Below the current folder they are called by their paths; elsewhere one must not take the other's place."""
     for name in ("a", "b"):
         (here.folder / name).mkdir()
@@ -237,10 +237,10 @@ def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_cur
     engine = "pipeline/dynamics/__init__.py"
     project.edit(engine, 'if "fails" in scene.name', 'if "ideal" in scene.name')
     assert project.run("run", "tiny/ideal").returncode == 3
-    told = (folder / "OUTDATED.txt").read_text()
-    assert "of an earlier state" in told
-    assert "simulate: tiny/ideal simulate: at t = 0.1 s joint A1: no step is small enough" in told
-    assert "post: tiny/ideal simulate: at t = 0.1 s" in told
+    reported = (folder / "OUTDATED.txt").read_text()
+    assert "of an earlier state" in reported
+    assert "simulate: tiny/ideal simulate: at t = 0.1 s joint A1: no step is small enough" in reported
+    assert "post: tiny/ideal simulate: at t = 0.1 s" in reported
     assert "what is shown is of an earlier state: tiny/ideal simulate: at t" in project.run("why", "tiny/ideal").stdout
     project.edit(engine, 'if "ideal" in scene.name', 'if "other" in scene.name')
     process = project.start("run", "tiny/ideal", HELD_BY=str(project.hold))
@@ -297,11 +297,11 @@ def _alive(pid: int) -> bool:
 
 def test_what_a_run_is_to_be_doubted_for_ends_the_command_each_time(here: Project):
     here.add("doubtful", SCENE + JOINT)
-    told = ["tiny/doubtful: warning: the rod bends too far", "tiny/doubtful: warning: the contact is too deep"]
+    reported = ["tiny/doubtful: warning: the rod bends too far", "tiny/doubtful: warning: the contact is too deep"]
     for _ in range(2):  # the second time nothing runs
         done = here.run("run", "tiny/doubtful")
         assert done.returncode == 0
-        assert done.stderr.splitlines()[-2:] == [f"flexclear: {sentence}" for sentence in told]
+        assert done.stderr.splitlines()[-2:] == [f"flexclear: {sentence}" for sentence in reported]
 
 
 def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(here: Project):

@@ -11,12 +11,13 @@ import numpy as np
 from flexclear.papers.wang_wang_2019 import deviations
 from flexclear.papers.wang_wang_2019 import models as paper
 from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import Data, drawn
 from flexclear.papers.wang_wang_2019.figures.errors import NOISE
 from flexclear.papers.wang_wang_2019.figures.table10 import ratios
 from flexclear.papers.wang_wang_2019.models import mode_set
 from flexclear.papers.wang_wang_2019.published import TABLE10
 from flexclear.pipeline.core.artifacts.paths import TREE
+from flexclear.pipeline.core.scene.output import rows
 from flexclear.pipeline.post.plotting.table import Table
 
 #: verdicts on the repeated stroke, which take two hours and stand in the repository (`make chaos`)
@@ -31,8 +32,16 @@ HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
 Outcome = tuple[str, str]  #: verdict, and the numbers that say so
 
 
-def _verdicts(data: Data) -> Table:
-    rows = tuple((place, text, *test(data)) for place, text, test in STATEMENTS)
+@drawn(
+    "Verdicts (added): what the paper states in section 6, and whether it holds here",
+    *paper.references((paper.IDEAL, *paper.FAR, paper.CSJ, *paper.FIRST), "run", "post"),
+    *paper.references(paper.FAR_CSJ, "post", "ensemble"),
+    "sps4:timing",
+    files=(SECTIONS,),
+)
+def verdicts(data: Data) -> Table:
+    """Each statement with the verdict of its test."""
+    said = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
@@ -44,7 +53,7 @@ def _verdicts(data: Data) -> Table:
         "and 5 have verdicts of their own below them.",
     )
     heads = ("place", "statement", "verdict", "numbers")
-    return Table("Verdicts on the paper's statements (added)", heads, rows, notes)
+    return Table("Verdicts on the paper's statements (added)", heads, said, notes)
 
 
 def _verdict(*tests: bool) -> str:
@@ -74,7 +83,8 @@ def _same_path(data: Data, models: Sequence[paper.Model]) -> Outcome:
     ideal = deviations.ball_centre(data[f"{paper.IDEAL.scene}:run"])
     stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
     off = {m: float(np.linalg.norm(difference(data, m, deviations.ball_centre), axis=1).max()) for m in models}
-    words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
+    lengths = {m: f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing" for m, far in off.items()}
+    words = ", ".join(f"{mode_set(model) or model.label} {length}" for model, length in lengths.items())
     numbers = f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
     return _verdict(*(far < SMALL * stroke for far in off.values())), numbers
 
@@ -83,10 +93,6 @@ def _other_path(data: Data) -> Outcome:
     """The contrary statement on the same numbers."""
     verdict, numbers = _same_path(data, [paper.CSJ])
     return {HOLDS: NOT, NOT: HOLDS}[verdict], f"{numbers}: by the measure of the platform's displacement no influence"
-
-
-def _length(far: float) -> str:
-    return f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing"
 
 
 def _slight_vibration(data: Data) -> Outcome:
@@ -226,13 +232,10 @@ def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
     for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
         costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
         tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
-        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in costs.items()))
+        said = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
+        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in said.items()))
     printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
     return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
-
-
-def _ratio(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "fails"
 
 
 def _becomes_chaotic(data: Data) -> Outcome:
@@ -265,80 +268,54 @@ def _one_stroke(data: Data) -> Outcome:
     )
 
 
-#: statements of the paper: where they are, and the test of each
-STATEMENTS: tuple[tuple[str, str, Callable[[Data], Outcome]], ...] = (
-    (
-        "6.2.1, Fig. 11(a)-(c)",
-        "With ideal joints the rod's flexibility has no effect on angle, displacement and velocity",
-        _same_motion,
-    ),
-    (
-        "6.2.1, Fig. 11(d)",
-        "With ideal joints the rod's flexibility has no effect on the acceleration",
-        _same_acceleration,
-    ),
-    ("6.2.1, Fig. 11(e)", "The reaction at A1 differs slightly, by a vibration", _slight_vibration),
-    (
-        "6.2.1, Fig. 11(f)",
-        "With ideal joints the path of the ball's centre is almost the same",
-        partial(_same_path, models=paper.FAR),
-    ),
-    ("6.2.1, Table 7", "Free-free and fixed-fixed modes give the same with ideal joints", _consistent),
-    ("6.2.1", "Free-free modes give the right solution where there is no clearance", _free_suitable),
-    (
-        "6.2.2, Fig. 12(a), (b)",
-        "Clearance has almost no influence on trajectory and displacement",
-        partial(_in_both_layouts, outcome=_no_influence),
-    ),
-    (
-        "6.2.2, Fig. 12(c)",
-        "The velocity does not suffer from clearance",
-        partial(_in_both_layouts, outcome=_velocity_free),
-    ),
-    (
-        "6.2.2, Fig. 12(d), (e)",
-        "The effect of clearance on acceleration and force is conspicuous",
-        partial(_in_both_layouts, outcome=_conspicuous),
-    ),
-    ("6.2.2, Fig. 12(f)", "Clearance makes the path of the ball's centre significantly different", _other_path),
-    (
-        "6.2.3, Fig. 13(a)-(c), Figs. 14, 15",
-        "With clearance and a flexible rod, angle, displacement and velocity stay those of the ideal model, whatever "
-        "the mode set",
-        _motion_kept,
-    ),
-    (
-        "6.2.3, Fig. 13(d), (e)",
-        "Free-free and fixed-fixed modes differ obviously in force and acceleration",
-        _sets_differ,
-    ),
-    ("6.2.3", "A flexible rod lowers contact force and acceleration", _lowered),
-    ("6.2.3, section 7", "The rod is a dashpot that damps the vibration out", _dashpot),
-    ("6.2.3, section 7", "The right reference conditions, fixed-fixed, must be imposed with clearance", _fixed_right),
-    ("Tables 7 and 8", "Clearance, not the rod's flexibility, costs the accuracy", _clearance_dominates),
-    ("Tables 8 and 9", "Clearance and a flexible rod together enlarge the errors further", _enlarged),
-    ("Fig. 13(f), Fig. 17", "The ball's path in the socket differs significantly between the mode sets", _paths_differ),
-    (
-        "6.2.3, Table 10",
-        "A flexible rod with ideal joints costs hardly more than the ideal model",
-        partial(_costs, models=(paper.FAR_FREE, paper.FAR_FIXED)),
-    ),
-    ("6.2.3, Table 10", "Clearance makes the ideal model twenty times as dear", partial(_costs, models=(paper.CSJ,))),
-    (
-        "6.2.3, Table 10",
-        "Clearance and a flexible rod together make it forty times as dear",
-        partial(_costs, models=(paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)),
-    ),
-    ("Fig. 16", "The motion changes from periodic to quasi-periodic and chaotic", _becomes_chaotic),
-)
-
-TABLE = Figure(
-    "Verdicts (added): what the paper states in section 6, and whether it holds here",
-    (
-        *paper.references((paper.IDEAL, *paper.FAR, paper.CSJ, *paper.FIRST), "run", "post"),
-        *paper.references(paper.FAR_CSJ, "post", "ensemble"),
-        "sps4:timing",
-    ),
-    _verdicts,
-    (SECTIONS,),
-)
+#: statements of the paper: name of the test of each, where they are, and what they say
+STATEMENTS = rows("""
+same motion | 6.2.1, Fig. 11(a)-(c) | With ideal joints the rod's flexibility has no effect on angle, displacement and
+    velocity
+same acceleration | 6.2.1, Fig. 11(d) | With ideal joints the rod's flexibility has no effect on the acceleration
+slight vibration | 6.2.1, Fig. 11(e) | The reaction at A1 differs slightly, by a vibration
+same path | 6.2.1, Fig. 11(f) | With ideal joints the path of the ball's centre is almost the same
+consistent | 6.2.1, Table 7 | Free-free and fixed-fixed modes give the same with ideal joints
+free suitable | 6.2.1 | Free-free modes give the right solution where there is no clearance
+no influence | 6.2.2, Fig. 12(a), (b) | Clearance has almost no influence on trajectory and displacement
+velocity free | 6.2.2, Fig. 12(c) | The velocity does not suffer from clearance
+conspicuous | 6.2.2, Fig. 12(d), (e) | The effect of clearance on acceleration and force is conspicuous
+other path | 6.2.2, Fig. 12(f) | Clearance makes the path of the ball's centre significantly different
+motion kept | 6.2.3, Fig. 13(a)-(c), Figs. 14, 15 | With clearance and a flexible rod, angle, displacement and velocity
+    stay those of the ideal model, whatever the mode set
+sets differ | 6.2.3, Fig. 13(d), (e) | Free-free and fixed-fixed modes differ obviously in force and acceleration
+lowered | 6.2.3 | A flexible rod lowers contact force and acceleration
+dashpot | 6.2.3, section 7 | The rod is a dashpot that damps the vibration out
+fixed right | 6.2.3, section 7 | The right reference conditions, fixed-fixed, must be imposed with clearance
+clearance dominates | Tables 7 and 8 | Clearance, not the rod's flexibility, costs the accuracy
+enlarged | Tables 8 and 9 | Clearance and a flexible rod together enlarge the errors further
+paths differ | Fig. 13(f), Fig. 17 | The ball's path in the socket differs significantly between the mode sets
+costs of a rod | 6.2.3, Table 10 | A flexible rod with ideal joints costs hardly more than the ideal model
+costs of clearance | 6.2.3, Table 10 | Clearance makes the ideal model twenty times as dear
+costs of both | 6.2.3, Table 10 | Clearance and a flexible rod together make it forty times as dear
+becomes chaotic | Fig. 16 | The motion changes from periodic to quasi-periodic and chaotic
+""")
+TESTS: dict[str, Callable[[Data], Outcome]] = {
+    "same motion": _same_motion,
+    "same acceleration": _same_acceleration,
+    "slight vibration": _slight_vibration,
+    "same path": partial(_same_path, models=paper.FAR),
+    "consistent": _consistent,
+    "free suitable": _free_suitable,
+    "no influence": partial(_in_both_layouts, outcome=_no_influence),
+    "velocity free": partial(_in_both_layouts, outcome=_velocity_free),
+    "conspicuous": partial(_in_both_layouts, outcome=_conspicuous),
+    "other path": _other_path,
+    "motion kept": _motion_kept,
+    "sets differ": _sets_differ,
+    "lowered": _lowered,
+    "dashpot": _dashpot,
+    "fixed right": _fixed_right,
+    "clearance dominates": _clearance_dominates,
+    "enlarged": _enlarged,
+    "paths differ": _paths_differ,
+    "costs of a rod": partial(_costs, models=(paper.FAR_FREE, paper.FAR_FIXED)),
+    "costs of clearance": partial(_costs, models=(paper.CSJ,)),
+    "costs of both": partial(_costs, models=(paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)),
+    "becomes chaotic": _becomes_chaotic,
+}

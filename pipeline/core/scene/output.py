@@ -33,6 +33,11 @@ class Variable:
 Schema = dict[str, Variable]
 
 
+def rows(text: str) -> tuple[tuple[str, ...], ...]:
+    """Cells of a table, one row in each line: ``first | second | third``; an indented line continues the one before."""
+    return tuple(tuple(map(str.strip, line.split("|"))) for line in re.sub(r"\n +", " ", text.strip()).splitlines())
+
+
 def table(text: str) -> Schema:
     """Variables by name, one in each line: ``name | dimensions | units | long name``.
 
@@ -40,8 +45,7 @@ def table(text: str) -> Schema:
     that slide and of those that turn. An indented line continues the long name of the line before.
     """
     variables = {}
-    for line in re.sub(r"\n +", " ", text.strip()).splitlines():
-        name, dims, units, long_name = (part.strip() for part in line.split("|", 3))
+    for name, dims, units, long_name in rows(text):
         sliding, _, turning = units.partition(", ")
         variables[name.rstrip("?~")] = Variable(
             tuple(dims.split()), sliding, long_name, "?" in name, turning, gaps="~" in name

@@ -51,7 +51,7 @@ class Task:
     scene: str
     run: str
     params: Mapping[str, Any]
-    folder: str
+    folder: str = ""
     part: str = ""
     inputs: Mapping[str, Task] = field(default_factory=dict)
     modules: tuple[str, ...] = ()

@@ -12,8 +12,8 @@ Where bending shortens the body, r also moves along x by a quadratic form of q (
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 from flexclear.pipeline.dynamics.bodies.interface import all_in_interface, deform, modal_rates
@@ -29,6 +29,7 @@ from flexclear.pipeline.dynamics.bodies.modal_terms import (
     tensor,
 )
 from flexclear.pipeline.dynamics.bodies.ports import make_ports
+from flexclear.pipeline.dynamics.bodies.rigid import FlexibleBodies
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
@@ -51,6 +52,9 @@ def straight(d, k, j, vector, first):
     return 0.0
 
 
+LINEAR = SimpleNamespace(first_moment=straight, second_moment=straight, at_port=straight)
+
+
 def of_each(body: Callable) -> Callable:
     """The kernel that applies body(d, k) to every flexible body k."""
 
@@ -62,39 +66,15 @@ def of_each(body: Callable) -> Callable:
     return bodies
 
 
-@dataclass(frozen=True)
-class FlexibleBodies:
-    """Kernels of all flexible bodies.
-
-    deform(d): X and U in the interface basis, before all else.  site(d, s), inboard(d, i, ...): of frames on them (see
-    `ports`).  inertia(d): spatial inertias, wrenches and modal forces, modal accelerations taken as zero.
-    mass_matrix(d): modal blocks, right after it.  modal_inertia(d): what these add to the wrenches.  port_load(d, i): a
-    link on a flexible parent loads its moving shapes, too.  modal_forces(d): generalised forces of the modes.
-    modal_rates(d, dy): their accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
-    """
-
-    deform: Callable
-    site: Callable
-    inboard: Callable
-    inertia: Callable
-    mass_matrix: Callable
-    modal_inertia: Callable
-    port_load: Callable
-    modal_forces: Callable
-    modal_rates: Callable
-    energies: Callable
-
-
-def flexible_bodies(shortening: Any = None) -> Callable[[Any], FlexibleBodies]:
+def flexible_bodies(shortening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]:
     """What makes the kernels of bodies with linear shapes, or with those that bending shortens
     (`effects.stiffening.bodies`): of what factors the mass matrix, the module `articulated` or `composite`."""
     return partial(_flexible_bodies, shortening)
 
 
 def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
-    first_moment = straight if shortening is None else shortening.first_moment
-    second_moment = straight if shortening is None else shortening.second_moment
-    site, inboard = make_ports(straight if shortening is None else shortening.at_port, tree)
+    first_moment, second_moment = shortening.first_moment, shortening.second_moment
+    site, inboard = make_ports(shortening.at_port, tree)
     carried, body_mass_matrix = make_carrying(tree)
     reference, demand_of = tree.origin, tree.demand_of
 

@@ -35,7 +35,7 @@ def in_interface(d, k, source, out):
 
 @kernel
 def all_in_interface(d, k, source, out, more):
-    """The same of four times as much: what stands from `source` on goes to `out`, the three after it from `more` on."""
+    """The same of four times as much: what is from `source` on goes to `out`, the three after it from `more` on."""
     body = d.flexes[k]
     n, e, end = body.n_modes, body.basis0, body.basis0 + body.n_basis
     for j in range(n):

@@ -1,12 +1,15 @@
-"""Spatial inertia and inertial wrench of a rigid link, about the kernels' origin."""
+"""Spatial inertia and inertial wrench of a rigid link, about the kernels' origin; what bodies without modes do."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
+from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
+    ZERO,
     add,
     add_wrench,
     at6,
@@ -17,6 +20,50 @@ from flexclear.pipeline.dynamics.vectors import (
     turn,
     turn_symmetric,
 )
+
+
+@kernel
+def _no_site(d, s):
+    return ZERO
+
+
+@kernel
+def _same_frame(d, i, p, R, omega, v, alpha, a):
+    return p, R, omega, v, alpha, a
+
+
+@kernel
+def _no_energy(d, component):
+    return 0.0, 0.0
+
+
+@dataclass(frozen=True)
+class FlexibleBodies:
+    """Kernels of all flexible bodies; by default of none.
+
+    deform(d): X and U in the interface basis, before all else.  site(d, s): of a frame on one; the way to it from the
+    link's origin.  inboard(d, i, ...): from the frame of a link's inboard joint to the link's own (see `ports`).
+    inertia(d): spatial inertias, wrenches and modal forces, modal accelerations taken as zero.
+    mass_matrix(d): modal blocks, right after it.  modal_inertia(d): what these add to the wrenches.  port_load(d, i): a
+    link on a flexible parent loads its moving shapes, too.  modal_forces(d): generalised forces of the modes.
+    modal_rates(d, dy): their accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
+    """
+
+    deform: Callable = nothing
+    site: Callable = _no_site
+    inboard: Callable = _same_frame
+    inertia: Callable = nothing
+    mass_matrix: Callable = nothing
+    modal_inertia: Callable = nothing
+    port_load: Callable = nothing
+    modal_forces: Callable = nothing
+    modal_rates: Callable = nothing
+    energies: Callable = _no_energy
+
+
+def all_rigid(tree: Any) -> FlexibleBodies:
+    """What makes the kernels of flexible bodies where there are none."""
+    return FlexibleBodies()
 
 
 @kernel
@@ -32,29 +79,22 @@ def spatial(own, mass, c, J):
     own.inertia[5] = J[5] - mass * y * z
 
 
-@kernel
-def demand(d, i):
-    """Return mass of link i, its centre from its origin, inertia about the centre, and the moment there and force.
-
-    World axes.  Moment and force are what the accelerations now in its frame need, gravity being an acceleration of the
-    ground.
-    """
-    frame, link = d.link_frames[i], d.link_numbers[i]
-    R, omega, alpha, mass = frame.axes, frame.omega, frame.alpha, link.mass
-    arm = turn(R, link.com)
-    J = congruence(R, at6(link.inertia, 0))
-    a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, cross(omega, arm))))
-    return mass, arm, J, add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega))), scale(mass, a)
-
-
 def make_inertia(tree: Any) -> Callable:
-    """The kernel inertia(d, i): spatial inertia of link i (OWN) and the wrench that it needs, about what `tree` refers
-    them to: the kernels' origin, or the link's own, far from which both lose digits."""
+    """The kernel inertia(d, i): spatial inertia of link i (OWN), and the wrench that its frame's accelerations need.
+
+    Both are about what `tree` refers them to: the kernels' origin, or the link's own, far from which they lose digits.
+    Gravity is an acceleration of the ground.
+    """
     origin, demand_of = tree.origin, tree.demand_of
 
     @kernel
     def inertia(d, i):
-        mass, arm, J, moment, force = demand(d, i)
+        frame, link = d.link_frames[i], d.link_numbers[i]
+        R, omega, alpha, mass = frame.axes, frame.omega, frame.alpha, link.mass
+        arm = turn(R, link.com)
+        J = congruence(R, at6(link.inertia, 0))
+        a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, cross(omega, arm))))
+        moment, force = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega))), scale(mass, a)
         c = add(origin(d, i), arm)
         spatial(d.own[i], mass, c, J)
         demand_of(d, i, add(moment, cross(c, force)), force)
@@ -92,3 +132,10 @@ def apply_wrench(d, s, moment, force):
         for j in range(body.n_modes - body.n_held):
             column = d.columns[port.column + j]
             d.modal_bias[body.c0 + body.n_held + j] -= dot(column.angular, moment) + dot(column.linear, force)
+
+
+@kernel
+def apply_between(d, a, b, moment, force):
+    """Apply a wrench as above on site b, and against it on site a."""
+    apply_wrench(d, b, moment, force)
+    apply_wrench(d, a, scale(-1.0, moment), scale(-1.0, force))

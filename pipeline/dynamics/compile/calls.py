@@ -16,29 +16,12 @@ from numba.extending import intrinsic
 
 import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
+from flexclear.pipeline.dynamics.compile.files import SIGNATURES, compiles, interpreted
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, lowering
 
-_INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.float64), types.int64
-_TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
-_FLOAT, _INTEGER = types.float64, types.int64
-_TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, rows, columns
-#: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, f, w, n, y, retractment, out,
-#: total); (h, f, w, n, t); (h, f, w, n); (h, f, w, n, step, t_new, rows, events). Of what Python calls (`functions`):
-#: (h, f, w, n, rows, pieces with rows and columns, tolerance, out with its length); (h, f, w, n, t, repeat, outputs
-#: with their number, rows, events); (table, places, numbers)
-SIGNATURES = {
-    "evaluate": types.int64(*_TABLES, types.float64, _PLACE, _PLACE),
-    "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
-    "retract": types.int64(*_TABLES, _PLACE, _PLACE, _PLACE, _PLACE),
-    "prescribe": types.int64(*_TABLES, _FLOAT),
-    "describe": types.int64(*_TABLES),
-    "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, _FLOATS, _INTEGER),
-    "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
-    "resolve": types.int64(*_TABLES, _FLOAT, _FLOAT, *_TABLE, *_TABLE),
-    "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS),
-}
+#: of arguments, as Numba has them (`files.SIGNATURES`)
+TYPES = {"I": types.CPointer(types.int64), "F": types.CPointer(types.float64), "i": types.int64, "f": types.float64}
 
 
 @intrinsic
@@ -65,7 +48,8 @@ def exported(name: str) -> Callable[[Callable], int]:
     options: dict[str, Any] = {"error_model": "numpy"}
     if not INTERPRETED and lowering():
         options["pipeline_class"] = lowering().WholeCompiler
-    return compiles(cfunc(SIGNATURES[name], **options))
+    arguments = (TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
+    return compiles(cfunc(types.int64(*arguments), **options))
 
 
 if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for addresses

@@ -23,13 +23,28 @@ from flexclear.pipeline.dynamics.compile import machine_code
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 
-#: told the file that has to be compiled, or waited for
+#: receives the file that has to be compiled, or waited for
 Tell = Callable[[Path], None]
 #: functions of this process by the name of their file
 loaded: dict[str, machine_code.Code] = {}
 #: functions of Python by their numbers, where nothing is compiled
 interpreted: dict[int, Callable] = {}
 CODE = ".code"  #: what was compiled of a file
+#: arguments of compiled functions, which return an integer: pointers to integers (I) and floats (F), an integer (i), a
+#: float (f).  After h, f, w, n: t, y, dy, and a tolerance; y, retractment, out, total; t; nothing; rows and pieces with
+#: their shapes, tolerance, out with its length; t, repeat, outputs with their number, rows, events; step, t_new, rows,
+#: events.  Of several lanes: table, places, numbers
+SIGNATURES = {
+    "evaluate": "IFFI fii",
+    "project": "IFFI fiif",
+    "retract": "IFFI iiii",
+    "prescribe": "IFFI f",
+    "describe": "IFFI",
+    "observe": "IFFI Fii Iii fFi",
+    "advance": "IFFI fi Fi Fii Fii",
+    "resolve": "IFFI ff Fii Fii",
+    "lanes": "IIF",
+}
 
 
 def bring(paths: list[Path], tell: Tell, late: Collection[Path] = ()) -> list[Path]:

@@ -17,7 +17,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.calls import awaited, call, laws
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.specialise.abreast import exactly
+from flexclear.pipeline.dynamics.specialise.batched import exactly
 
 #: all lanes at once take as long as this fraction of them does one by one
 LANE_COST = 4
@@ -39,11 +39,11 @@ def _pointer(kind: Any) -> Any:
 integers, floats = _pointer(types.int64), _pointer(types.float64)
 
 
-def make_lanes(note: Callable, abreast: Callable, lanes: int) -> Callable:
+def make_lanes(note: Callable, evaluate: Callable, lanes: int) -> Callable:
     """The kernel run(table, places, numbers), which comes back when a stepper has, or when it is called back.
 
     table: see `memory.LANE_WORDS`. places: room for 6 lanes words, then for whose numbers are in which lane, 0 where
-    they are to be put there again. numbers: as of `specialise.abreast`.
+    they are to be put there again. numbers: as of `specialise.batched`.
     """
     few = lanes // LANE_COST
 
@@ -101,7 +101,7 @@ def make_lanes(note: Callable, abreast: Callable, lanes: int) -> Callable:
             if waits:
                 laws(d.h, d.f, d.w, d.n, d.awaited_time)
                 table[own] = m.LANE_READY
-        abreast(places, numbers)
+        evaluate(places, numbers)
 
     @kernel
     def run(table, places, numbers):

@@ -40,7 +40,9 @@ def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
     alone: whether it is a run without others next to it, and without derivatives; what it may meet is in `met` then.
     Raises InputError when a name is not listed in its family.
     """
-    found, scene = _of_parts(scene), _switched(scene)
+    scene = _switched(scene)
+    found = named(scene).union(*(effect.modules for effect in most_parts(scene).present))
+    found |= {module_of(RUNS, way) for way in ways(scene) if way not in POSES}
     found |= set().union(*(_composed(most_parts(scene), scheme, alone) for scheme in schemes(scene)[: _needed(scene)]))
     return tuple(sorted(found if alone else found.union(*met(scene, alone=False).values())))
 
@@ -57,12 +59,6 @@ def met(scene: Scene, *, alone: bool = True) -> dict[str, tuple[str, ...]]:
     return {name: tuple(sorted(of_it)) for name, of_it in found.items()}
 
 
-def _of_parts(scene: Scene) -> set[str]:
-    scene = _switched(scene)
-    names = {part.module for part in named(scene)}.union(*(one.modules for one in most_parts(scene).present))
-    return names.union(module_of(RUNS, way) for way in ways(scene) if way not in POSES)
-
-
 def _switched(scene: Scene) -> Scene:
     return with_switched(scene) if scene.event else scene
 
@@ -76,7 +72,7 @@ def _needed(scene: Scene) -> int:
 def _composed(parts: Parts, scheme: Scheme, alone: bool) -> frozenset[str]:
     """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
     texts = [*sources.sources(parts, scheme).values(), *sources.kernels(parts).values(), sources.straight(parts, ())]
-    texts += [] if alone else [sources.abreast(parts, (), lanes=2), sources.along(parts, ())]
+    texts += [] if alone else [sources.batched(parts, (), lanes=2), sources.tangent(parts, ())]
     return frozenset().union(*map(_reached, texts))
 
 

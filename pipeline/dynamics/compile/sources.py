@@ -38,17 +38,21 @@ DYNAMICS = "flexclear.pipeline.dynamics"
 CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
 #: straight code: the right-hand side as steps call it, the same with all that it leaves, and what is recorded
 SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
-PRESCRIBED = f"{DYNAMICS}.equations.prescribed_motion"
+PRESCRIBED, RIGHT_HAND_SIDE = f"{DYNAMICS}.equations.prescribed_motion", f"{DYNAMICS}.equations.right_hand_side"
 
 
 @dataclass
 class Composition:
     """A file in the making for a mechanism's parts.
 
-    given: arguments of what makes its function, by name.  imports: (module, name) each.
+    what, kernel, maker: what it is of, the name of its kernel, and the module and name of what makes that.
+    given: arguments of the maker, by name.  imports: (module, name) each.
     """
 
     parts: Parts
+    what: str
+    kernel: str
+    maker: tuple[str, str]
     given: dict[str, str] = field(default_factory=dict)
     imports: list[tuple[str, str]] = field(default_factory=list)
 
@@ -79,6 +83,23 @@ class Composition:
         """The forms of normal forces."""
         return self.family(FORMS, self.parts.forms)
 
+    @property
+    def harmonics(self) -> str:
+        """The kernel of the harmonics of laws, if there are some."""
+        return self.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if self.parts.harmonics else ""
+
+    @property
+    def flexible(self) -> str:
+        """What makes the kernels of the flexible bodies, unless an effect brings more."""
+        return f"{self.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
+
+    @property
+    def projection(self) -> str:
+        """What takes states back onto the closures."""
+        return (
+            "calls.project" if self.parts.closures else self.take(f"{DYNAMICS}.equations.projection", "no_projection")
+        )
+
     def add_effects(self, point: str) -> None:
         """Add what the effects present declare for a point."""
         for effect in self.parts.present:
@@ -91,26 +112,56 @@ class Composition:
         chosen = self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds and "{kinds}" in text else ""
         return text.format(file=self, kinds=chosen)
 
+    def add_closures(self) -> None:
+        """Add the kernels of the closures: of joints, unless an effect brings more."""
+        self.add_effects("closures")
+        if "closures" not in self.given:
+            self.given["closures"] = f"{self.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({self.tree})"
+
+    def text(self, function: str, formulas: str = "", using: tuple[str, str] = CALLS) -> str:
+        """The source.  function: what is compiled.  formulas: kernels of expressions.  using: what `function` names."""
+        maker = self.take(*self.maker)
+        lines = sorted(
+            {f"from {module} import {name}" for module, name in [*([using] if function else []), *self.imports]}
+        )
+        arguments = [f"    {key}={value}," for key, value in self.given.items()]
+        made = [f"{self.kernel} = {maker}(", *arguments, ")", "", "", function]
+        return "\n".join([f'"""Generated: {self.what}."""', *lines, "", formulas, *made])
+
+    def calling(self, name: str, arguments: str = "", formulas: str = "") -> str:
+        """The source of the function that others call by its address for a kernel that returns nothing."""
+        given = ", ".join(["h, f, w, n", *([arguments] if arguments else [])])
+        function = f'@calls.exported("{name}")\ndef {name}({given}):\n    {self.kernel}({given})\n    return 0\n'
+        return self.text(function, formulas)
+
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     """Source by name of what it compiles besides the right-hand side, in the order of which calls which."""
-    by_name = {"prescribe": _prescribe(parts)}
+    laws = Composition(parts, "laws of time", "laws", (PRESCRIBED, "make_laws"))
+    if parts.harmonics:
+        laws.given["harmonics"] = laws.harmonics
+    by_name = {"prescribe": laws.calling("prescribe", "t")}
     if parts.closures:
         by_name["project"] = _project(parts)
     if integrators.INTEGRATORS[scheme.integrator].retracts:
-        by_name["retract"] = _retract(parts)
-    steps = _steps(parts, scheme)
-    if "events" in steps.given:
-        by_name["resolve"] = _resolve(steps, scheme)
+        maker = (f"{DYNAMICS}.equations.retraction", "make_retraction")
+        retraction = _joints(parts, "retraction of", "retraction", maker)
+        by_name["retract"] = retraction.calling("retract", "y, displacement, out, total")
+    events = _steps(parts, scheme, f"events in steps of {scheme}", "resolution", "make_resolution")
+    if "events" in events.given:
+        events.take(f"{DYNAMICS}.fields", "data")
+        by_name["resolve"] = events.text(RESOLVE)
     return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
 
 
 def kernels(parts: Parts) -> dict[str, str]:
     """Source by name of what a mechanism of these parts calls whose wiring has no code of its own."""
-    return {
-        "evaluate": _evaluate(parts),
-        "describe": _text(*_description(parts), _calling("describe", "description"), _formulas(parts)),
-    }
+    file = _equations(parts)
+    file.kernel, file.maker = "right_hand_side", (RIGHT_HAND_SIDE, "make_right_hand_side")
+    file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({file.harmonics})"
+    formulas = _formulas(parts)
+    described = _description(parts).calling("describe", formulas=formulas)
+    return {"evaluate": file.calling("evaluate", "t, y, dy", formulas), "describe": described}
 
 
 def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bool = False) -> str:
@@ -119,145 +170,100 @@ def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bo
     name: of the right-hand side as steps call it, of the same with all that it leaves, or of what is recorded.
     exact: with the bits that it gives to each of several lanes.
     """
-    file, what, kernel, maker = _description(parts) if name == DESCRIBED else _equations(parts)
+    file = _description(parts) if name == DESCRIBED else _equations(parts)
     for taken in ("straight", "NAME"):
         file.take(f"{DYNAMICS}.specialise.straight", taken)
     options = {SPECIALISED: f"exact={exact}", WHOLE: "whole=True", DESCRIBED: "describes=True"}[name]
-    function = STRAIGHT.format(
-        wiring=_rows(wiring), kernel=kernel, options=options, level=3 if name == SPECIALISED else 0
-    )
-    return _text(file, f"{what}, for one wiring", kernel, maker, function, _formulas(parts), using=FILES)
+    level = 3 if name == SPECIALISED else 0
+    return _of_wiring(file, wiring, STRAIGHT, FILES, kernel=file.kernel, options=options, level=level)
 
 
-def abreast(parts: Parts, wiring: Wiring, lanes: int) -> str:
+def batched(parts: Parts, wiring: Wiring, lanes: int) -> str:
     """Source of what lets so many steppers of one wiring proceed (`compile.lanes`)."""
-    file, what, kernel, maker = _equations(parts)
-    file.take(f"{DYNAMICS}.specialise", "abreast")
+    file = _equations(parts)
+    file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
-    function = LANES.format(wiring=_rows(wiring), lanes=lanes)
-    return _text(file, f"{what}, for one wiring", kernel, maker, function, _formulas(parts))
+    return _of_wiring(file, wiring, LANES, lanes=lanes)
 
 
-def along(parts: Parts, wiring: Wiring) -> str:
+def tangent(parts: Parts, wiring: Wiring) -> str:
     """Source of the right-hand side for one wiring with its tangent."""
-    file, what, kernel, maker = _equations(parts)
-    file.take(f"{DYNAMICS}.specialise", "abreast")
+    file = _equations(parts)
+    file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.fields", "data")
     change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
-    law_changes = f"{file.take(PRESCRIBED, 'make_law_changes')}({change})"
-    function = CHANGES.format(wiring=_rows(wiring), law_changes=law_changes)
-    return _text(file, f"{what}, for one wiring", kernel, maker, function, _formulas(parts))
+    return _of_wiring(file, wiring, CHANGES, law_changes=f"{file.take(PRESCRIBED, 'make_law_changes')}({change})")
 
 
-def _rows(wiring: Wiring) -> str:
-    return "".join(f"    {row},\n" for row in wiring)
+def _of_wiring(
+    file: Composition, wiring: Wiring, template: str, using: tuple[str, str] = CALLS, **values: object
+) -> str:
+    file.what += ", for one wiring"
+    function = template.format(wiring="".join(f"    {row},\n" for row in wiring), **values)
+    return file.text(function, _formulas(file.parts), using)
 
 
 def rates(parts: Parts) -> str:
     """Source of the kernel `rates` alone, which Python runs (`specialise.dual`), without friction of ideal joints."""
-    return _text(*_equations(parts, whole=False), "", _formulas(parts))
+    return _equations(parts, whole=False).text("", _formulas(parts))
 
 
-def _equations(parts: Parts, *, whole: bool = True) -> tuple[Composition, str, str, str]:
-    """A file for the right-hand side, with what it is, the name of its kernel, and what makes that.
-
-    whole: with friction of ideal joints.
-    """
-    file = _forces(parts)
+def _equations(parts: Parts, *, whole: bool = True) -> Composition:
+    """A file for the right-hand side.  whole: with friction of ideal joints."""
+    file = _forces(parts, "right-hand side of", "rates", (RIGHT_HAND_SIDE, "make_rates"))
     file.given["tree"] = file.tree
     if parts.closures:
-        _close(file)
+        file.add_closures()
     if whole:
         file.add_effects("evaluate")
-    maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_rates")
-    return file, f"right-hand side of {', '.join(parts.joints)}", "rates", maker
-
-
-def _evaluate(parts: Parts) -> str:
-    file, what, _, _ = _equations(parts)
-    file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({_harmonics(file)})"
-    maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
-    return _text(
-        file, what, "right_hand_side", maker, _calling("evaluate", "right_hand_side", "t, y, dy"), _formulas(parts)
-    )
-
-
-def _prescribe(parts: Parts) -> str:
-    file = Composition(parts)
-    if parts.harmonics:
-        file.given["harmonics"] = _harmonics(file)
-    return _text(file, "laws of time", "laws", file.take(PRESCRIBED, "make_laws"), _calling("prescribe", "laws", "t"))
-
-
-def _harmonics(file: Composition) -> str:
-    return file.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if file.parts.harmonics else ""
+    return file
 
 
 def _project(parts: Parts) -> str:
-    file = _joints(parts)
+    projection = f"{DYNAMICS}.equations.projection"
+    file = _joints(parts, "projection with", "projection", (projection, "make_projection"))
     file.given["evaluate"] = "calls.evaluate"
-    _close(file)
+    file.add_closures()
     if parts.flexible:
-        stiffen = file.take(f"{DYNAMICS}.equations.projection", "make_stiffen")
-        file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {_flexible(file)})"
+        stiffen = file.take(projection, "make_stiffen")
+        file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {file.flexible})"
         file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
-    maker = file.take(f"{DYNAMICS}.equations.projection", "make_projection")
-    return _text(file, f"projection with {', '.join(parts.joints)}", "projection", maker, PROJECT)
+    return file.text(PROJECT)
 
 
-def _retract(parts: Parts) -> str:
-    file = _joints(parts)
-    maker = file.take(f"{DYNAMICS}.equations.retraction", "make_retraction")
-    return _text(
-        file,
-        f"retraction of {', '.join(parts.joints)}",
-        "retraction",
-        maker,
-        _calling("retract", "retraction", "y, displacement, out, total"),
-    )
-
-
-def _description(parts: Parts) -> tuple[Composition, str, str, str]:
-    """A file for what is recorded of an evaluation, with what it is, the name of its kernel, and what makes that."""
-    file = _forces(parts)
+def _description(parts: Parts) -> Composition:
+    """A file for what is recorded of an evaluation."""
+    maker = (f"{DYNAMICS}.equations.observation", "make_description")
+    file = _forces(parts, "what is recorded of", "description", maker)
     file.add_effects("observe")
     if parts.closures:
         file.add_effects("observe closures")
-    maker = file.take(f"{DYNAMICS}.equations.observation", "make_description")
-    return file, f"what is recorded of {', '.join(parts.joints)}", "description", maker
+    return file
 
 
 def _observe(parts: Parts) -> str:
-    file = Composition(parts)
+    file = Composition(parts, "record", "observation", (f"{DYNAMICS}.equations.observation", "make_observation"))
     file.given = {"evaluate": "calls.evaluate", "laws": "calls.laws", "describe": "calls.describe"}
-    file.given["project"] = _projection(file)
-    maker = file.take(f"{DYNAMICS}.equations.observation", "make_observation")
-    return _text(file, "record", "observation", maker, OBSERVE)
+    file.given["project"] = file.projection
+    return file.text(OBSERVE)
 
 
 def _advance(parts: Parts, scheme: Scheme) -> str:
-    file = _steps(parts, scheme)
+    file = _steps(parts, scheme, f"steps of {scheme}", "steps", "make_advance")
     file.given["stepping"] = file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive")
     if "events" in file.given:
         file.given["resolve"] = "calls.resolve"
     file.take(DYNAMICS, "memory as m")
-    maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
-    return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
+    return file.text(ADVANCE)
 
 
-def _resolve(file: Composition, scheme: Scheme) -> str:
-    file.take(f"{DYNAMICS}.fields", "data")
-    maker = file.take(f"{INTEGRATORS}.stepper", "make_resolution")
-    return _text(file, f"events in steps of {scheme}", "resolution", maker, RESOLVE)
-
-
-def _steps(parts: Parts, scheme: Scheme) -> Composition:
-    """What steps, and the events in them, are made of."""
+def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> Composition:
+    """A file for steps, or for the events in them."""
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
-    file = Composition(parts)
+    file = Composition(parts, what, kernel, (f"{INTEGRATORS}.stepper", maker))
     file.given = {
         "evaluate": "calls.rates",
-        "project": _projection(file),
+        "project": file.projection,
         "retract": "calls.retract",
         "method": file.take(module, method),
     }
@@ -287,24 +293,22 @@ def _events(file: Composition, scheme: Scheme) -> str:
     return file.take(f"{INTEGRATORS}.guards", "GUARDS") if guarded else ""
 
 
-def _joints(parts: Parts) -> Composition:
-    file = Composition(parts)
+def _joints(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
+    """A file that depends on the joints."""
+    file = Composition(parts, f"{what} {', '.join(parts.joints)}", kernel, maker)
     file.given["joints"] = file.family(JOINTS, parts.joints)
     return file
 
 
-def _forces(parts: Parts) -> Composition:
-    """What acts in the mechanism: joints, flexible bodies, contacts, loads."""
-    file = _joints(parts)
+def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
+    """A file with what acts in the mechanism: joints, flexible bodies, contacts, loads."""
+    file = _joints(parts, what, kernel, maker)
     if parts.flexible:
-        file.given["flexible"] = _flexible(file)
+        file.given["flexible"] = file.flexible
     if parts.surfaces:
-        surfaces = file.family(SURFACES, parts.surfaces)
-        maker, frictions = (
-            file.take(f"{DYNAMICS}.contact.forces", "make_contacts"),
-            file.family(FRICTION_LAWS, parts.frictions),
-        )
-        file.given["contacts"] = f"{maker}(surfaces={surfaces}, forms={file.forms}, frictions={frictions})"
+        surfaces, frictions = file.family(SURFACES, parts.surfaces), file.family(FRICTION_LAWS, parts.frictions)
+        contacts = file.take(f"{DYNAMICS}.contact.forces", "make_contacts")
+        file.given["contacts"] = f"{contacts}(surfaces={surfaces}, forms={file.forms}, frictions={frictions})"
     if parts.loads:
         kinds = "".join(f"{_load(file, n, *kind.split(maxsplit=1))}, " for n, kind in enumerate(parts.loads))
         file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
@@ -312,16 +316,11 @@ def _forces(parts: Parts) -> Composition:
     return file
 
 
-def _flexible(file: Composition) -> str:
-    """What makes the kernels of the flexible bodies, unless an effect brings more."""
-    return f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
-
-
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
-    """The module of a kind of loads, or what it makes of the kernel of an expression (`_formulas`)."""
+    """The kernel of a kind of loads, which may be made of that of an expression (`_formulas`)."""
     module = file.part(LOADS, name)
     if not formula:
-        return module
+        return f"{module}.apply"
     file.take(f"{DYNAMICS}.kernels", "kernel")
     file.take(LOADS, "looks")
     return f"{module}.applying(formula{number})"
@@ -337,39 +336,6 @@ def _formulas(parts: Parts) -> str:
     return "\n\n".join(formulas.source(*text) for text in texts)
 
 
-def _close(file: Composition) -> None:
-    """Add the kernels of the closures: of joints, unless an effect brings more."""
-    file.add_effects("closures")
-    if "closures" not in file.given:
-        file.given["closures"] = f"{file.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({file.tree})"
-
-
-def _projection(file: Composition) -> str:
-    return "calls.project" if file.parts.closures else file.take(f"{DYNAMICS}.equations.projection", "no_projection")
-
-
-def _calling(name: str, kernel: str, arguments: str = "") -> str:
-    """The function that others call by its address for a kernel that returns nothing."""
-    given = ", ".join(["h, f, w, n", *([arguments] if arguments else [])])
-    return f'@calls.exported("{name}")\ndef {name}({given}):\n    {kernel}({given})\n    return 0\n'
-
-
-def _text(
-    file: Composition,
-    what: str,
-    result: str,
-    maker: str,
-    function: str,
-    kernels: str = "",
-    using: tuple[str, str] = CALLS,
-) -> str:
-    lines = sorted({f"from {module} import {name}" for module, name in [*([using] if function else []), *file.imports]})
-    arguments = [f"    {key}={value}," for key, value in file.given.items()]
-    return "\n".join(
-        [f'"""Generated: {what}."""', *lines, "", kernels, f"{result} = {maker}(", *arguments, ")", "", "", function]
-    )
-
-
 # laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
 STRAIGHT = """WIRING = (
 {wiring})
@@ -377,7 +343,7 @@ files.assembles(__name__, NAME, lambda: straight({kernel}, WIRING, {options}), {
 """
 CHANGES = """WIRING = (
 {wiring})
-law_changes, differentiated = {law_changes}, abreast.along(rates, WIRING)
+law_changes, differentiated = {law_changes}, batched.differentiated(rates, WIRING)
 
 
 @calls.exported("evaluate")
@@ -392,7 +358,7 @@ def specialised(h, f, w, n, t, y, dy):
 """
 LANES = """WIRING = (
 {wiring})
-run = make_lanes(*abreast.abreast(rates, WIRING, {lanes}), {lanes})
+run = make_lanes(*batched.batched(rates, WIRING, {lanes}), {lanes})
 
 
 @calls.exported("lanes")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
+from flexclear.pipeline.dynamics.bodies.rigid import apply_between
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn, turn_back
@@ -26,12 +26,6 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, 
 def contact_slots(c):
     """Index in LEDGER_RATE of contact c's slots."""
     return m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c
-
-
-@kernel
-def push(d, s, point, force):
-    """Apply a force [N] at a point, both world, on the link that carries site s."""
-    apply_wrench(d, s, cross(point, force), force)
 
 
 @kernel
@@ -47,14 +41,10 @@ def tangential(normal, v):
     return sub(v, scale(dot(normal, v), normal))
 
 
-def frictionless() -> Callable:
+@kernel
+def frictionless(d, c, normal, turning, p_WQ, f_n):
     """The kernel `rub` of a scene without friction."""
-
-    @kernel
-    def rub(d, c, normal, turning, p_WQ, f_n):
-        return ZERO
-
-    return rub
+    return ZERO
 
 
 def rubbing(traction: Callable) -> Callable:
@@ -119,7 +109,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
     """
     separation = choose(tuple(kind.separation for kind in surfaces))
     normal_force = make_normal_force(forms)
-    rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless()
+    rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless
 
     @kernel
     def measure(d, c):
@@ -142,8 +132,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
         p_WQ = add(d.site_frames[contact.inner].origin, scale(d.contact_numbers[c].radius, axis))
         force = add(scale(-f_n, axis), rub(d, c, axis, turning, p_WQ, f_n))
         touch.force, touch.point = force, p_WQ
-        push(d, contact.inner, p_WQ, force)
-        push(d, contact.outer, p_WQ, scale(-1.0, force))
+        apply_between(d, contact.outer, contact.inner, cross(p_WQ, force), force)
 
     @kernel
     def contact(d, c):

@@ -12,17 +12,24 @@ from flexclear.pipeline.core.scene.clearance import Clearance, ClearanceRevolute
 Pin = ClearanceRevolute | ClearanceSlot
 
 
-def given_or(joint: Clearance, exponent: float, published: Mapping[float, Callable[[Any], float]]) -> float:
-    """Stiffness K [N/m^exponent] that the scene gives, or published for the exponent; ValueError where nothing is."""
-    if joint.normal.stiffness is not None:
-        return joint.normal.stiffness
-    if exponent in published:
-        return published[exponent](joint)
-    known = f"exponent{'s' if len(published) > 1 else ''} {' and '.join(f'{one:g}' for one in published)}"
-    raise ValueError(
-        f"radii and materials give the stiffness of the {known}, not of {exponent:g}; "
-        f"give normal.stiffness [N/m^{exponent:g}]"
-    )
+def published(stiffness: Mapping[float, Callable[[Any], float]]) -> Callable[[Clearance, float], float]:
+    """The function (joint, exponent) -> stiffness K [N/m^exponent] that the scene gives, or published for the exponent.
+
+    It raises ValueError where nothing is published.
+    """
+
+    def given_or_published(joint: Clearance, exponent: float) -> float:
+        if joint.normal.stiffness is not None:
+            return joint.normal.stiffness
+        if exponent in stiffness:
+            return stiffness[exponent](joint)
+        known = f"exponent{'s' if len(stiffness) > 1 else ''} {' and '.join(f'{one:g}' for one in stiffness)}"
+        raise ValueError(
+            f"radii and materials give the stiffness of the {known}, not of {exponent:g}; "
+            f"give normal.stiffness [N/m^{exponent:g}]"
+        )
+
+    return given_or_published
 
 
 def compliance(joint: Clearance) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 from typing import NamedTuple
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
@@ -71,22 +71,22 @@ class Hysteresis:
         return Resolved("hysteretic", numbers, parameter, delivered, self._warning(law, delivered))
 
     def _factor(self, parameter: float) -> float:
-        a = self.factor(parameter) if parameter > 0.0 or self._finite_at_zero() else float("inf")
+        a = self._at(parameter)
         if not isfinite(a):
             raise ValueError(f"the law '{self.name}' has no finite damping for a restitution of 0; ask for 0.01 or so")
         return a
 
-    def _finite_at_zero(self) -> bool:
+    def _at(self, parameter: float) -> float:
         try:
-            return isfinite(self.factor(0.0))
+            return self.factor(parameter)
         except ZeroDivisionError:
-            return False
+            return inf
 
     def _parameter(self, a: float) -> float:
         """The parameter whose factor is a; the factors of all these laws fall as it grows."""
         if a == 0.0:
             return 1.0
-        least = 0.0 if self._finite_at_zero() else 1e-300
+        least = 0.0 if isfinite(self._at(0.0)) else 1e-300
         if self.factor(least) < a:
             lowest = closed_form.delivered(self.factor(least))
             raise ValueError(

@@ -29,10 +29,10 @@ def delivered(a: float) -> float:
     """Rebound over approach speed that the factor a >= 0 gives a free impact."""
     if a < SLIGHT_DAMPING:
         return 1.0 - 2.0 * a / 3.0
-    wanted = psi(a)
-    if wanted >= psi(-NEAREST):
+    level = psi(a)
+    if level >= psi(-NEAREST):
         return 1.0 / a
-    return root(lambda y: psi(-y) - wanted, 0.0, NEAREST) / a
+    return root(lambda y: psi(-y) - level, 0.0, NEAREST) / a
 
 
 def factor(e: float) -> float:

@@ -63,12 +63,12 @@ def refuse_deep(name: str, joint: Any, depth: float) -> None:
 
     name: in words.
     """
-    if told := pressed_through(name, joint, depth):
-        raise SolverError(f"{told}: choose a stiffer contact, a slower impact or smaller loads")
+    if problem := pressed_through(name, joint, depth):
+        raise SolverError(f"{problem}: choose a stiffer contact, a slower impact or smaller loads")
 
 
 def pressed_through(name: str, joint: Any, depth: float) -> str:
-    """What is told of such a contact; nothing of others. Arguments: as of `refuse_deep`."""
+    """What is wrong with such a contact; empty for others. Arguments: as of `refuse_deep`."""
     if not depth > joint.radius > 0.0:
         return ""
     return (

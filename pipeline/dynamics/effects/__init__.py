@@ -11,7 +11,6 @@ A load that comes with an effect is a module there, called like the load.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -94,20 +93,6 @@ def scheme_of(solver: Any) -> Scheme:
     return Scheme(solver.integrator, solver.step is not None, solver.events == "located")
 
 
-@dataclass(frozen=True)
-class Named:
-    """A part that a scene names: its family's package, its name, and where the scene says so."""
-
-    package: str
-    name: str
-    where: str
-
-    @property
-    def module(self) -> str:
-        """The module that holds the part; InputError when the family has no such name."""
-        return module_of(self.package, self.name, where=self.where)
-
-
 def most_parts(scene: Scene) -> Parts:
     """All parts that the machine code of a scene may have, as far as the scene alone decides: its code has no more."""
     contacts, joints = scene.contacts(), import_module(JOINTS)
@@ -169,32 +154,28 @@ def _laws(scene: Scene) -> set[str]:
     return {law for part in (*scene.drive.values(), *scene.load.values()) for law in law_types(part)}
 
 
-def named(scene: Scene) -> Iterator[Named]:
-    """Every part of a family that a scene names."""
-    contacts = scene.contacts()
-    for integrator in _integrators(scene):
-        yield Named(INTEGRATORS, integrator, "[solver]")
+def named(scene: Scene) -> set[str]:
+    """Modules of the parts of families that a scene names; InputError for a name that its family does not have."""
+    contacts, laws = scene.contacts(), sorted(_laws(scene))
+    parts = [(INTEGRATORS, integrator, "[solver]") for integrator in _integrators(scene)]
     for name, joint in scene.joint.items():
-        yield Named(SURFACES if name in contacts else JOINTS, joint.type, f"[joint.{name}]")
+        parts.append((SURFACES if name in contacts else JOINTS, joint.type, f"[joint.{name}]"))
     for name, contact in contacts.items():
-        yield Named(NORMAL_LAWS, contact.normal.law, f"[joint.{name}.normal]")
+        parts.append((NORMAL_LAWS, contact.normal.law, f"[joint.{name}.normal]"))
         if contact.friction is not None:
-            yield Named(FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]")
+            parts.append((FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]"))
     for effect in EFFECTS:
-        yield from (Named(f"flexclear.pipeline.dynamics.{family}", *rest) for family, *rest in effect.named(scene))
-    for law in sorted(_laws(scene)):
-        yield Named(LAWS, law, "law")
-    for name, load in scene.load.items():
-        yield Named(LOADS, load.type, f"[load.{name}]")
+        parts += [(f"flexclear.pipeline.dynamics.{family}", name, at) for family, name, at in effect.named(scene)]
+    parts += [(LOADS, load.type, f"[load.{name}]") for name, load in scene.load.items()]
     if scene.start is not None and scene.start.at is not None:
-        yield Named(STARTS, scene.start.at, "[start.at]")
-        for name, contact in loose(scene).items():
-            yield Named(JOINTS, WITHOUT_CLEARANCE[contact.type], f"[joint.{name}]")
-    for name in scene.output.requests():
-        yield Named(RECORDS, name, "[output]")
+        parts.append((STARTS, scene.start.at, "[start.at]"))
+        parts += [(JOINTS, WITHOUT_CLEARANCE[one.type], f"[joint.{name}]") for name, one in loose(scene).items()]
+    parts += [(RECORDS, name, "[output]") for name in scene.output.requests()]
     if scene.event:
-        yield Named(EVENTS, "phases", "[event]")
-        yield from (Named(LAWS, law, "law") for law in ("constant", "delayed", "sum"))
+        parts.append((EVENTS, "phases", "[event]"))
+        laws += ["constant", "delayed", "sum"]
+    parts += [(LAWS, law, "law") for law in laws]
+    return {module_of(package, name, where=where) for package, name, where in parts}
 
 
 def ways(scene: Scene) -> list[str]:

@@ -18,10 +18,10 @@ factorisation); Featherstone (2008), *Rigid Body Dynamics Algorithms*, ch. 7.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
+from flexclear.pipeline.dynamics.bodies.rigid import FlexibleBodies
 from flexclear.pipeline.dynamics.equations.articulated_modes import (
     at_port,
     backward_modes,
@@ -382,9 +382,9 @@ def drive_power(d, b, motion):
     return power
 
 
-def make_again(flexible: Any) -> tuple[Callable, Callable]:
+def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
     """The kernels unfactor(d), which leaves the modes' own mass so that they can get more, and refactor(d)."""
-    modal_mass, eliminate = flexible.mass_matrix, make_eliminate(flexible)
+    modal_mass = flexible.mass_matrix
 
     @kernel
     def unfactor(d):
@@ -392,14 +392,10 @@ def make_again(flexible: Any) -> tuple[Callable, Callable]:
             d.mass[k] = 0.0
         modal_mass(d)
 
-    @kernel
-    def refactor(d):
-        eliminate(d)
-
-    return unfactor, refactor
+    return unfactor, make_eliminate(flexible)
 
 
-def make_eliminate(flexible: Any = None) -> Callable:
+def make_eliminate(flexible: FlexibleBodies) -> Callable:
     """The kernel eliminate(d): factor of the mass matrix and L^-1 of minus the bias (FORCE); whether it is sound."""
 
     @kernel

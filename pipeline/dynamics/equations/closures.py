@@ -222,23 +222,31 @@ def locate(d):
 
 
 @kernel
-def take_share(d, e, first):
-    """Take what a closure's multipliers do along one known column (entry e) out of its drive's force.
+def wrench_row(d, c, part):
+    """First row of ROWS of closure c; of a coupling that of its second joint, or of its first one (part 1)."""
+    return d.closures[c].row0 if part == 0 else d.n_closure_rows + d.closures[c].coupling
 
-    first: of the wrenches of the closure's kept rows.
-    """
-    known = d.known_entries[e]
-    closure, column = d.closures[known.closure], d.columns[known.column]
+
+@kernel
+def closure_wrench(d, c, part):
+    """Wrench of closure c on its second body, or of a coupling on its first joint (part 1)."""
+    closure, moment, force, first = d.closures[c], ZERO, ZERO, wrench_row(d, c, part)
     for k in range(closure.n_kept):
-        wrench, size = d.rows[first + k], d.multiplier[closure.kept0 + k]
-        d.drive_force[known.drive] -= known.sign * dot_wrench(wrench, column) * size
+        size, row = d.multiplier[closure.kept0 + k], d.rows[first + k]
+        moment, force = add(moment, scale(size, row.moment)), add(force, scale(size, row.force))
+    return moment, force
 
 
 @kernel
 def known_forces(d):
-    """Take the closures' share out of the forces that the drives must supply."""
+    """Take what closures do along known columns out of the forces that the drives must supply."""
     for e in range(d.n_known_entries):
-        take_share(d, e, d.closures[d.known_entries[e].closure].row0)
+        known = d.known_entries[e]
+        closure, column = d.closures[known.closure], d.columns[known.column]
+        first = wrench_row(d, known.closure, known.part)
+        for k in range(closure.n_kept):
+            wrench, size = d.rows[first + k], d.multiplier[closure.kept0 + k]
+            d.drive_force[known.drive] -= known.sign * dot_wrench(wrench, column) * size
 
 
 class Closing(NamedTuple):
@@ -247,7 +255,7 @@ class Closing(NamedTuple):
     close(d): rows, Jacobians and multipliers, see `finish`.  complete(d): the factor of J M^-1 J^T, of Jacobians that
     are there; needs the factor of M.  correction(d, residual, step): step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both
     indices in w, with the factors of `complete`: the least correction of the coordinates, in the metric of M, that
-    undoes a residual.  known_forces(d): takes the closures' fraction out of the forces that the drives must supply.
+    undoes a residual.  known_forces(d): takes what closures do out of the forces that the drives must supply.
     """
 
     close: Callable
@@ -256,7 +264,7 @@ class Closing(NamedTuple):
     known_forces: Callable
 
 
-def make_closing(tree: Any, locate: Callable = locate, known_forces: Callable = known_forces) -> Closing:
+def make_closing(tree: Any, locate: Callable = locate) -> Closing:
     """Return the kernels of all closures.
 
     tree: what factors the mass matrix, the module `articulated` or `composite`.  locate: fills rows and Jacobians.

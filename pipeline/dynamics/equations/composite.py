@@ -7,9 +7,9 @@ takes fewer operations than articulated inertias do (`equations.articulated`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-from flexclear.pipeline.dynamics.bodies.rigid import carry
+from flexclear.pipeline.dynamics.bodies.rigid import FlexibleBodies, carry
+from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.equations import envelope
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn_symmetric
@@ -37,32 +37,8 @@ def column(d, k):
     return d.columns[k].angular, d.columns[k].linear
 
 
-@kernel
-def localise(d, k, angular, linear):
-    """Columns about the kernels' origin are enough."""
-
-
-@kernel
-def localise_shape(d, k, base, angular, linear):
-    """Those of shapes, too."""
-
-
-@kernel
-def step(d, i, arm):
-    """So are positions."""
-
-
-shift = step  # nor where a link's origin is
-
-
-@kernel
-def no_modal_forces(d):
-    """No modes."""
-
-
-@kernel
-def no_link_load(d, i):
-    """No link is carried by a flexible one."""
+# columns about the kernels' origin are enough, and positions; `demand` has momenta and wrenches passed to the ground
+localise = localise_shape = step = shift = transmit = nothing
 
 
 @kernel
@@ -132,11 +108,6 @@ def spread(d, c):
 
 
 @kernel
-def transmit(d, b, biased):
-    """`demand` has all that it needs: momenta, and wrenches that have been passed to the ground."""
-
-
-@kernel
 def demand(d, j, b, biased):
     """What the links beyond joint j with friction need through it for accelerations in w from index b.
 
@@ -180,7 +151,7 @@ def drive_power(d, b, motion):
     return power
 
 
-def make_again(flexible: Any) -> tuple[Callable, Callable]:
+def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
     """The kernels unfactor(d), which leaves the mass matrix so that modes can get more, and refactor(d)."""
 
     @kernel
@@ -194,10 +165,9 @@ def make_again(flexible: Any) -> tuple[Callable, Callable]:
     return unfactor, refactor
 
 
-def make_eliminate(flexible: Any = None) -> Callable:
+def make_eliminate(flexible: FlexibleBodies) -> Callable:
     """The kernel eliminate(d): factor of the mass matrix and L^-1 of minus the bias (FORCE); whether it is sound."""
-    port_load = no_link_load if flexible is None else flexible.port_load
-    modal = no_modal_forces if flexible is None else flexible.modal_forces
+    port_load, modal = flexible.port_load, flexible.modal_forces
 
     @kernel
     def eliminate(d):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from flexclear.pipeline.dynamics.bodies.rigid import FlexibleBodies
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, cross, product, scale, turn
@@ -30,38 +31,17 @@ def rigid_site(d, s):
     return arm
 
 
-@kernel
-def no_port(d, s):
-    """No body is flexible."""
-    return ZERO
-
-
-@kernel
-def undeformed(d):
-    """No modes."""
-
-
-@kernel
-def rigid_inboard(d, i, p, R, omega, v, alpha, a):
-    """A rigid link's frame is its inboard joint frame."""
-    return p, R, omega, v, alpha, a
-
-
-def make_kinematics(joints: tuple[Any, ...], tree: Any, flexible: Any = None) -> Callable:
+def make_kinematics(joints: tuple[Any, ...], tree: Any, flexible: FlexibleBodies) -> Callable:
     """The kernel kinematics(d) that moves everything.
 
     joints: modules of the joint types present.  tree: what factors the mass matrix; its localise(d, k, angular, linear)
     is called with each column about its joint's frame, its step(d, i, arm) for each link with the way from its parent's
-    origin to its joint's frame.  flexible: kernels of the flexible bodies (`bodies.flexible`); their `deform` is called
-    first, their `site` adds the deformation of a link to a site, their `inboard` steps from the inboard joint frame to
-    the link's.
+    origin to its joint's frame.  flexible: kernels of the flexible bodies.
     """
     joint_motion = choose(tuple(joint.motion for joint in joints))
     position_rate = choose(tuple(joint.position_rate for joint in joints))
     localise, step = tree.localise, tree.step
-    deform = undeformed if flexible is None else flexible.deform
-    inboard = rigid_inboard if flexible is None else flexible.inboard
-    port_site = no_port if flexible is None else flexible.site
+    deform, inboard, port_site = flexible.deform, flexible.inboard, flexible.site
 
     @kernel
     def place(d, i, way):

@@ -15,6 +15,7 @@ from flexclear.pipeline.dynamics.vectors import (
     product,
     put,
     scale,
+    to_quaternion,
     turn,
     turn_back,
     turn_symmetric,
@@ -27,20 +28,8 @@ SIZE = sum(OF_BODIES.values())
 
 @kernel
 def put_quaternion(out, o, R):
-    """Store the unit quaternion (w x y z, w >= 0) of a rotation matrix, by its largest component (Shepperd 1978)."""
-    xx, yy, zz = R[0], R[4], R[8]
-    w, x, y, z = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz
-    wx, wy, wz = R[7] - R[5], R[2] - R[6], R[3] - R[1]
-    xy, yz, zx = R[1] + R[3], R[5] + R[7], R[2] + R[6]
-    # four times the products of two components, of one with all of them
-    if w >= x and w >= y and w >= z:
-        x, y, z = wx, wy, wz
-    elif x >= y and x >= z:
-        w, y, z = wx, xy, zx
-    elif y >= z:
-        w, x, z = wy, xy, yz
-    else:
-        w, x, y = wz, zx, yz
+    """Store the unit quaternion (w x y z, w >= 0) of a rotation matrix."""
+    w, x, y, z = to_quaternion(R)
     size = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
     if w < 0.0:
         size = -size

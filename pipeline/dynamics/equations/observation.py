@@ -29,7 +29,7 @@ Series = tuple[Variables, dict[str, object]]
 AS_RECORDED = -1.0
 #: of so many rows one is closed first, and those between two of them start from what that changed there, where rows
 #: follow at distances in time that differ by no more than this fraction
-APART, EVEN = 4, 1e-6
+STRIDE, EVEN = 4, 1e-6
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ Blocks = dict[str, np.ndarray]
 def room(rows: int, size: Callable[[int], int], *, frames: bool = False) -> tuple[np.ndarray, Blocks]:
     """Zeros that `observe` can write on, all in one piece, and the parts of it; size: of a place in the header.
 
-    One quantity of all rows stands in one piece, as datasets have it.  frames: whether only they are written.
+    One quantity of all rows is in one piece, as datasets have it.  frames: whether only they are written.
     """
     columns = _frames(size) if frames else _columns(size)
     widths = [_numbers(kind) * count for kind, count in columns.values()]
@@ -158,12 +158,6 @@ def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def no_energy(d, component):
-    """Kinetic and elastic energy where no body is flexible."""
-    return 0.0, 0.0
-
-
-@kernel
 def columns_before_state(d):
     """Columns of what is worked out, and of the frames of links and sites."""
     return SIZE * d.n_bodies + 3 * d.n_frames + 2 + m.FRAME.size * (d.n_links + d.n_sites)
@@ -172,8 +166,8 @@ def columns_before_state(d):
 @kernel
 def place_of(k, count):
     """Row that comes k-th: of `count` rows every fourth comes first."""
-    first = (count + APART - 1) // APART
-    return APART * k if k < first else (k - first) + (k - first) // (APART - 1) + 1
+    first = (count + STRIDE - 1) // STRIDE
+    return STRIDE * k if k < first else (k - first) + (k - first) // (STRIDE - 1) + 1
 
 
 @kernel
@@ -200,13 +194,13 @@ def foresee(d, rows, r, state, closed, states):
     By how much loops are open grows and falls within a step as smoothly as the motion: the cubic through the changes
     of two rows before and two after that have been closed.  states: place of their states, row after row, in closed.
     """
-    before, most = r - r % APART, 0.0
-    s = (r - before) / APART
+    before, most = r - r % STRIDE, 0.0
+    s = (r - before) / STRIDE
     outer, inner = -s * (1.0 - s) / 6.0, (1.0 + s) * (2.0 - s) / 2.0
     for k in range(d.nq + d.nv):
         change = 0.0
         for j in range(-1, 3):
-            row = before + APART * j
+            row = before + STRIDE * j
             # of Lagrange's interpolation between -1, 0, 1 and 2
             weight = inner * (1.0 - s if j == 0 else s) if 0 <= j <= 1 else outer * (2.0 - s if j < 0 else 1.0 + s)
             change += weight * (closed[states + d.ny * row + k] - rows[row, state + k])
@@ -217,25 +211,22 @@ def foresee(d, rows, r, state, closed, states):
 
 def make_description(
     joints: tuple[Any, ...],
-    flexible: Any = None,
-    contacts: Callable | None = None,
-    loads: Callable | None = None,
-    stops: Callable | None = None,
-    couplings: Callable | None = None,
-    friction: Callable | None = None,
+    flexible: Callable[[Any], rigid.FlexibleBodies] = rigid.all_rigid,
+    contacts: Callable = nothing,
+    loads: Callable = nothing,
+    stops: Callable = nothing,
+    couplings: Callable = nothing,
+    friction: Callable = nothing,
 ) -> Callable:
     """The kernel describe(h, f, w, n): motion, wrenches and energies of what has been evaluated.
 
     couplings: takes them off their links (`effects.gears`); friction: of ideal joints, in closures
     (`effects.joint_friction`); the other arguments are those of `make_rates`.
     """
-    bodies = None if flexible is None else flexible(composite)  # wrenches about the kernels' origin
+    bodies = flexible(composite)  # wrenches about the kernels' origin
     kinematics = make_kinematics(joints, composite, bodies)
     forces = make_forces(composite, bodies, contacts, loads, stops)
-    modal_inertia = nothing if bodies is None else bodies.modal_inertia
-    couple = nothing if couplings is None else couplings
-    rub = nothing if friction is None else friction
-    flexible_energy = no_energy if bodies is None else bodies.energies
+    modal_inertia, flexible_energy = bodies.modal_inertia, bodies.energies
 
     @kernel
     def closure_wrenches(d):
@@ -250,8 +241,8 @@ def make_description(
             on_a, on_b = d.wrench[d.sites[closure.site_a].link], d.wrench[d.sites[closure.site_b].link]
             add_wrench(on_b, scale(-1.0, moment), scale(-1.0, force))
             add_wrench(on_a, moment, force)
-        couple(d)
-        rub(d)
+        couplings(d)
+        friction(d)
 
     @kernel
     def joint_wrenches(d):
@@ -379,8 +370,8 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
         every, uneven, states = rows.shape[0], -1, rows.shape[0] * columns_before_state(d)
         for turn in range(every):
             r = place_of(turn, every)
-            first, last = r - r % APART - APART, r - r % APART + 2 * APART
-            foreseen = tolerance != AS_RECORDED and r % APART > 0 and first >= 0 and last < every and first != uneven
+            first, last = r - r % STRIDE - STRIDE, r - r % STRIDE + 2 * STRIDE
+            foreseen = tolerance != AS_RECORDED and r % STRIDE > 0 and first >= 0 and last < every and first != uneven
             foreseen = foreseen and even(rows, first, last)
             while True:
                 state = select(d, rows[r], pieces[r])

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: of the polynomials of the laws' pieces
 DEGREE = 7
-
-
-@kernel
-def no_harmonics(d, k, piece, s):
-    """Polynomials only."""
 
 
 @kernel
@@ -27,9 +23,8 @@ def prescribe(d):
         d.du[d.nv + k] = law.second_rate
 
 
-def make_laws(harmonics: Callable | None = None) -> Callable:
+def make_laws(harmonics: Callable = nothing) -> Callable:
     """The kernel laws(h, f, w, n, t); harmonics(d, k, piece, s) adds those of law k in a piece."""
-    add_harmonics = no_harmonics if harmonics is None else harmonics
 
     @kernel
     def laws(h, f, w, n, t):
@@ -45,23 +40,17 @@ def make_laws(harmonics: Callable | None = None) -> Callable:
                 v = v * s + x
                 x = x * s + piece.coefficients[c]
             law.value, law.rate, law.second_rate = x, v, a
-            add_harmonics(d, k, active, s)
+            harmonics(d, k, active, s)
 
     return laws
 
 
-@kernel
-def no_harmonic_changes(d, k, piece, s, numbers, out):
-    """Polynomials only."""
-
-
-def make_law_changes(harmonics: Callable | None = None) -> Callable:
+def make_law_changes(harmonics: Callable = nothing) -> Callable:
     """The kernel law_changes(d, t, k): changes of all laws along direction k, counted from 1, after `laws`.
 
     harmonics(d, law, piece, s, numbers, out) adds those of a piece; numbers: where the direction's begin in f, out:
     where the law's changes are in w.
     """
-    add_harmonics = no_harmonic_changes if harmonics is None else harmonics
 
     @kernel
     def law_changes(d, t, k):
@@ -81,6 +70,6 @@ def make_law_changes(harmonics: Callable | None = None) -> Callable:
             d.w[out + m.LAW.value] = x + law.rate * later
             d.w[out + m.LAW.rate] = v + law.second_rate * later
             d.w[out + m.LAW.second_rate] = a + jerk * later
-            add_harmonics(d, i, active, s, numbers, out)
+            harmonics(d, i, active, s, numbers, out)
 
     return law_changes

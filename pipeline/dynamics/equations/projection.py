@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.equations.retraction import make_position_rates
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -72,16 +73,6 @@ def keep_scales(d):
         d.row_scale[r] = max(d.row_scale[r], d.row_scale[d.n_closure_rows + r])
 
 
-@kernel
-def rigid_bodies(d):
-    """No mode."""
-
-
-@kernel
-def no_modes(d, b):
-    """No mode."""
-
-
 def make_stiffen(closures: Any, tree: Any, flexible: Any) -> Callable:
     """The kernel stiffen(d): the factors of an evaluation, with the modal stiffness next to the mass.
 
@@ -111,8 +102,8 @@ def make_projection(
     evaluate: Callable,
     joints: tuple[Any, ...],
     closures: Any,
-    stiffen: Callable = rigid_bodies,
-    to_modes: Callable = no_modes,
+    stiffen: Callable = nothing,
+    to_modes: Callable = nothing,
 ) -> Callable:
     """The kernel project(h, f, w, n, t, y, dy, tolerance).
 
@@ -139,12 +130,12 @@ def make_projection(
         residual says little about the error behind it, nothing is changed.
         """
         d = data(h, f, w, n)
-        step, used, apart = d.at_correction, 0, OPEN_REDUNDANT * d.length
+        step, used, redundant = d.at_correction, 0, OPEN_REDUNDANT * d.length
         if d.last_pivot < BLIND:
             return 0
         for _ in range(PROJECTIONS):
             if open_by(d) <= tolerance:
-                return used if widest(d, d.residual, False) <= max(apart, tolerance) else -1
+                return used if widest(d, d.residual, False) <= max(redundant, tolerance) else -1
             if d.abridged:
                 evaluate(h, f, w, n, t, y, dy)  # for its factors
             stiffen(d)
@@ -163,6 +154,6 @@ def make_projection(
                 return -1
         if not widest(d, d.residual, True) <= ROUNDING_FACTOR * tolerance:
             return -1
-        return used if widest(d, d.residual, False) <= max(apart, ROUNDING_FACTOR * tolerance) else -1
+        return used if widest(d, d.residual, False) <= max(redundant, ROUNDING_FACTOR * tolerance) else -1
 
     return project

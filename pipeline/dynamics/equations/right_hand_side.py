@@ -11,17 +11,13 @@ from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.bodies.rigid import FlexibleBodies, all_rigid
 from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.prescribed_motion import prescribe
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO
-
-
-@kernel
-def no_modal_rates(d, dy):
-    """No modes."""
 
 
 @kernel
@@ -36,19 +32,9 @@ def spread_state(d, y):
         d.internal[k] = d.w[y + d.nq + d.nv + d.n_ledger - d.n_internal + k]
 
 
-def make_forces(
-    tree: Any,
-    flexible: Any = None,
-    contacts: Callable | None = None,
-    loads: Callable | None = None,
-    stops: Callable | None = None,
-) -> Callable:
+def make_forces(tree: Any, flexible: FlexibleBodies, contacts: Callable, loads: Callable, stops: Callable) -> Callable:
     """The kernel forces(d): inertia and applied forces of all links, before the tree gathers them."""
-    rigid_inertia = rigid.make_inertia(tree)
-    flexible_inertia = nothing if flexible is None else flexible.inertia
-    contact_forces = nothing if contacts is None else contacts
-    applied = nothing if loads is None else loads
-    stop_forces = nothing if stops is None else stops
+    rigid_inertia, flexible_inertia = rigid.make_inertia(tree), flexible.inertia
 
     @kernel
     def forces(d):
@@ -58,9 +44,9 @@ def make_forces(
             if d.links[i].flex < 0:
                 rigid_inertia(d, i)
         flexible_inertia(d)
-        contact_forces(d)
-        applied(d)
-        stop_forces(d)
+        contacts(d)
+        loads(d)
+        stops(d)
 
     return forces
 
@@ -84,12 +70,12 @@ def make_right_hand_side(laws: Callable, **parts: Any) -> Callable:
 def make_rates(
     joints: tuple[Any, ...],
     tree: Any,
-    flexible: Any = None,
-    contacts: Callable | None = None,
-    loads: Callable | None = None,
-    stops: Callable | None = None,
+    flexible: Callable[[Any], FlexibleBodies] = all_rigid,
+    contacts: Callable = nothing,
+    loads: Callable = nothing,
+    stops: Callable = nothing,
     closures: Any = None,
-    friction: tuple[Callable, Callable] | None = None,
+    friction: tuple[Callable, Callable] = (nothing, nothing),
 ) -> Callable:
     """The kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
@@ -98,15 +84,14 @@ def make_rates(
     kernels that apply them.  closures: kernels of all closures.  friction: of ideal joints, on accelerations and on
     drives (`effects.joint_friction`).
     """
-    bodies = None if flexible is None else flexible(tree)
+    bodies = flexible(tree)
     kinematics = make_kinematics(joints, tree, bodies)
     forces = make_forces(tree, bodies, contacts, loads, stops)
     eliminate, backward, drive_forces = tree.make_eliminate(bodies), tree.backward, tree.drive_forces
-    modal_mass = nothing if bodies is None else bodies.mass_matrix
-    modal_rates = no_modal_rates if bodies is None else bodies.modal_rates
+    modal_mass, modal_rates = bodies.mass_matrix, bodies.modal_rates
     close = nothing if closures is None else closures.close
     known_forces = nothing if closures is None else closures.known_forces
-    rub, rub_drives = (nothing, nothing) if friction is None else friction
+    rub, rub_drives = friction
 
     @kernel
     def store_rates(d, dy):

@@ -191,7 +191,7 @@ def make_advance(
             d.status = m.PAUSED
         elif d.blind_steps > MOST_BLIND:
             d.status = m.AT_SINGULAR
-        elif d.last_pivot < d.wanted_pivot:
+        elif d.last_pivot < d.least_pivot:
             d.status = m.WORN_ROWS
         elif d.n_recorded + waiting + room > rows.shape[0] or d.n_events + room > events.shape[0]:
             d.status = m.FULL

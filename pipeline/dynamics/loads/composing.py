@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
-def make_loads(kinds: tuple[Any, ...]) -> Callable:
-    """The kernel loads(d) that applies the loads of all kinds present, given their modules."""
-    return _in_order(tuple(kind.apply for kind in kinds))
-
-
-def _in_order(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
-    if not kernels:
+def make_loads(kinds: tuple[Callable, ...], first: int = 0) -> Callable:
+    """The kernel loads(d) that applies the loads of all kinds from the first on, given their kernels `apply`."""
+    if not kinds:
         return nothing
-    head, tail = kernels[0], _in_order(kernels[1:], first + 1)
+    head, tail = kinds[0], make_loads(kinds[1:], first + 1)
 
     @kernel
     def loads(d):

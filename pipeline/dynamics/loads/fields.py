@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flexclear.pipeline.dynamics import gauge
-from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import cross, dot, scale, turn
+import numpy as np
 
-ZERO = (0.0, 0.0, 0.0)
+from flexclear.pipeline.dynamics import gauge
+from flexclear.pipeline.dynamics.bodies.rigid import apply_between, apply_wrench
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, cross, dot, scale, sub, turn
 
 
 @kernel
@@ -47,15 +47,29 @@ def act(d, k, moment, force, value, rate, stored, power, loss):
     now.stored, now.power, now.loss = stored, power, loss
     d.ledger_rate[load.book] += power
     d.ledger_rate[load.book + 1] += loss
-    apply_wrench(d, load.b, moment, force)
     if load.a >= 0:
-        apply_wrench(d, load.a, scale(-1.0, moment), scale(-1.0, force))
+        apply_between(d, load.a, load.b, moment, force)
+    else:
+        apply_wrench(d, load.b, moment, force)
 
 
 @kernel
 def measure(d, k):
     """Joint coordinate of load k, its rate, and the wrench (moment, force) of a unit force along it."""
     return gauge.counted(d, d.loads[k].gauge)
+
+
+@kernel
+def line(d, k):
+    """Distance between the two origins of load k, its rate, and the direction from the first one to the second.
+
+    The direction is zero where they meet.
+    """
+    a, b = d.site_frames[d.loads[k].a], d.site_frames[d.loads[k].b]
+    r = sub(b.origin, a.origin)
+    length = np.sqrt(dot(r, r))
+    along = scale(1.0 / length, r) if length > 0.0 else ZERO
+    return length, dot(along, sub(b.velocity, a.velocity)), along
 
 
 def along_coordinate(size: Callable) -> Callable:

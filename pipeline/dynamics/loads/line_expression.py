@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import SimpleNamespace
 
 from flexclear.pipeline.core.scene.formulas import Formula
 from flexclear.pipeline.core.scene.loads import LineExpression
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import act
-from flexclear.pipeline.dynamics.loads.looks import line
+from flexclear.pipeline.dynamics.loads.fields import act, line
 from flexclear.pipeline.dynamics.loads.row import Row, by_formula
 from flexclear.pipeline.dynamics.vectors import cross, scale
 
 
-def applying(formula: Callable) -> SimpleNamespace:
+def applying(formula: Callable) -> Callable:
     """The kernel `apply` of loads whose expression the kernel formula(d, k) computes."""
 
     @kernel
@@ -25,7 +23,7 @@ def applying(formula: Callable) -> SimpleNamespace:
         origin = d.site_frames[d.loads[k].b].origin
         act(d, k, cross(origin, force), force, length, rate, 0.0, -size * rate, 0.0)
 
-    return SimpleNamespace(apply=apply)
+    return apply
 
 
 def row(load: LineExpression, path: str, formula: Formula) -> Row:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+import numpy as np  # noqa: F401
 
 from flexclear.pipeline.dynamics import gauge
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import law, number  # noqa: F401
-from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
+from flexclear.pipeline.dynamics.loads.fields import law, line, number  # noqa: F401
+from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub  # noqa: F401
 
 
 @kernel
@@ -52,19 +52,6 @@ def coordinate_rate(d, k, i):
     """Return the rate of a joint coordinate."""
     _, rate, _, _ = gauge.counted(d, index(d, k, i))
     return rate
-
-
-@kernel
-def line(d, k):
-    """Return distance between the two origins of load k, its rate, and the direction; the latter zero where they meet.
-
-    The direction is that from the first to the second origin.
-    """
-    a, b = d.site_frames[d.loads[k].a], d.site_frames[d.loads[k].b]
-    r = sub(b.origin, a.origin)
-    length = np.sqrt(dot(r, r))
-    along = scale(1.0 / length, r) if length > 0.0 else (0.0, 0.0, 0.0)
-    return length, dot(along, sub(b.velocity, a.velocity)), along
 
 
 @kernel

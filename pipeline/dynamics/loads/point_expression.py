@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from types import SimpleNamespace
-
 from flexclear.pipeline.core.scene.formulas import Formula
 from flexclear.pipeline.core.scene.loads import PointExpression
 from flexclear.pipeline.dynamics.loads.fields import at_origin
 from flexclear.pipeline.dynamics.loads.row import Row, by_formula
 
-
-def applying(formula: Callable) -> SimpleNamespace:
-    """The kernel `apply` of loads whose expressions the kernel formula(d, k) computes, as a vector."""
-    return SimpleNamespace(apply=at_origin(formula))
+#: makes of the kernel formula(d, k) of three expressions, a vector, the kernel `apply`
+applying = at_origin
 
 
 def row(load: PointExpression, path: str, formula: Formula) -> Row:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import PointTorque
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import ZERO, act, laws
+from flexclear.pipeline.dynamics.loads.fields import act, laws
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import dot, turn
+from flexclear.pipeline.dynamics.vectors import ZERO, dot, turn
 
 
 @kernel

@@ -8,24 +8,19 @@ which is its limit when :math:`l_0 = 0` and :math:`c = 0`; otherwise a start the
 
 from __future__ import annotations
 
-import numpy as np
-
 from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import act, number
+from flexclear.pipeline.dynamics.loads.fields import act, line, number
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import add, cross, dot, scale, sub
+from flexclear.pipeline.dynamics.vectors import add, cross, scale, sub
 
 
 @kernel
 def apply(d, k):
     """Apply load k."""
-    a, b = d.site_frames[d.loads[k].a], d.site_frames[d.loads[k].b]
-    p = b.origin
-    r = sub(p, a.origin)
-    length = np.sqrt(dot(r, r))
-    along = scale(1.0 / length, r) if length > 0.0 else (0.0, 0.0, 0.0)
-    rate = dot(along, sub(b.velocity, a.velocity))
+    length, rate, along = line(d, k)
+    p = d.site_frames[d.loads[k].b].origin
+    r = sub(p, d.site_frames[d.loads[k].a].origin)
     stretch, damped = length - number(d, k, 2), number(d, k, 1) * rate
     # the part without a direction also has its slope where the ends meet
     force = add(scale(-number(d, k, 0), r), scale(number(d, k, 0) * number(d, k, 2) - damped, along))

@@ -13,8 +13,8 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.effects import way
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
-from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, far_apart, misfit, opposite
-from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
+from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, ill_fitting, misfit, opposite
+from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import NONE
@@ -43,10 +43,10 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     placed = given_start.given_links(mechanism)
     between = [joint for joint in joints if {joint.link_a, joint.link_b} <= placed]
     free = len(placed) + sum(link.massless for link in mechanism.links[1:]) < len(mechanism.links)
-    wrong = far_apart(mechanism, joints, poses) or opposite(joints, poses)
+    wrong = ill_fitting(mechanism, joints, poses) or opposite(joints, poses)
     search = free and not mechanism.has_paths and (wrong is not None or bool(starts))
     judged = between if search else joints
-    wrong = far_apart(mechanism, judged, poses) or opposite(judged, poses)
+    wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
     if wrong is not None:
         raise wrong
     missed = given_start.misses(mechanism, joints, poses, given)
@@ -130,8 +130,7 @@ def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str,
     """Largest residual per joint [m, or the sine of an angle], without drives."""
     worst = {}
     for joint in joints:
-        values, _ = demands(joint.edge.kind, *joint.frames(poses))
-        worst[joint.name] = float(np.max(np.abs(values), initial=0.0))
+        worst[joint.name] = float(np.max(np.abs(joint.demands(poses).residuals), initial=0.0))
     return worst
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix, skew
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model.constraints import Constraint, demands, prescribed
+from flexclear.pipeline.dynamics.model.constraints import Constraint
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -122,12 +122,8 @@ def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
     values, blocks, row = [], list[tuple[np.ndarray, int, int]](), 0
     centres = [pose.of(Placement(_centre(link))).p for link, pose in zip(mechanism.links, poses, strict=True)]
     for joint in joints:
-        A, B = joint.frames(poses)
-        parts = [demands(joint.edge.kind, A, B)]
-        if joint.values:
-            parts.append(prescribed(joint.edge.kind, A, B, joint.values))
-        for residual, wrench in parts:
-            force = np.any(wrench[:, 3:] != 0.0, axis=1)
+        for demanded in (joint.demands(poses), *([joint.prescribed(poses)] if joint.values else [])):
+            (residual, wrench), force = demanded, ~demanded.turning
             values.append(np.where(force, residual / L, residual))
             for link, sign in ((joint.link_a, -1.0), (joint.link_b, 1.0)):
                 moment = wrench[:, :3] - wrench[:, 3:] @ skew(centres[link]).T
@@ -165,14 +161,14 @@ def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> li
     return moved
 
 
-def far_apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
+def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
     """What is wrong about joints whose frames are far from fitting, if some are."""
     for joint in joints:
-        A, B = joint.frames(poses)
-        values, wrenches = demands(joint.edge.kind, A, B)
-        force = np.any(wrenches[:, 3:] != 0.0, axis=1)
-        gap = float(np.max(np.abs(values[force]), initial=0.0))
-        turned = float(np.max(np.abs(values[~force]), initial=0.0))
+        demanded = joint.demands(poses)
+        gap, turned = (
+            float(np.max(np.abs(demanded.residuals[mine]), initial=0.0))
+            for mine in (~demanded.turning, demanded.turning)
+        )
         a, b = joint.edge.frame_a, joint.edge.frame_b
         if gap > WORST_GUESS * mechanism.length:
             return InputError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,22 @@ from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
+
+
+class Demands(NamedTuple):
+    """Residuals (n,) [m or -], and the wrenches (n, 6) (moment about the origin, force) that resist them.
+
+    A wrench times the twist of B relative to A (angular velocity; velocity of the point at the origin) is the
+    residual's rate.
+    """
+
+    residuals: np.ndarray
+    wrenches: np.ndarray
+
+    @property
+    def turning(self) -> np.ndarray:
+        """Whether each is an angle, not a length, shape (n,)."""
+        return ~np.any(self.wrenches[:, 3:] != 0.0, axis=1)
 
 
 @dataclass(frozen=True)
@@ -35,6 +52,14 @@ class Constraint:
     def name(self) -> str:
         """Name of the joint."""
         return self.edge.name
+
+    def demands(self, poses: Sequence[Placement]) -> Demands:
+        """What it demands, its drives left out."""
+        return demands(self.edge.kind, *self.frames(poses))
+
+    def prescribed(self, poses: Sequence[Placement]) -> Demands:
+        """The same of those of its coordinates that have `values`."""
+        return prescribed(self.edge.kind, *self.frames(poses), self.values)
 
     def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
         """Both frames in the world, from the poses of all links."""
@@ -76,12 +101,8 @@ def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
     return Placement() if frame is None or not link.flexible else start_place(mechanism, mechanism.site(frame))
 
 
-def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals (n,) [m or -] of a joint, and the wrenches (n, 6) (moment about the origin, force) that resist them.
-
-    A wrench times the twist of B relative to A (angular velocity; velocity of the point at the origin) is the
-    residual's rate.
-    """
+def demands(kind: str, A: Placement, B: Placement) -> Demands:
+    """What a joint demands of its two frames."""
     declared = joint_type(kind)
     residuals, wrenches = [], []
     for k in declared.TRANSLATIONS:
@@ -91,10 +112,10 @@ def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarr
     for k, other in declared.ROTATIONS:
         residuals.append(A.R[:, k] @ B.R[:, other])
         wrenches.append([*_cross(B.R[:, other], A.R[:, k]), 0.0, 0.0, 0.0])
-    return np.array(residuals), np.array(wrenches).reshape(-1, 6)
+    return Demands(np.array(residuals), np.array(wrenches).reshape(-1, 6))
 
 
-def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> tuple[np.ndarray, np.ndarray]:
+def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> Demands:
     """The same for the driven coordinates of a joint."""
     declared, relative = joint_type(kind), A.inverse().of(B)
     now = declared.coordinates(relative.R, relative.p)
@@ -108,7 +129,7 @@ def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float
         else:
             wrenches.append([*_cross(B.p, along), *along])
         residuals.append(miss)
-    return np.array(residuals), np.array(wrenches).reshape(-1, 6)
+    return Demands(np.array(residuals), np.array(wrenches).reshape(-1, 6))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""The tables of the contacts: wiring, numbers of their laws, and their fraction of the state."""
+"""The tables of the contacts: wiring, numbers of their laws, and their variables in the state."""
 
 from __future__ import annotations
 
@@ -40,9 +40,8 @@ def fill(
 
     gauges: take those of the stops.  slot: of the first bristles in the ledger.
     """
-    mechanism, rows, reals = numbering.mechanism, [], []
-    given = zip(mechanism.contacts, laws, touching, _bristle_places(numbering, slot), strict=True)
-    for contact, law, sites, first in given:
+    mechanism, rows, reals, first = numbering.mechanism, [], [], numbering.nq + numbering.nv + slot
+    for contact, law, sites in zip(mechanism.contacts, laws, touching, strict=True):
         name, joint, *_ = contact
         length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
@@ -55,7 +54,9 @@ def fill(
         else:
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
-        rows.append((*sites, *kinds_of, first))
+        bends = bristle(name, joint) is not None
+        rows.append((*sites, *kinds_of, first if bends else -1))
+        first += 3 * bends
         sizes = (joint.clearance, joint.radius, _floor(joint, length))
         reals.append([*sizes, stick, *law.numbers, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
@@ -72,24 +73,9 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> dict[str,
     for part in parts:
         floors = {"damping": energies, "friction": energies, "impulse": np.divide(energies, lengths)}  # [J], [N s]
         ledger += [(floors[name][part], 1, part) for name in m.row_type(m.CONTACT_LEDGER).names or ()]
-    bristles = zip(_bristles(mechanism), parts, strict=True)
-    return {"contacts": ledger, "bristles": [(size, 3, part) for size, part in bristles if size is not None]}
-
-
-def _bristle_places(numbering: Numbering, slot: int) -> list[int]:
-    """Where in the state each contact's deflection of bristles starts, or -1."""
-    first, places = numbering.nq + numbering.nv + slot, []
-    for size in _bristles(numbering.mechanism):
-        places.append(-1 if size is None else first)
-        first += 0 if size is None else 3
-    return places
-
-
-def _bristles(mechanism: Mechanism) -> list[float | None]:
-    return [
-        None if joint.friction is None else friction_law(name, joint).bristle(joint.friction)
-        for name, joint, *_ in mechanism.contacts
-    ]
+    sizes = [bristle(name, joint) for name, joint, *_ in mechanism.contacts]
+    bristles = [(size, 3, part) for size, part in zip(sizes, parts, strict=True) if size is not None]
+    return {"contacts": ledger, "bristles": bristles}
 
 
 def _floor(joint: Clearance | End, length: float) -> float:
@@ -102,6 +88,14 @@ def _floor(joint: Clearance | End, length: float) -> float:
 def friction_law(name: str, joint: Any) -> Any:
     """The friction law of a joint that has one."""
     return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
+
+
+def bristle(name: str, joint: Any) -> float | None:
+    """Size of the bristles of a joint's friction [m]; None without."""
+    if joint.friction is None:
+        return None
+    size: float | None = friction_law(name, joint).bristle(joint.friction)
+    return size
 
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:

@@ -73,5 +73,5 @@ def changed(before: Scene, after: Scene) -> str:
         for body, old in before.rigid().items()
         if (frames := list(after.rigid()[body].frames.items()))
     }
-    told = ", ".join(f"{body} by up to {size:.2g} m" for body, size in away.items() if size > 0.0)
-    return f"frames were moved within their frame_tolerance so that the joints fit: {told}"
+    moved = ", ".join(f"{body} by up to {size:.2g} m" for body, size in away.items() if size > 0.0)
+    return f"frames were moved within their frame_tolerance so that the joints fit: {moved}"

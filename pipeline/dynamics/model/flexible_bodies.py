@@ -30,49 +30,44 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
 
     losses: place in the ledger of what damping loses in each independent mechanism.
     """
-    flex, flex_real, data, index, value = [], [], [], [], []
-    entry, entry_value, interface = list[tuple[int, int]](), list[float](), list[np.ndarray]()
-    row_end = list[int]()
-    data0 = moment0 = interface0 = 0
+    flex, flex_real, ends = list[tuple[int, ...]](), list[list[float]](), list[int]()
+    data, index, value, interface = list[float](), list[int](), list[float](), list[float]()
+    entry, entry_value = list[tuple[int, int]](), list[float]()
     mechanism, bodies = numbering.mechanism, numbering.mechanism.scene.flexible()
     any_shortened = any(b.stiffening is not None for b in bodies.values())
     for i in numbering.flexible:
         name, bundle = _body(mechanism, i)
         q, c = numbering.modal_positions[i], numbering.modal_coordinates[i]
-        moments, where, ends = _moments(bundle)
-        chunk = _data(bundle, _damping(name, bodies[name], bundle))
-        if any_shortened:
-            chunk = np.concatenate([chunk, *_forms(mechanism, i, len(q))])
+        moments, where, row_ends = _moments(bundle)
         basis, moves = numbering.bases[i], int(_inboard_moves(mechanism, i))
-        entries, places = basis.entries(), (i, len(q), q.start, c.start, data0, moment0, len(row_end))
+        entries, places = basis.entries(), (i, len(q), q.start, c.start, len(data), len(value), len(ends))
         held = sum(j < basis.held for _, j in entries)
-        of_basis = (basis.held, len(entry), len(entries), len(entry) + held, interface0)
+        of_basis = (basis.held, len(entry), len(entries), len(entry) + held, len(interface))
         flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis, losses[mechanism.components.of(i)]))
-        entry += entries
-        entry_value += [basis.matrix[where_] for where_ in entries]
-        interface.append(_interface_data(bundle, basis))
         flex_real.append(
             [float(bundle["mass"].values), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
         )
-        data.append(chunk)
-        value.append(moments)
-        index.append(where)
-        row_end += (moment0 + ends).tolist()
-        data0 += len(chunk)
-        moment0 += len(moments)
-        interface0 += len(interface[-1])
+        entry += entries
+        entry_value += [basis.matrix[where_] for where_ in entries]
+        interface += _interface_data(bundle, basis).tolist()
+        data += _data(bundle, _damping(name, bodies[name], bundle)).tolist()
+        if any_shortened:
+            data += np.concatenate(_forms(mechanism, i, len(q))).tolist()
+        ends += (len(value) + row_ends).tolist()
+        value += moments.tolist()
+        index += where.tolist()
     port, port_real, port_data = _ports(numbering, any_shortened)
     return {
         m.FLEXES: flex,
-        m.MOMENTS: np.concatenate([*index, np.zeros(0, dtype=np.int64)]),
-        m.MOMENT_ROWS: row_end,
+        m.MOMENTS: index,
+        m.MOMENT_ROWS: ends,
         m.BASIS: entry,
         m.PORTS: port,
         m.FLEX_NUMBERS: flex_real,
-        m.FLEX_DATA: np.concatenate([*data, np.zeros(0)]),
-        m.MOMENT_VALUES: np.concatenate([*value, np.zeros(0)]),
+        m.FLEX_DATA: data,
+        m.MOMENT_VALUES: value,
         m.BASIS_VALUES: entry_value,
-        m.INTERFACE_DATA: np.concatenate([*interface, np.zeros(0)]),
+        m.INTERFACE_DATA: interface,
         m.PORT_NUMBERS: port_real,
         m.PORT_DATA: port_data,
     }
@@ -203,10 +198,10 @@ def coupled(mechanism: Mechanism, link: int) -> bool:
     return _inboard_moves(mechanism, link) or mass_coupled(_body(mechanism, link)[1])
 
 
-def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any], np.ndarray]:
+def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any], list[float]]:
     """Ports of sites first, then one inboard port per flexible link (`Numbering.port_of_inboard`)."""
     mechanism = numbering.mechanism
-    rows, reals, data, start = list[Any](), list[Any](), list[np.ndarray](), 0
+    rows, reals, data = list[Any](), list[Any](), list[float]()
     ports = [(numbering.sites[p.site].link, p.frame.partition(".")[2], p.column) for p in numbering.ports]
     for link, frame, column in [*ports, *((i, _inboard_frame(mechanism, i), -1) for i in numbering.flexible)]:
         n = len(numbering.modal_positions[link])
@@ -218,11 +213,10 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
         if shortened:
             drawn = None if frame is None else bow(mechanism, link, frame)
             chunks.append(np.zeros(n * n) if drawn is None else drawn.ravel())
-        rows.append((numbering.flexible.index(link), column, start))
+        rows.append((numbering.flexible.index(link), column, len(data)))
         reals.append(pose)
-        data += chunks
-        start += sum(len(chunk) for chunk in chunks)
-    return rows, reals, np.concatenate([*data, np.zeros(0)])
+        data += np.concatenate(chunks).tolist()
+    return rows, reals, data
 
 
 def start_place(mechanism: Mechanism, site: Site) -> Placement:

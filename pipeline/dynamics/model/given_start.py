@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model.chain import path_positions
-from flexclear.pipeline.dynamics.model.constraints import Constraint, prescribed
+from flexclear.pipeline.dynamics.model.constraints import Constraint
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_type, label
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import drive_laws
@@ -99,7 +99,7 @@ def given_links(mechanism: Mechanism) -> set[int]:
 
 def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
     now, kind = joint.coordinates(poses), joint.edge.kind
-    differences = prescribed(kind, *joint.frames(poses), joint.values)[0]
+    differences = joint.prescribed(poses).residuals
     for (k, value), difference in zip(joint.values.items(), differences, strict=True):
         coordinate, named = joint_type(kind).COORDINATES[k], label(joint.name, kind, k)
         drive = joint.edge.drives[k] if joint.edge.drives else None

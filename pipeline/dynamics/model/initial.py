@@ -11,7 +11,6 @@ from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
@@ -107,7 +106,7 @@ def _of_joints(model: Model) -> Iterator[Rate]:
                 if start.number in numbers:
                     yield Rate(path, start.velocity, size, numbers[start.number], link.joint.sign)
         for row, closure in zip(closures, model.closures, strict=True):
-            if not isinstance(closure, Coupling) and closure.edge.name == start.joint:
+            if closure.name == start.joint:
                 sites = int(row["site_a"]), int(row["site_b"])
                 yield Rate(path, start.velocity, size, sites=sites, coordinate=start.coordinate)
 

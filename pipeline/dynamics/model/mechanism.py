@@ -16,7 +16,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects.stops.model import STOP, End, ends
 from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
 from flexclear.pipeline.dynamics.model.components import Components, components, joined
-from flexclear.pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.dynamics.model.driving import joint_type, prescribed
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,
     Group,
@@ -58,6 +58,17 @@ class Closure(NamedTuple):
     def name(self) -> str:
         """Of the joint."""
         return self.edge.name
+
+    @property
+    def ends(self) -> list[tuple[Site, Site]]:
+        """Pairs of sites between which it acts."""
+        return [(self.a, self.b)]
+
+    @property
+    def rows(self) -> list[tuple[int, int, int]]:
+        """Rows of the table CLOSURE_ROWS."""
+        declared = joint_type(self.edge.kind)
+        return [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
 
 
 class Contact(NamedTuple):
@@ -151,7 +162,7 @@ class Mechanism:
 
     origin: point of the world that the kernels use as theirs, close to the mechanism.  length: size of the mechanism
     [m].
-    components: its parts that fraction no force.
+    components: its parts that share no force.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     choice: which of several ways it was assembled in, and frames moved for that, in words; empty without these.
@@ -301,7 +312,8 @@ def _joined(
     assert edge is not None
     assert far is not None
     path = edge.kind == PATH
-    inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, str(branch.parent_frame))
+    near = edge.frame_b if branch.reverse else edge.frame_a
+    inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, near)
     joints = chain(edge, branch.reverse, inboard.frame is not None, body.group.flexible)
     here = links[inboard.link].start.of(inboard.place)
     axes, between = np.eye(3), list[Link]()

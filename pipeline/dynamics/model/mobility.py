@@ -19,10 +19,10 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.model.assembly import settled
 from flexclear.pipeline.dynamics.model.closing import LEAST_GYRATION, close
-from flexclear.pipeline.dynamics.model.constraints import constraints, demands
+from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_unit, sites, unit_wrench
+from flexclear.pipeline.dynamics.model.rates import Rates, acting, motions, rates
 
 #: displacements, in radians and fractions of the mechanism's size, of the poses nearby; how many are searched for, and
 #: how many are enough; fraction of the displacement that such a pose must keep when its loops are closed
@@ -112,8 +112,8 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
     random = np.random.default_rng(0)
     left, stayed, evidence = [(here.rank, start)], [(here.rank, start)], 0
     for k in range(POSE_TRIES):
-        fraction = random.normal(size=here.free.shape[1])
-        motion = here.free @ (fraction / np.linalg.norm(fraction))
+        direction = random.normal(size=here.free.shape[1])
+        motion = here.free @ (direction / np.linalg.norm(direction))
         motion *= NEARBY[k % 2] / max(1.0, float(np.linalg.norm(motion)))
         closed = close(model.mechanism, joints, _displaced(model, start, motion))
         if closed is None:
@@ -165,24 +165,14 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
     carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
     joints, row = set[str](), 0
     for closure in model.closures:
-        if isinstance(closure, Coupling):
-            fraction = stresses[:, row]
-            for side, factor in closure.parts:
-                wrench = np.outer(unit_wrench(side, poses, L) * factor * L / row_unit(closure, L), fraction)
-                carried[side.a.link] -= wrench
-                carried[side.b.link] += wrench
-            row += 1
-            continue
-        edge, a, b = closure
-        _, wrenches = demands(edge.kind, *sites(closure, poses))
-        wrenches[:, :3] /= np.where(np.any(wrenches[:, 3:] != 0.0, axis=1), L, 1.0)[:, None]
-        fraction = stresses[:, row : row + len(wrenches)]
-        wrench = wrenches.T @ fraction.T
-        carried[a.link] -= wrench
-        carried[b.link] += wrench
-        if np.max(np.abs(fraction), initial=0.0) > CARRIES:
-            joints.add(edge.name)
-        row += len(wrenches)
+        stress = stresses[:, row : row + len(closure.rows)]
+        for acts in acting(closure, poses, L):
+            wrench = acts.wrenches(L).T @ stress.T
+            carried[acts.a.link] -= wrench
+            carried[acts.b.link] += wrench
+        if not isinstance(closure, Coupling) and np.max(np.abs(stress), initial=0.0) > CARRIES:
+            joints.add(closure.name)
+        row += len(closure.rows)
     for i in range(len(mechanism.links) - 1, 0, -1):
         branch = mechanism.links[i].branch
         carried[branch.parent] += carried[i]

@@ -76,6 +76,11 @@ class Model:
         """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
         return self.state_scales[self.speeds]
 
+    def rows_of(self, *kinds: type) -> dict[str, np.ndarray]:
+        """Row of the table LOADS of each load of such kinds, by name, as the scene has them."""
+        rows = {name: row for (name, _), row in zip(self.loads, self.arrays.table(m.LOADS), strict=True)}
+        return {name: rows[name] for name, load in self.scene.forces().items() if isinstance(load, kinds)}
+
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:
     """Place a mechanism's links so that its joints fit, number it and fill its tables.
@@ -98,14 +103,10 @@ def filled(
     like: a model with the same links, joints, frames and flexible bodies, whose wiring is this one's, too.
     """
     normals = contacting.resolve(mechanism)
-    site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
+    closing: list[Closure | Coupling] = [*mechanism.closures, *couplings(mechanism)]
+    looped, ordered = wiring.closures(numbering, closing) if like is None else ({}, like.closures)
     touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
-    coupled, gauges = couplings(mechanism), Gauges()
-    if like is None:
-        looped, order = wiring.closures(numbering, site_pairs, coupled)
-        ordered = tuple([*mechanism.closures, *coupled][k] for k in order)
-    else:
-        looped, ordered = {}, like.closures
+    gauges = Gauges()
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
@@ -301,8 +302,7 @@ def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling
     L, weights = mechanism.length, list[float]()
     rounding = LENGTH_ROUNDING * L / mechanism.scene.solver.rtol
     for one in closures:
-        sites = (one.a, one.b) if isinstance(one, Closure) else (one.first.a, one.first.b, one.second.a, one.second.b)
-        part = mechanism.components.of(*(site.link for site in sites))
+        part = mechanism.components.of(*(site.link for both in one.ends for site in both))
         weights.append(max(L / max(mechanism.components.lengths[part], rounding), 1.0))
     return weights
 

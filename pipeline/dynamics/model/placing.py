@@ -42,13 +42,6 @@ class Assembly:
     coordinates: dict[tuple[str, int], float]
 
 
-def opened(
-    mechanism: Mechanism, joints: Sequence[Constraint], placed: set[int], starts: Sequence[Given]
-) -> list[Placement]:
-    """Poses of all links where one joint each puts those without a pose; loops may stay open.  Arguments as below."""
-    return _guess(mechanism, joints, placed, _targets(joints, starts)[1], None, 0.0)
-
-
 def assemblies(
     mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]
 ) -> list[Assembly]:
@@ -56,15 +49,15 @@ def assemblies(
 
     placed: links that have a pose.  Empty when none was found.
     """
-    hints, targets = _targets(joints, starts)
+    hints, aims = targets(joints, starts)
     random, distinct, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
     for k in range(GUESSES):
-        guess = _guess(mechanism, joints, placed, targets, random if k else None, k / GUESSES)
+        here = guess(mechanism, joints, placed, aims, random if k else None, k / GUESSES)
         if k == 0:
-            aim = {**_coordinates(joints, guess), **hints}
-        poses = close(mechanism, joints, guess, placed)
+            aim = {**_coordinates(joints, here), **hints}
+        poses = close(mechanism, joints, here, placed)
         if poses is None and len(placed) > 1:
-            poses = close(mechanism, joints, guess)
+            poses = close(mechanism, joints, here)
         if poses is None or opposite(joints, poses) is not None:
             continue
         made = Assembly(poses, _coordinates(joints, poses))
@@ -91,7 +84,7 @@ def chosen(
     first = candidates[0]
     if len(candidates) < 2 or not _isolated(mechanism, list(joints), first.poses):
         return ""
-    hints, _ = _targets(joints, starts)
+    hints, _ = targets(joints, starts)
     distances = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
     if hints and distances[1] - distances[0] > SAME_ASSEMBLY:
         return ""
@@ -107,21 +100,21 @@ def chosen(
     )
 
 
-def _targets(joints: Sequence[Constraint], starts: Sequence[Given]) -> tuple[Hints, Hints]:
+def targets(joints: Sequence[Constraint], starts: Sequence[Given]) -> tuple[Hints, Hints]:
     """Where coordinates are to be about, by hints alone, and with what is prescribed of them."""
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
     return hints, hints | {(j.name, k): value for j in joints for k, value in j.values.items()}
 
 
-def _guess(
+def guess(
     mechanism: Mechanism,
     joints: Sequence[Constraint],
     placed: set[int],
     values: Hints,
-    random: np.random.Generator | None,
-    spread: float,
+    random: np.random.Generator | None = None,
+    spread: float = 0.0,
 ) -> list[Placement]:
-    """Poses of all links, those not placed each put where a joint to a known one has it."""
+    """Poses of all links, those not placed each put where a joint to a known one has it; loops may stay open."""
     poses, known = [link.start for link in mechanism.links], set(placed)
     # joints with few degrees of freedom are best
     order = sorted(joints, key=lambda joint: len(joint_type(joint.edge.kind).SPEEDS) - len(joint.values))

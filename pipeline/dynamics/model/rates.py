@@ -20,14 +20,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects.gears.model import Coupling, Side
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
 from flexclear.pipeline.dynamics.model.interface_basis import frame_index
-from flexclear.pipeline.dynamics.model.mechanism import Closure
+from flexclear.pipeline.dynamics.model.mechanism import Closure, Site
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
@@ -109,70 +110,58 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     motion, speeds = motions(model, poses), model.nv + len(model.drives)
     J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
     first = 0
-    for line, closure in zip(model.arrays.table(m.CLOSURES), model.closures, strict=True):
-        if isinstance(closure, Coupling):
-            J[first], sizes[first] = _coupling_row(model, closure, poses, motion)
-            first += 1
-            continue
-        A, B = sites(closure, poses)
-        _, wrenches = demands(closure.edge.kind, A, B)
-        along, about, force = wrenches[:, 3:], wrenches[:, :3], np.any(wrenches[:, 3:] != 0.0, axis=1)
-        route = uncommon(closure_route(numbering, int(line["site_a"]), int(line["site_b"])))
-        mine = slice(first, first + len(force))
-        for coordinate, column, sign in route:
-            turn, arm = motion.turn[column], B.p - motion.at[column]
-            shift = motion.shift[column] + np.cross(turn, arm)
-            J[mine, coordinate] += sign * np.where(force, along @ shift / L, about @ turn)
-            angle = float(np.linalg.norm(turn))
-            way = float(np.linalg.norm(motion.shift[column])) / L + angle * (np.linalg.norm(arm) / L + LEAST_ARM)
-            sizes[mine, coordinate] += np.where(force, way, angle)
-        first += len(force)
+    for closure in model.closures:
+        for acts in acting(closure, poses, L):
+            mine, factor = slice(first, first + len(acts.factor)), acts.factor
+            route = uncommon(closure_route(numbering, numbering.site(acts.a), numbering.site(acts.b)))
+            for coordinate, column, sign in route:
+                turn, arm = motion.turn[column], acts.point - motion.at[column]
+                shift = motion.shift[column] + np.cross(turn, arm)
+                moved = np.where(acts.turning, acts.directions @ turn, acts.directions @ shift)
+                J[mine, coordinate] += sign * factor * moved
+                angle = float(np.linalg.norm(turn))
+                way = float(np.linalg.norm(motion.shift[column])) + angle * (np.linalg.norm(arm) + L * LEAST_ARM)
+                sizes[mine, coordinate] += np.abs(factor) * np.where(acts.turning, angle, way)
+        first += len(closure.rows)
     by_row, by_column = scales(sizes)
     J *= by_row[:, None] * by_column
     return Rates(J[:, : model.nv], J[:, model.nv :], by_row, by_column)
 
 
-def _coupling_row(
-    model: Model, coupling: Coupling, poses: Sequence[Placement], motion: Motions
-) -> tuple[np.ndarray, np.ndarray]:
-    """Row of a coupling against unit motions of all coordinates, and the natural sizes of its entries."""
-    numbering, L = model.numbering, model.length
-    row, size = np.zeros((2, model.nv + len(model.drives)))
-    for side, factor in coupling.parts:
-        origin, along = poses[side.b.link].of(side.b.place).p, side.along(poses)
-        unit = abs(factor) / row_unit(coupling, L)
-        route = uncommon(closure_route(numbering, numbering.site(side.a), numbering.site(side.b)))
-        for coordinate, column, sign in route:
-            turn, arm = motion.turn[column], origin - motion.at[column]
-            shift = motion.shift[column] + np.cross(turn, arm)
-            angle = float(np.linalg.norm(turn))
-            way = float(np.linalg.norm(motion.shift[column])) + angle * (float(np.linalg.norm(arm)) + L * LEAST_ARM)
-            turning = side.coordinate.turning
-            row[coordinate] += sign * np.copysign(unit, factor) * float(along @ (turn if turning else shift))
-            size[coordinate] += unit * (angle if turning else way)
-    return row, size
+class Acting(NamedTuple):
+    """What the rows of a closure are between two sites a and b: each a turn about a direction, or a way along one.
 
-
-def row_unit(coupling: Coupling, length: float) -> float:
-    """What the row of a coupling is measured in: a radian, or the mechanism's size [m]."""
-    return 1.0 if coupling.second.coordinate.turning else length
-
-
-def unit_wrench(side: Side, poses: Sequence[Placement], length: float) -> np.ndarray:
-    """Moment about the kernels' origin, in units of force times size, and force of a unit force along a coordinate.
-
-    Of an angle: of a unit torque.
+    directions: unit vectors, (rows, 3).  turning, factor: of each row, which it is, and what a radian or a metre of it
+    counts for; (rows,).  point: origin of b.
     """
-    along = side.along(poses)
-    if side.coordinate.turning:
-        return np.concatenate([along / length, np.zeros(3)])
-    return np.concatenate([np.cross(poses[side.b.link].of(side.b.place).p, along) / length, along])
+
+    a: Site
+    b: Site
+    directions: np.ndarray
+    turning: np.ndarray
+    factor: np.ndarray
+    point: np.ndarray
+
+    def wrenches(self, length: float) -> np.ndarray:
+        """Moment about the kernels' origin, in units of force times size, and force of each row; (rows, 6)."""
+        along = np.where(self.turning[:, None], 0.0, self.directions)
+        moment = np.where(self.turning[:, None], self.directions, np.cross(self.point, along))
+        return self.factor[:, None] * np.hstack([moment, length * along])
 
 
-def sites(closure: Closure, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
-    """Both frames of a closure."""
-    _, a, b = closure
-    return poses[a.link].of(a.place), poses[b.link].of(b.place)
+def acting(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[Acting]:
+    """The rows of a closure, in radians or the mechanism's size, for each pair of sites between which it acts."""
+    frames = [(poses[a.link].of(a.place), poses[b.link].of(b.place)) for a, b in closure.ends]
+    if isinstance(closure, Coupling):
+        unit = 1.0 if closure.second.coordinate.turning else length
+        sides = zip(closure.ends, closure.parts, frames, strict=True)
+        return [
+            Acting(*ends, side.along(poses)[None], np.array([side.coordinate.turning]), np.array([factor / unit]), B.p)
+            for ends, (side, factor), (_, B) in sides
+        ]
+    demanded, (_, B) = demands(closure.edge.kind, *frames[0]), frames[0]
+    directions = np.where(demanded.turning[:, None], demanded.wrenches[:, :3], demanded.wrenches[:, 3:])
+    return [Acting(*closure.ends[0], directions, demanded.turning, np.where(demanded.turning, 1.0, 1.0 / length), B.p)]
 
 
 def motions(model: Model, poses: Sequence[Placement]) -> Motions:

@@ -71,40 +71,33 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
     arrays, lengths = model.arrays, np.zeros(model.arrays.size(m.N_CLOSURE_ROWS))
     if not np.all(factor.diagonal() > 0.0):
         return lengths
-    kinds, entries = arrays.table(m.CLOSURE_ROWS)["kind"], arrays.table(m.ENTRIES)
-    support = arrays.table(m.SUPPORT)["coordinate"]
+    entries, support = arrays.table(m.ENTRIES), arrays.table(m.SUPPORT)["coordinate"]
     inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
     mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
     for c in arrays.table(m.CLOSURES):
-        mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
-        if c["coupling"] >= 0:
-            lengths[c["row0"]] = _coupling_length(model, c, mine, columns, points, mobility)
-            continue
-        turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
-        angle = np.linalg.norm(turn, axis=1)
-        way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.length * angle
-        fraction = mobility[support[c["support0"] + mine["slot"]]]
-        rows = slice(c["row0"], c["row0"] + c["n_rows"])
-        along, about = (np.sqrt(np.sum(size**2 * fraction)) for size in (way, angle))
-        lengths[rows] = np.where(kinds[rows] == 0, along, about)
+        total: np.ndarray = np.zeros(c["n_rows"])
+        for part, (site, turning, ratio) in enumerate(_acting(model, c)):
+            mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
+            mine = mine[mine["part"] == part]
+            turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
+            angle = np.linalg.norm(turn, axis=1)
+            way = np.linalg.norm(shift + np.cross(turn, points[site]), axis=1) + model.length * angle
+            mobilities = mobility[support[c["support0"] + mine["slot"]]]
+            along, about = (np.sum((ratio * size) ** 2 * mobilities) for size in (way, angle))
+            total = total + np.where(turning, about, along)
+        lengths[c["row0"] : c["row0"] + c["n_rows"]] = np.sqrt(total)
     return lengths
 
 
-def _coupling_length(
-    model: Model, c: Any, entries: np.ndarray, columns: np.ndarray, points: np.ndarray, mobility: np.ndarray
-) -> float:
-    """Natural length of the row of a coupling, as of `natural_lengths`; c: its closure."""
-    gauges, table = model.arrays.table(m.GAUGES), model.arrays.table(m.NAMED["couplings"])[c["coupling"]]
-    ratio = model.arrays.table(m.NAMED["coupling_numbers"])["ratio"][c["coupling"]]
-    support, total = model.arrays.table(m.SUPPORT)["coordinate"], 0.0
-    for part, gauge, factor in ((0, gauges[table["second"]], 1.0), (1, gauges[table["first"]], ratio)):
-        mine = entries[entries["part"] == part]
-        turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
-        size = np.linalg.norm(turn, axis=1)
-        if not gauge["turning"]:
-            size = np.linalg.norm(shift + np.cross(turn, points[gauge["b"]]), axis=1) + model.length * size
-        total += float(np.sum((factor * size) ** 2 * mobility[support[c["support0"] + mine["slot"]]]))
-    return total**0.5
+def _acting(model: Model, c: Any) -> list[tuple[int, np.ndarray, float]]:
+    """Of each part of a closure (a row of CLOSURES): its second site, whether its rows turn, and their factor."""
+    arrays, k = model.arrays, c["coupling"]
+    if k < 0:
+        return [(c["site_b"], arrays.table(m.CLOSURE_ROWS)["kind"][c["row0"] : c["row0"] + c["n_rows"]] == 1, 1.0)]
+    gauges, coupling = arrays.table(m.GAUGES), arrays.table(m.NAMED["couplings"])[k]
+    ratio = arrays.table(m.NAMED["coupling_numbers"])["ratio"][k]
+    both = ((gauges[coupling[side]], factor) for side, factor in (("second", 1.0), ("first", ratio)))
+    return [(gauge["b"], gauge["turning"] == 1, factor) for gauge, factor in both]
 
 
 def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:

@@ -14,11 +14,11 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.assembly import assembled, settled
-from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
+from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.placing import opened
+from flexclear.pipeline.dynamics.model.placing import guess, targets
 from flexclear.pipeline.dynamics.model.plausibility import offsets
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates
 
@@ -81,23 +81,22 @@ def start_pose(scene: Scene, bundles: Mapping[str, Labelled], drawn: Mapping[str
 def _open(mechanism: Mechanism) -> Mechanism:
     """The mechanism with bodies without poses put where one joint each has them; loops may stay open."""
     starts, placed = given_coordinates(mechanism.scene), given_start.given_links(mechanism)
-    return settled(mechanism, opened(mechanism, constraints(mechanism, starts=starts), placed, starts))
+    joints = constraints(mechanism, starts=starts)
+    return settled(mechanism, guess(mechanism, joints, placed, targets(joints, starts)[1]))
 
 
 def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> list[Gap]:
     result = []
     for joint in joints:
-        A, B = joint.frames(poses)
-        parts = [demands(joint.edge.kind, A, B), prescribed(joint.edge.kind, A, B, joint.values)]
         away, turned = np.zeros(3), 0.0
-        for values, wrenches in parts:
-            for value, wrench in zip(values, wrenches, strict=True):
+        for demanded in (joint.demands(poses), joint.prescribed(poses)):
+            for value, wrench in zip(*demanded, strict=True):
                 if np.any(wrench[3:]):
                     away = away + value * wrench[3:]
                 else:
                     turned = max(turned, float(abs(value)))
         if np.linalg.norm(away) > CLOSED_POSE * mechanism.length or turned > STRAIGHT:
-            end = B.p + mechanism.origin
+            end = joint.frames(poses)[1].p + mechanism.origin
             result.append(Gap(joint.name, end - away, end, turned))
     return result
 

@@ -10,7 +10,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.model import arrays, flexible_bodies
-from flexclear.pipeline.dynamics.model.driving import joint_type
+from flexclear.pipeline.dynamics.model.mechanism import Closure
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
@@ -72,14 +72,10 @@ def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, in
 
 
 def closures(
-    numbering: Numbering, site_pairs: list[tuple[str, int, int]], coupled: Sequence[Coupling] = ()
-) -> tuple[dict[Any, Any], np.ndarray]:
-    """Tables of the closures, and their order there, for a thin envelope.
-
-    site_pairs: (joint type, site a, site b) of the joints that close loops; coupled: couplings, numbered after them.
-    """
-    ends = [[(a, b)] for _, a, b in site_pairs]
-    ends += [[(numbering.site(side.a), numbering.site(side.b)) for side, _ in one.parts] for one in coupled]
+    numbering: Numbering, closing: Sequence[Closure | Coupling]
+) -> tuple[dict[Any, Any], tuple[Closure | Coupling, ...]]:
+    """Tables of the closures, and these in their order there, for a thin envelope; closing: joints, then couplings."""
+    ends = [[(numbering.site(a), numbering.site(b)) for a, b in one.ends] for one in closing]
     routes = [[closure_route(numbering, a, b) for a, b in parts] for parts in ends]
     order = _order([{c for route in parts for c, _, _ in route} for parts in routes])
     closure: list[tuple[int, ...]] = []
@@ -90,9 +86,9 @@ def closures(
     supports: list[list[int]] = []
     paths: list[tuple[int, ...]] = []
     row0 = jacobian0 = 0
+    joints = sum(isinstance(one, Closure) for one in closing)
     for new, old in enumerate(order):
-        (a, b), coupling = ends[old][0], old - len(site_pairs) if old >= len(site_pairs) else -1
-        mine = _rows(site_pairs[old][0]) if coupling < 0 else [(int(coupled[coupling].second.coordinate.turning), 0, 0)]
+        (a, b), coupling, mine = ends[old][0], max(old - joints, -1), closing[old].rows
         slots = sorted({c for route in routes[old] for c, _, _ in route if c < numbering.nv})
         moved = [(*motion, part) for part, route in enumerate(routes[old]) for motion in uncommon(route)]
         entry0 = len(entries)
@@ -117,7 +113,7 @@ def closures(
         m.PATHS: paths,
         **_couplings(arrays.named(m.CLOSURES, closure), supports),
     }
-    return tables, np.array(order, dtype=np.int64)
+    return tables, tuple(closing[k] for k in order)
 
 
 def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tuple[int, ...]]:
@@ -136,12 +132,6 @@ def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tupl
     shapes = {i: slot(numbering.moving(i)) for i in links & numbering.bases.keys()}
     carrier = {i: shapes.get(numbering.mechanism.links[i].branch.parent, -1) for i in links}
     return [(i, slot(numbering.coordinates[i]), shapes.get(i, -1), carrier[i]) for i in sorted(links)[::-1]]
-
-
-def _rows(kind: str) -> list[tuple[int, int, int]]:
-    """Rows of the table CLOSURE_ROWS of a joint type."""
-    declared = joint_type(kind)
-    return [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
 
 
 def threes(count: int) -> int:

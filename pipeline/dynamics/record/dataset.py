@@ -129,7 +129,7 @@ def subject(scene: Scene) -> str:
 def references(scene: Scene) -> str:
     """Publications of the methods that the scene's parts represent, one a line."""
     sources = list[str]()
-    for name in sorted({part.module for part in named(scene)}):
+    for name in sorted(named(scene)):
         module = import_module(name)
         own = [thing for thing in vars(module).values() if getattr(thing, "__module__", None) == name]
         for thing in (module, *own):

@@ -19,6 +19,10 @@ from flexclear.pipeline.dynamics.specialise.plain import FUNCTIONS, Plain
 from flexclear.pipeline.dynamics.specialise.rules import RULES
 
 
+def _comparison(compare: Callable) -> Callable[[Any, Any], bool]:
+    return lambda self, other: bool(compare(self.value, value(other)))
+
+
 class Dual:
     """A number and its changes along all directions, shape (directions,)."""
 
@@ -73,20 +77,9 @@ class Dual:
     def __abs__(self) -> Dual:
         return -self if self.value < 0.0 else self
 
-    def __lt__(self, other: Any) -> bool:
-        return bool(self.value < value(other))
-
-    def __le__(self, other: Any) -> bool:
-        return bool(self.value <= value(other))
-
-    def __gt__(self, other: Any) -> bool:
-        return bool(self.value > value(other))
-
-    def __ge__(self, other: Any) -> bool:
-        return bool(self.value >= value(other))
-
-    def __eq__(self, other: object) -> bool:
-        return bool(self.value == value(other))
+    __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
+    __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
+    __eq__ = _comparison(operator.eq)
 
 
 def value(number: Any) -> Any:

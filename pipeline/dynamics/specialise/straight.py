@@ -75,7 +75,7 @@ def straight(
     """LLVM's text of a C function that does what a kernel does for a wiring.
 
     It is evaluate(h, f, w, n, t, y, dy), which finds the laws at time t first, or where it describes describe(h, f, w,
-    n).  whole, describes: see `program`.  exact: it gives what each lane of `abreast` gives, to the last bit; sums in
+    n).  whole, describes: see `program`.  exact: it gives what each lane of `batched` gives, to the last bit; sums in
     any order are faster by a sixth.
     """
     tape, module = program(kernel, wiring, whole=whole, describes=describes), ir.Module("straight")
@@ -98,8 +98,8 @@ def straight(
 def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
 
-    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are, see `abreast.along`; of what only
-    describes no more than the arrays.
+    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are (`batched.differentiated`); of
+    what only describes no more than the arrays.
     """
     begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
     places = [(array, index) for array, index, _ in tape.stores] + loads(tape)

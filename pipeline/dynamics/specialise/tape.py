@@ -29,6 +29,22 @@ class Undecided(Exception):  # noqa: N818  (not an error: how a branch leaves th
         self.condition = condition
 
 
+def _operator(name: str, *, reflected: bool = False) -> Callable[[Any, Any], Any]:
+    """An operator of symbols, which a function of their tape writes; reflected: the symbol is the second operand."""
+
+    def apply(self: Symbol, other: Any) -> Any:
+        return getattr(self.tape, name)(other, self) if reflected else getattr(self.tape, name)(self, other)
+
+    return apply
+
+
+def _comparison(name: str) -> Callable[[Any, Any], Any]:
+    def apply(self: Symbol, other: Any) -> Any:
+        return self.tape.write(BIT, name, self, other)
+
+    return apply
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Symbol:
     """A value that is known only when the code runs: an operation, and what it is applied to.
@@ -42,29 +58,14 @@ class Symbol:
     operation: str
     arguments: tuple[Any, ...]
 
-    def __add__(self, other: Any) -> Any:
-        return self.tape.add(self, other)
-
-    def __radd__(self, other: Any) -> Any:
-        return self.tape.add(other, self)
-
-    def __sub__(self, other: Any) -> Any:
-        return self.tape.subtract(self, other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return self.tape.subtract(other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        return self.tape.multiply(self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return self.tape.multiply(other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        return self.tape.divide(self, other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self.tape.divide(other, self)
+    __add__, __radd__ = _operator("add"), _operator("add", reflected=True)
+    __sub__, __rsub__ = _operator("subtract"), _operator("subtract", reflected=True)
+    __mul__, __rmul__ = _operator("multiply"), _operator("multiply", reflected=True)
+    __truediv__, __rtruediv__ = _operator("divide"), _operator("divide", reflected=True)
+    __and__ = __rand__ = _operator("both")
+    __le__, __gt__, __ge__ = _comparison("<="), _comparison(">"), _comparison(">=")
+    __eq__, __ne__ = _comparison("=="), _comparison("!=")
+    __hash__ = object.__hash__
 
     def __pow__(self, other: Any) -> Any:
         square = not isinstance(other, Symbol) and other == 2
@@ -79,27 +80,6 @@ class Symbol:
     def __lt__(self, other: Any) -> Any:
         never = self.operation == "fabs" and not isinstance(other, Symbol) and other == 0.0
         return False if never else self.tape.write(BIT, "<", self, other)
-
-    def __le__(self, other: Any) -> Any:
-        return self.tape.write(BIT, "<=", self, other)
-
-    def __gt__(self, other: Any) -> Any:
-        return self.tape.write(BIT, ">", self, other)
-
-    def __ge__(self, other: Any) -> Any:
-        return self.tape.write(BIT, ">=", self, other)
-
-    def __eq__(self, other: object) -> Any:
-        return self.tape.write(BIT, "==", self, other)
-
-    def __ne__(self, other: object) -> Any:
-        return self.tape.write(BIT, "!=", self, other)
-
-    def __and__(self, other: Any) -> Any:
-        return self.tape.both(self, other)
-
-    __rand__ = __and__
-    __hash__ = object.__hash__
 
     def __bool__(self) -> bool:
         return self.tape.decide(self)
@@ -193,9 +173,8 @@ class Tape:
             return -a
         if _negative(a):
             return a.arguments[0]
-        return self.write(FLOAT, "sub", a.arguments[1], a.arguments[0]) if a.operation == "sub" else self._minus(a)
-
-    def _minus(self, a: Symbol) -> Symbol:
+        if a.operation == "sub":
+            return self.write(FLOAT, "sub", a.arguments[1], a.arguments[0])
         return self.write(FLOAT, "neg", a)
 
     def multiply(self, a: Any, b: Any) -> Any:

@@ -1,7 +1,7 @@
 """Which effects of a scene matter: what taking each away changes in each quantity, and how well that is known.
 
 Scenes with contacts are compared by the means of members that start a hair apart, the same starts in each variant. A
-change is decided where it exceeds what may be chance, or where both together are below a hundredth of the quantity's
+change is decided where it is twice what may be chance, or where both together are below a hundredth of the quantity's
 size (`pipeline.core.artifacts.effect_size`).
 """
 
@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.effect_size import Influence, chance, influence, scatter, size
+from flexclear.pipeline.core.artifacts.effect_size import REAL, Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.answers.effect_sizes import cell, listed
-from flexclear.pipeline.post.overview.curves import measured, rounded
+from flexclear.pipeline.post.overview.curves import measured, rounded, size_of
 from flexclear.pipeline.post.plotting.table import Table
 
 #: what clearance and flexibility do together: the scene against the ideal mechanism
@@ -55,7 +55,7 @@ def decided(change: Influence, scale: float) -> bool:
     """Whether a change is known well enough, or cannot be known better by more members."""
     if not np.isfinite(change.difference) or change.uncertainty == 0.0:
         return True
-    return change.difference >= change.uncertainty or change.most <= SLIGHT * scale
+    return change.real or change.most <= SLIGHT * scale
 
 
 def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
@@ -118,36 +118,39 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
     return said
 
 
-def in_words(change: Influence, scale: float, unit: str, members: int = 0, spread: float = 0.0) -> str:
+def in_words(
+    change: Influence, scale: float, unit: str, members: int = 0, spread: float = 0.0, of: str = "the scene"
+) -> str:
     """What is different from the ideal mechanism, whose runs do not scatter, as HTML.
 
     members: of which these are the means, 0 where one run each is compared.  spread: standard deviation of a run.
+    of: whose size the scale is.
     """
+
+    def percent(value: float) -> str:
+        return f" ({rounded(100.0 * value / scale, 2)} % of its {size_of(unit)} in {of})"
+
     means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
     bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree to {bound}"
-    part = _percent(change.difference, scale) if change.difference < LARGE * scale else ""
+    part = percent(change.difference) if change.difference < LARGE * scale else ""
     if not decided(change, scale) and spread > SLIGHT * scale:
-        value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and _percent(spread, scale)}"
+        value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and percent(spread)}"
         return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
     if not decided(change, scale):
         more = f"; about {needed(change, scale, members)} would decide it" if members else ""
-        return f"changes by {bound} at most{part and _percent(change.most, scale)}{means}{more}"
+        return f"changes by {bound} at most{part and percent(change.most)}{means}{more}"
     if change.difference > 0.0:
         slightly = "slightly, " if change.difference < SLIGHT * scale else ""
         value = measured(change.difference, change.uncertainty or np.nan, unit)
         return f"changes {slightly}by up to <b class='n'>{value}</b>{part}{means}"
-    return f"changes by less than {bound}{part and _percent(change.most, scale)}{means}"
-
-
-def _percent(value: float, scale: float) -> str:
-    return f" ({rounded(100.0 * value / scale, 2)} % of its size)"
+    return f"changes by less than {bound}{part and percent(change.most)}{means}"
 
 
 def needed(change: Influence, scale: float, members: int) -> int:
     """Members that would decide a change: chance falls with the root of their number, and Student's t with it."""
-    enough, fewer = max(SLIGHT * scale, change.difference), chance(MANY) / chance(members)
+    enough, fewer = max(SLIGHT * scale, change.difference / REAL), chance(MANY) / chance(members)
     return int(np.ceil(members * (fewer * change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
 
 
@@ -160,9 +163,10 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     undone = [f"The budget did not reach {result.attrs['undone']}."] if result.attrs["undone"] else []
     if not single.sizes["effect"]:
         return " ".join(undone) or "The scene has no effect that could be taken away."
-    levels = [("The requested accuracy", _limits(result, requested))] if requested else [
-        (f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS
-    ]  # fmt: skip
+    levels = [(f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
+    if requested:
+        asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
+        levels = [("The requested accuracy", asked)]
     said, before, calm = list[str](), list[str](), list[str]()
     for name, limits in levels:
         now, perhaps = _called_for(single, limits)
@@ -181,14 +185,10 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     return " ".join(said + undone)
 
 
-def _limits(result: xr.Dataset, requested: Mapping[str, float]) -> np.ndarray:
-    return np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
-
-
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
-    """Effects that change a quantity by more than its limit, and those that chance alone may make do so."""
+    """Effects whose real change of a quantity is more than its limit, and those that chance alone may make do so."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
-    now = np.any(np.where(np.isnan(change), False, change > limits), axis=1)
+    now = np.any((change > limits) & (change >= REAL * chance), axis=1)
     perhaps = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
     words = [str(w) for w in single["words"].values]
     return [w for w, hit in zip(words, now, strict=True) if hit], [

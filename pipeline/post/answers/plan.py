@@ -10,25 +10,27 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.effect_size import Agreement
+from flexclear.pipeline.core.scene.output import Schema
+from flexclear.pipeline.core.scene.output import table as described
 from flexclear.pipeline.core.scene.plan_decisions import EVIDENCE, NOT_WORTH, Plan
 from flexclear.pipeline.post.answers.effect_sizes import listed, written
 from flexclear.pipeline.post.plotting.table import Table
 
-#: what a plan says of bodies' meshes: its name there, type, what it is
-OF_MESHES = {
-    "elements": ("given", np.int64, "finite elements of the body"),
-    "elements_called_for": ("called_for", np.int64, "finite elements that the requested accuracy calls for"),
-    "mesh_frequency_error": (
-        "frequency",
-        float,
-        "largest error of a retained frequency due to the mesh, as a fraction",
-    ),
-    "mesh_compliance_error": (
-        "compliance",
-        float,
-        "largest error of the frames' compliance due to the mesh, as a fraction",
-    ),
-}
+#: variables of a plan; those of quantities are in the unit of each
+PLAN: Schema = described("""
+influence | effect quantity | | estimated influence of the effect on the quantity, in the quantity's unit
+uncertainty | effect quantity | | what the estimate may be wrong by
+kept | effect | | 1: the planned scene has the effect
+evidence | effect | | what the decision rests on
+reason | effect | | the decision in words
+requested | quantity | | requested accuracy
+integration | quantity | | estimated error of the planned run's integration, and of the modes that it leaves out
+elements | body | | finite elements of the body
+elements_called_for | body | | finite elements that the requested accuracy calls for
+mesh_frequency_error | body | | largest error of a retained frequency due to the mesh, as a fraction
+mesh_compliance_error | body | | largest error of the frames' compliance due to the mesh, as a fraction
+mesh_error | body quantity | | estimated error of the quantity due to the body's mesh, at most, in the quantity's unit
+""")
 
 
 def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
@@ -37,14 +39,8 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
     differ.
     """
-    names = list(plan.requested)
-    shape = (len(plan.decisions), len(names))
-    estimate, doubt = (np.full(shape, np.nan) for _ in range(2))
-    for i, decision in enumerate(plan.decisions):
-        for k, name in enumerate(names):
-            estimate[i, k] = decision.estimate.get(name, np.nan)
-            doubt[i, k] = decision.uncertainty.get(name, 0.0 if name in decision.estimate else np.nan)
-    meshes = list(plan.meshes.values())
+    names, decisions, meshes = list(plan.requested), plan.decisions, list(plan.meshes.values())
+    doubts = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
     planned = {
         "gone": [effect.name for effect in plan.gone],
         "modes": dict(plan.modes),
@@ -52,42 +48,26 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
         "uncoupled": list(plan.uncoupled),
     }
-    variables = {
-        "influence": (
-            ("effect", "quantity"),
-            estimate,
-            "estimated influence of the effect on the quantity, in the quantity's unit",
-        ),
-        "uncertainty": (("effect", "quantity"), doubt, "what the estimate may be wrong by"),
-        "kept": (
-            ("effect",),
-            np.array([int(d.kept) for d in plan.decisions], dtype=np.int8),
-            "1: the planned scene has the effect",
-        ),
-        "evidence": (("effect",), _texts(d.evidence for d in plan.decisions), "what the decision rests on"),
-        "reason": (("effect",), _texts(d.reason for d in plan.decisions), "the decision in words"),
-        "requested": (("quantity",), np.array([plan.requested[name] for name in names]), "requested accuracy"),
-        "integration": (
-            ("quantity",),
-            np.array([plan.integration.get(name, np.nan) for name in names]),
-            "estimated error of the planned run's integration, and of the modes that it leaves out",
-        ),
-        **{
-            name: (("body",), np.array([getattr(m, of) for m in meshes], dtype=kind), text)
-            for name, (of, kind, text) in OF_MESHES.items()
-        },
-        "mesh_error": (
-            ("body", "quantity"),
-            np.array([[m.error[name] for name in names] for m in meshes], dtype=float).reshape(-1, len(names)),
-            "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
-        ),
+    values = {
+        "influence": np.reshape([[d.estimate.get(n, np.nan) for n in names] for d in decisions], (-1, len(names))),
+        "uncertainty": np.reshape(doubts, (-1, len(names))),
+        "kept": np.array([d.kept for d in decisions], dtype=np.int8),
+        "evidence": _texts(d.evidence for d in decisions),
+        "reason": _texts(d.reason for d in decisions),
+        "requested": np.array(list(plan.requested.values())),
+        "integration": np.array([plan.integration.get(name, np.nan) for name in names]),
+        "elements": np.array([m.given for m in meshes], dtype=np.int64),
+        "elements_called_for": np.array([m.called_for for m in meshes], dtype=np.int64),
+        "mesh_frequency_error": np.array([m.frequency for m in meshes], dtype=float),
+        "mesh_compliance_error": np.array([m.compliance for m in meshes], dtype=float),
+        "mesh_error": np.reshape([[m.error[name] for name in names] for m in meshes], (-1, len(names))),
     }
     return xr.Dataset(
-        {name: (dims, values, {"long_name": text}) for name, (dims, values, text) in variables.items()},
+        {name: (PLAN[name].dims, value, {"long_name": PLAN[name].long_name}) for name, value in values.items()},
         coords={
             "body": _texts(plan.meshes),
-            "effect": _texts(d.effect.name for d in plan.decisions),
-            "words": ("effect", _texts(d.effect.words for d in plan.decisions)),
+            "effect": _texts(d.effect.name for d in decisions),
+            "words": ("effect", _texts(d.effect.words for d in decisions)),
             "quantity": _texts(names),
             "unit": ("quantity", _texts(units[name] for name in names)),
         },
@@ -274,10 +254,11 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
         rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
     return Table(
         "What accuracy calls for",
-        ("of each size", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
+        ("accuracy", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
         tuple(rows),
         (
-            "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
+            "Each accuracy is that of all watched quantities, of positions and angles a fraction of the largest change "
+            "from the start, of others of the largest value; name one in [accuracy] to get its planned scene. "
             "Unchanged without a run: leaving the effect out would save no time worth the runs that measure its size.",
         ),
     )

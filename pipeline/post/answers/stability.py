@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.quantities import SEPARATED
 from flexclear.pipeline.post.cost.study import methods
+from flexclear.pipeline.post.overview.curves import size_of
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import sentence
 
@@ -94,18 +96,20 @@ def _agreement(study: xr.Dataset) -> list[Check]:
     """With runs at half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
     result = []
     for group, method, setting, one in methods(study):
-        values = one[f"distance_by_{group}"].max("quantity", skipna=False)
-        there = [float(s) for s in study[setting].values if np.isfinite(values.sel({setting: s}))]
+        distance = one[f"distance_by_{group}"]
+        there = [float(s) for s in study[setting].values if np.isfinite(distance.sel({setting: s})).all()]
         if method == study.attrs["own_integrator"]:
             at = float(study.attrs[f"own_{setting}"])
             shown = [s for s in there if 0.05 * at < s < 0.9 * at]
         else:
             shown = [min(there)] if there else []
         for s in shown:
-            value = float(values.sel({setting: s}))
+            values = distance.sel({setting: s}).values
+            worst = int(np.argmax(values))
+            value, unit, which = (float(values[worst]), *(str(study[n].values[worst]) for n in ("unit", "quantity")))
             name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
-            limit = f"{AGREEMENT:g}"
-            result.append(Check(name, f"{value:.1e} of a size", limit, value < AGREEMENT, "a tighter tolerance"))
+            said = f"{value:.1e} of the {size_of(unit)} of {which}"
+            result.append(Check(name, said, f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance"))
     return result
 
 
@@ -175,8 +179,6 @@ def figure(run: xr.Dataset) -> dict[str, bytes]:
     if drift is not None and drift.max(initial=0.0) > ROUNDING:
         panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, drift, LOOPS))
     if "separation" in run:
-        from flexclear.pipeline.core.artifacts.quantities import SEPARATED
-
         times, values = run["separation_time"].values, run["separation"].values
         panels.append(("separation of a perturbed run", "fraction of each motion", times, values, SEPARATED))
     with style.style():

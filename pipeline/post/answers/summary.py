@@ -56,7 +56,8 @@ def _effects(compared: xr.Dataset) -> list[str]:
             unit = str(compared["unit"].values[j])
             text = f"differs by <b class='n'>{measured(difference, np.nan, unit)}</b>; how exact that is is not known"
             if np.isfinite(error):
-                text = in_words(Influence(difference, error), float(first["largest"][j]), unit)
+                size = float(first["largest"][j])
+                text = in_words(Influence(difference, error), size, unit, of="the ideal mechanism")
             said.append(f"<b>{html.escape(name)}</b>: {text}.")
     return said
 

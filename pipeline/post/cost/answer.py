@@ -10,6 +10,9 @@ import xarray as xr
 
 from flexclear.pipeline.post.cost.causes import CAUSES, dominant
 from flexclear.pipeline.post.cost.study import methods, recording, resolved
+from flexclear.pipeline.post.cost.work_precision import LOOKS
+from flexclear.pipeline.post.overview.curves import size_of
+from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
 
 #: a setting that is as accurate as the scene's own is named where it costs less than this fraction
@@ -18,17 +21,18 @@ CHEAPER = 0.7
 
 def sentences(study: xr.Dataset) -> str:
     """In words; study: of `stages.cost_study`."""
-    return " ".join(filter(None, (_own(study), _digit(study), _looser(study), _cause(study), _undone(study))))
+    return " ".join(filter(None, (_own(study), _digit(study), _looser(study), _cause(study), *undone(study))))
 
 
 def _worst(study: xr.Dataset) -> tuple[str, float]:
+    """What the largest error is a fraction of, in words, and that error."""
     errors = study["own_error"].values
     k = int(np.argmax(errors))
-    return str(study["quantity"].values[k]), float(errors[k])
+    return f"{size_of(str(study['unit'].values[k]))} of {study['quantity'].values[k]}", float(errors[k])
 
 
 def _own(study: xr.Dataset) -> str:
-    name, error = _worst(study)
+    of, error = _worst(study)
     setting = (
         f"rtol {study.attrs['own_rtol']:g}" if "own_rtol" in study.attrs else f"steps of {study.attrs['own_step']:g} s"
     )
@@ -40,8 +44,8 @@ def _own(study: xr.Dataset) -> str:
     whole = horizon == "none" or horizon >= study.attrs["end"]
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
-        return f"{took} Its error cannot be said: other runs{until} have another number of impacts ({name})."
-    return f"{took} Its largest error{until} is {error:.1e} of a quantity's size ({name})."
+        return f"{took} Its error cannot be said: other runs{until} have another number of impacts."
+    return f"{took} Its largest error{until} is {error:.1e} of the {of}."
 
 
 def _digit(study: xr.Dataset) -> str:
@@ -80,15 +84,17 @@ def _cause(study: xr.Dataset) -> str:
     return f"The largest cause of error is {first} ({size}{rest}){helps}.{unseen}"
 
 
-def _undone(study: xr.Dataset) -> str:
-    return f"Not run within the budget: {study.attrs['undone']}." if study.attrs.get("undone") else ""
+def undone(study: xr.Dataset) -> list[str]:
+    """Which runs were left undone, and why, a sentence for each reason."""
+    reasons = {
+        "undone": "Not run within the budget",
+        "given_up": "Not run, since their method used up its evaluations at a looser tolerance",
+    }
+    return [f"{text}: {study.attrs[name]}." for name, text in reasons.items() if study.attrs.get(name)]
 
 
 def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
     """``<name>.png`` and ``.svg``: the largest error of any quantity against processor time, this scene as a star."""
-    from flexclear.pipeline.post.cost.work_precision import LOOKS
-    from flexclear.pipeline.post.plotting import style
-
     by_method: dict[str, list[Choice]] = {}
     for choice in choices(study):
         by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
@@ -241,7 +247,8 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
         best = min(choices(one), key=lambda c: c.error, default=NOTHING)
-        cells = (_cell(cheapest(one, target), _absent(study)) for target in TARGETS)
+        best_for = [cheapest(one, target) for target in TARGETS]
+        cells = (f"{c.name} ({c.seconds:.2g} s)" if c is not None else _absent(study) for c in best_for)
         rows.append((str(name), *cells, f"{best.error:.1e}"))
     heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
     return Table(title, heads, tuple(rows), ("In brackets: processor time of the integration of one run.",))
@@ -250,10 +257,6 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
 def _absent(study: xr.Dataset) -> str:
     """What is said of an accuracy that no run of a study has."""
     return "cannot be had" if study.attrs.get("complete", 1) else "not reached yet"
-
-
-def _cell(choice: Choice | None, absent: str) -> str:
-    return absent if choice is None else f"{choice.name} ({choice.seconds:.2g} s)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,7 +312,8 @@ def _notes(study: xr.Dataset) -> list[str]:
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a fraction of its own size, the reference's uncertainty included.",
+        + "; each as a fraction of its own size (of positions and angles the largest change from the start, of others "
+        "the largest value), the reference's uncertainty included.",
         _confirmed(study),
     ]
     if recorded == recorded:

@@ -16,6 +16,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.output import Schema, Variable, table
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import SolverError
 
@@ -30,27 +31,21 @@ GROUPS: dict[str, tuple[str, ...]] = {
 INTEGRATION = ("tolerance", "step")
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
-LONG_NAMES = {
-    "error": "largest error up to the horizon, as a fraction of the quantity's size",
-    "distance": "largest distance from the scene's own run up to the horizon, as a fraction of the quantity's size",
-    "cpu_seconds": "processor time of the integration of a warm run, median of the repeats",
-    "recording_seconds": "processor time of its record: rows and dataset",
-    "cpu_spread": "largest minus smallest processor time of the repeats",
-    "evaluations": "right-hand sides evaluated",
-    "peak_memory": "largest resident memory of the process that made the run",
-    "own_error": "error of the scene's own run, the reference's uncertainty included, as a fraction of the size",
-    "compile_seconds": "time to build and fetch or compile the kernels, not part of the run",
-}
-UNITS = {
-    "error": "1",
-    "cpu_seconds": "s",
-    "recording_seconds": "s",
-    "cpu_spread": "s",
-    "evaluations": "1",
-    "peak_memory": "B",
-    "compile_seconds": "s",
-}
-COSTS = ("cpu_seconds", "cpu_spread", "recording_seconds", "evaluations", "peak_memory", "compile_seconds")
+#: what a run costs
+COSTS: Schema = table("""
+cpu_seconds | | s | processor time of the integration of a warm run, median of the repeats
+cpu_spread | | s | largest minus smallest processor time of the repeats
+recording_seconds | | s | processor time of its record: rows and dataset
+evaluations | | 1 | right-hand sides evaluated
+peak_memory | | B | largest resident memory of the process that made the run
+compile_seconds | | s | time to build and fetch or compile the kernels, not part of the run
+""")
+#: and what else a study says of it
+KINDS: Schema = COSTS | table("""
+error | | 1 | largest error up to the horizon, as a fraction of the quantity's size
+distance | | 1 | largest distance from the scene's own run up to the horizon, as a fraction of the quantity's size
+own_error | | 1 | error of the scene's own run, the reference's uncertainty included, as a fraction of the size
+""")
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +115,8 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         mine = [p for p in points if p.group == group]
         if not mine:
             continue
-        values = {factor: _sorted({p.factors[factor] for p in mine}) for factor in factors}
+        every = {factor: {p.factors[factor] for p in mine} for factor in factors}
+        values = {name: sorted(of, reverse=all(isinstance(v, float) for v in of)) for name, of in every.items()}
         coordinates |= values
         over, each = partial(_over_factors, values, mine, runs), (len(chosen),)
         distance = over(lambda run: np.nan if asis is None else errors(run, asis), each)
@@ -140,7 +136,8 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     result = xr.Dataset(data, coords=coordinates, attrs=attributes)
     for name in result.data_vars:
         kind = str(name).rpartition("_by_")[0] or str(name)
-        result[name].attrs = {"units": UNITS.get(kind, "1"), "long_name": LONG_NAMES.get(kind, kind.replace("_", " "))}
+        one = KINDS.get(kind, Variable((), "1", kind.replace("_", " ")))
+        result[name].attrs = {"units": one.units, "long_name": one.long_name}
     return result
 
 
@@ -216,10 +213,6 @@ def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
 def relative(error: float, scale: float) -> float:
     """An error as a fraction of a size; the error itself where there is no size."""
     return error / scale if scale > 0.0 else error
-
-
-def _sorted(values: set[Any]) -> list[Any]:
-    return sorted(values, reverse=all(isinstance(v, float) for v in values))
 
 
 def _described(points: Sequence[Point], group: str) -> str:

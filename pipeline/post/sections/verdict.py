@@ -16,14 +16,14 @@ it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.schema import Schema, Variable, conform
+from flexclear.pipeline.core.artifacts.schema import Schema, conform
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
+from flexclear.pipeline.core.scene.output import table
 from flexclear.pipeline.post.sections import chaos
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
@@ -34,23 +34,20 @@ DISCRETE = 0.95
 #: states below which the 0-1 test and the spectrum show nothing
 ENOUGH = 200
 
-_V, _O = Variable, partial(Variable, optional=True)
-VERDICT: Schema = {
-    "exponent": _V((), "s-1", "largest Lyapunov exponent"),
-    "exponent_low": _V((), "s-1", "lower end of its 95 % confidence interval"),
-    "exponent_high": _V((), "s-1", "upper end of its 95 % confidence interval"),
-    "least_exponent": _V((), "s-1", "exponent that so many periods cannot distinguish from zero"),
-    "zero_one": _O((), "1", "K of the 0-1 test, of the component that decides least for regular motion"),
-    "returns_after": _V((), "1", "periods after which the states come back; 0 where they do not"),
-    "return_distance": _V((), "1", "largest distance of a return, as a fraction of the motion's size"),
-    "contraction": _O((), "1", "factor per period by which successive returns come closer"),
-    "few_lines": _O((), "1", "fraction of the variance in the sixteen largest lines of the spectrum"),
-    "principal": _V(("section", "component"), "1", "states along their directions of largest variance"),
-    "power": _V(("frequency", "component"), "1", "fraction of the variance at each frequency"),
-    "impact_correlation": _O(
-        ("lag", "contact"), "1", "correlation of the first impact's phase with that of later periods"
-    ),
-}
+VERDICT: Schema = table("""
+exponent | | s-1 | largest Lyapunov exponent
+exponent_low | | s-1 | lower end of its 95 % confidence interval
+exponent_high | | s-1 | upper end of its 95 % confidence interval
+least_exponent | | s-1 | exponent that so many periods cannot distinguish from zero
+zero_one? | | 1 | K of the 0-1 test, of the component that decides least for regular motion
+returns_after | | 1 | periods after which the states come back; 0 where they do not
+return_distance | | 1 | largest distance of a return, as a fraction of the motion's size
+contraction? | | 1 | factor per period by which successive returns come closer
+few_lines? | | 1 | fraction of the variance in the sixteen largest lines of the spectrum
+principal | section component | 1 | states along their directions of largest variance
+power | frequency component | 1 | fraction of the variance at each frequency
+impact_correlation? | lag contact | 1 | correlation of the first impact's phase with that of later periods
+""")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
-from flexclear.pipeline.core.artifacts.quantities import IMPACT, LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.core.artifacts.quantities import IMPACT, PERTURBATION, SEPARATED, separated_from
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
 from flexclear.pipeline.core.numerics.rotations import angle_about_y, first_largest, rotation_between
 from flexclear.pipeline.post.single_run.schema import POST
@@ -296,13 +296,13 @@ def spread(velocity: np.ndarray) -> np.ndarray:
 
 
 def horizon(time: np.ndarray, velocity: np.ndarray) -> float:
-    """Time from which on `spread` stays above SEPARATED of the largest speed; the last time if it never does [s].
+    """Time from which on members are separated, by `spread` over the largest speed; the last time if none are [s].
 
     Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a
     pointwise value is one draw out of many.
     """
     peak = float(np.linalg.norm(velocity, axis=-1).max())
-    first = lasting(time, spread(velocity) > SEPARATED * peak, LASTING * float(time[-1] - time[0]))
+    first = separated_from(time, spread(velocity) / (peak or 1.0), float(time[-1] - time[0]))
     return float(time[-1] if first is None else time[first])
 
 
@@ -314,7 +314,7 @@ def sentence(horizon: float, end: float, members: float | None = None) -> str:
     neighbour = f"A run whose contacts start {100.0 * PERTURBATION:g} % of their clearance elsewhere"
     difference = f"{100.0 * SEPARATED:g} % of each body's largest motion"
     if horizon >= end:
-        text = f"{neighbour} stays within {difference} to the end, but for moments of impacts."
+        text = f"{neighbour} does not diverge from it: differences of more than {difference} pass."
     else:
         whole = f"the run lasts {1e3 * end:.4g} ms"
         text = f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."

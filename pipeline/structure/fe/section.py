@@ -86,8 +86,8 @@ def rectangle_torsion(width: Value, height: Value) -> Value:
 def shape(types: tuple[str, ...], given: Section) -> tuple[str, tuple[float, ...]]:
     """Which of `types` a section with these constants is, and its lengths as this type takes them; empty for none."""
     for name in types:
-        lengths = _LENGTHS[name](given) if name in _LENGTHS else ()
-        if lengths and (len(types) == 1 or _is(globals()[name](*lengths), given)):
+        lengths = SHAPES[name].lengths(given) if name in SHAPES else ()
+        if lengths and (len(types) == 1 or _is(SHAPES[name].constants(*lengths), given)):
             return name, lengths
     return "", ()
 
@@ -110,11 +110,19 @@ def _rectangle_lengths(given: Section) -> tuple[float, ...]:
     return math.sqrt(given.area * ratio), math.sqrt(given.area / ratio)
 
 
-#: lengths of a section of a type with given constants, as the type takes them; empty where there is none
-_LENGTHS: dict[str, Callable[[Section], tuple[float, ...]]] = {
-    "circle": lambda given: (math.sqrt(given.area / math.pi),),
-    "tube": _tube_lengths,
-    "rectangle": _rectangle_lengths,
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A type of section. constants: from its lengths.  lengths: from constants; empty where there are none."""
+
+    constants: Callable[..., Section]
+    lengths: Callable[[Section], tuple[float, ...]]
+
+
+#: by the type that a recipe gives; a general section has none
+SHAPES = {
+    "circle": Shape(circle, lambda given: (math.sqrt(given.area / math.pi),)),
+    "tube": Shape(tube, _tube_lengths),
+    "rectangle": Shape(rectangle, _rectangle_lengths),
 }
 
 

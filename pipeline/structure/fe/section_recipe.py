@@ -125,7 +125,7 @@ def constants(start: Any, end: Any | None, s: Value) -> Section:
     """Section constants at the fraction s of a span from the section `start` to the section `end` (None: no taper)."""
     if start.type == "general":
         return Section(start.area, start.torsion, start.second_y, start.second_z, start.product)
-    return getattr(sections, start.type)(*_dimensions(start, end, s))
+    return sections.SHAPES[start.type].constants(*_dimensions(start, end, s))
 
 
 def inertia(start: Any, end: Any | None, given: Any | None, s: Value) -> tuple[Value, Value, Value, Value]:

@@ -18,7 +18,7 @@ Timoshenko & Goodier, *Theory of Elasticity*, sec. 109 (torsion of a rectangle).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,13 +144,12 @@ def _at_ends(mesh: xr.Dataset, name: str) -> np.ndarray:
 def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline | None:
     """The maps of a section with these constants that is of one of `types`; None where it has no known outline."""
     name, lengths = sections.shape(types, given)
-    if not name:
+    if name not in OUTLINES:
         return None
-    made = getattr(sections, name)(*lengths)
-    return _sides(made, *lengths) if name == "rectangle" else _round(made, *lengths, poisson=poisson)
+    return OUTLINES[name](sections.SHAPES[name].constants(*lengths), poisson, *lengths)
 
 
-def _round(made: Section, radius: float, inner: float = 0.0, *, poisson: float) -> Outline:
+def _round(made: Section, poisson: float, radius: float, inner: float = 0.0) -> Outline:
     angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(angle), np.sin(angle)])
     y, z = np.concatenate([radius * ring, inner * ring if inner else np.zeros((2, 1))], axis=1)
@@ -182,7 +181,8 @@ def _flexure(
     return scale * along, scale * (across + (2.0 + poisson) * y * z)
 
 
-def _sides(made: Section, width: float, height: float) -> Outline:
+def _sides(made: Section, poisson: float, width: float, height: float) -> Outline:
+    """Of a rectangle; Poisson's ratio changes only what its flexure leaves out."""
     s = np.linspace(-0.5, 0.5, ALONG)
     half = np.full(ALONG, 0.5)
     y = width * np.concatenate([s, s, half, -half, [0.0]])
@@ -192,6 +192,10 @@ def _sides(made: Section, width: float, height: float) -> Outline:
     stress[:, 1, 1] = 1.5 / made.area * (1.0 - (2.0 * y / width) ** 2)
     stress[:, 2, 2] = 1.5 / made.area * (1.0 - (2.0 * z / height) ** 2)
     return Outline(stress, False)
+
+
+#: by type of section; others have no known outline
+OUTLINES: dict[str, Callable[..., Outline]] = {"circle": _round, "tube": _round, "rectangle": _sides}
 
 
 def _torsion(y: np.ndarray, z: np.ndarray, width: float, height: float, J: Value) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ Eqs. (27) and (28) of the paper both carry a minus sign. Read together, they mak
 sliding; read as eq. (28) alone being the signed coefficient, they make it dissipate. The reading
 that dissipates is used here. Below v_s the coefficient is :math:`\tfrac12\mu_s(3y - y^3)`,
 y = v/v_s; between v_s and v_d eq. (28) names its steps from the higher speed to the lower, which
-is the same cubic. Below v_s is the regime that stands for sticking.
+is the same cubic. Below v_s is the regime that represents sticking.
 Source: Wang & Wang (2019), eqs. (27)-(29).
 """
 

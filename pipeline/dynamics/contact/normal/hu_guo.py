@@ -1,4 +1,4 @@
-r"""Hertzian contact with a damping from the energy lost, compression and restitution apart.
+r"""Hertzian contact with a damping from the energy lost, of compression and restitution separately.
 
 .. math:: F_N = K\,\delta^n\left[1 + a\,\dot\delta/\dot\delta^{(-)}\right], \quad a = \frac{3(1-c_r)}{2c_r}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from flexclear.pipeline.core.scene.clearance import BallOnPlane
-from flexclear.pipeline.dynamics.contact.hertz import given_or, plane_stiffness
+from flexclear.pipeline.dynamics.contact.hertz import plane_stiffness, published
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, axis, dot, scale
 
@@ -18,12 +18,8 @@ def separation(axes, numbers, p, v):
     return height - numbers.radius, -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
 
 
-def stiffness(joint: BallOnPlane, exponent: float) -> float:
-    """K [N/m^exponent], given or of Hertz; ValueError where nothing is published.
-
-    Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
-    """
-    return given_or(joint, exponent, {1.5: plane_stiffness})
+#: source: Wang & Wang (2019), eq. (26), with a plane for the socket
+stiffness = published({1.5: plane_stiffness})
 
 
 def contact_size(joint: BallOnPlane, depth: float, force: float) -> float:

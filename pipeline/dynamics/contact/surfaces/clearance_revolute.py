@@ -16,8 +16,8 @@ from __future__ import annotations
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.dynamics.contact.hertz import (
     cylinder_stiffness,
-    given_or,
     half_width,
+    published,
     relative_radius,
     sphere_stiffness,
 )
@@ -33,13 +33,8 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, p
 
 
-def stiffness(joint: ClearanceRevolute, exponent: float) -> float:
-    """K [N/m^exponent], given or as above; ValueError where nothing is published.
-
-    Source: Wang & Wang (2019), eq. (26), of spheres; Popov (2017), Contact Mechanics and Friction, sec. 5.3, of
-    cylinders.
-    """
-    return given_or(joint, exponent, {1.0: cylinder_stiffness, 1.5: sphere_stiffness})
+#: sources: Wang & Wang (2019), eq. (26), of spheres; Popov (2017), Contact Mechanics and Friction, sec. 5.3
+stiffness = published({1.0: cylinder_stiffness, 1.5: sphere_stiffness})
 
 
 def contact_size(joint: ClearanceRevolute, depth: float, force: float) -> float:

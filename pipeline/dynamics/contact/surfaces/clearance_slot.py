@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.clearance import ClearanceSlot
-from flexclear.pipeline.dynamics.contact.hertz import cylinder_stiffness, given_or, half_width, plane_stiffness
+from flexclear.pipeline.dynamics.contact.hertz import cylinder_stiffness, half_width, plane_stiffness, published
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
 
@@ -31,12 +31,8 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, across
 
 
-def stiffness(joint: ClearanceSlot, exponent: float) -> float:
-    """K [N/m^exponent], given or as above; ValueError where nothing is published.
-
-    Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
-    """
-    return given_or(joint, exponent, {1.0: cylinder_stiffness, 1.5: plane_stiffness})
+#: source: Wang & Wang (2019), eq. (26), with a plane for the socket
+stiffness = published({1.0: cylinder_stiffness, 1.5: plane_stiffness})
 
 
 def contact_size(joint: ClearanceSlot, depth: float, force: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
-from flexclear.pipeline.dynamics.contact.hertz import given_or, relative_radius, sphere_stiffness
+from flexclear.pipeline.dynamics.contact.hertz import published, relative_radius, sphere_stiffness
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import radial
 
@@ -25,12 +25,8 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, p
 
 
-def stiffness(joint: ClearanceSpherical, exponent: float) -> float:
-    """K [N/m^exponent], given or of two spheres; ValueError where nothing is published.
-
-    Source: Wang & Wang (2019), eq. (26).
-    """
-    return given_or(joint, exponent, {1.5: sphere_stiffness})
+#: source: Wang & Wang (2019), eq. (26)
+stiffness = published({1.5: sphere_stiffness})
 
 
 def contact_size(joint: ClearanceSpherical, depth: float, force: float) -> float:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import Bushing
-from flexclear.pipeline.dynamics.gauge import internal_rate
+from flexclear.pipeline.dynamics.gauge import internal_rate, relative_twist
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
 from flexclear.pipeline.dynamics.loads.row import Row
@@ -31,6 +31,7 @@ from flexclear.pipeline.dynamics.vectors import (
     put,
     scale,
     sub,
+    to_quaternion,
     transpose,
     turn,
     turn_back,
@@ -47,15 +48,7 @@ DAMPING, MIXED, SECOND = 36, 3, 18
 @kernel
 def rotation_vector(R):
     """The shortest rotation vector [rad] of a rotation matrix, by its quaternion."""
-    trace, x, y, z = R[0] + R[4] + R[8], R[0], R[4], R[8]
-    if trace >= max(x, max(y, z)):
-        q = (1.0 + trace, R[7] - R[5], R[2] - R[6], R[3] - R[1])
-    elif x >= max(y, z):
-        q = (R[7] - R[5], 1.0 + x - y - z, R[1] + R[3], R[2] + R[6])
-    elif y >= z:
-        q = (R[2] - R[6], R[1] + R[3], 1.0 + y - x - z, R[5] + R[7])
-    else:
-        q = (R[3] - R[1], R[2] + R[6], R[5] + R[7], 1.0 + z - x - y)
+    q = to_quaternion(R)
     axis = (q[1], q[2], q[3]) if q[0] >= 0.0 else (-q[1], -q[2], -q[3])
     size, cosine = np.sqrt(dot(axis, axis)), abs(q[0])
     return scale(2.0 * np.arctan2(size, cosine) / size if size > 0.0 else 2.0 / cosine, axis)
@@ -109,10 +102,9 @@ def apply(d, k):
     """Apply load k."""
     load = d.loads[k]
     a, b = d.site_frames[load.a], d.site_frames[load.b]
-    F, G, p, omega = a.axes, b.axes, b.origin, a.omega
-    r = sub(p, a.origin)
-    slide = sub(b.velocity, add(a.velocity, cross(omega, r)))
-    spin = turn_back(F, sub(b.omega, omega))
+    F, G, p = a.axes, b.axes, b.origin
+    r, (turning, slide) = sub(p, a.origin), relative_twist(a, b)
+    spin = turn_back(F, turning)
     x, x_rate, v = turn_back(F, r), turn_back(F, slide), rotation_vector(product(transpose(F), G))
     if load.internal0 >= 0:
         v = continued(v, at(d.internal, load.internal0))

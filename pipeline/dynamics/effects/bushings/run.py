@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
@@ -23,18 +21,12 @@ def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int
     sites: frames of all sites, rows of SITE_FRAMES with named fields.  internal: states that the vectors continue.
     """
     vectors = {}
-    for row in _rows(model).values():
+    for row in model.rows_of(Bushing).values():
         first = int(row["internal0"])
         if first >= 0:
             R = sites[row["a"]]["axes"].T @ sites[row["b"]]["axes"]
             vectors[first] = nearest(R, internal[first : first + 3])
     return vectors
-
-
-def _rows(model: Model) -> dict[str, Any]:
-    """Row of LOADS of every bushing by name, as the scene has them."""
-    rows = {name: row for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True)}
-    return {name: rows[name] for name, load in model.scene.forces().items() if isinstance(load, Bushing)}
 
 
 def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
@@ -52,7 +44,7 @@ def explanation(engine: Engine) -> str | None:
     """What to say where a bushing has come to a full turn in the engine's state, else None."""
     model, y = engine.model, engine.view(m.Y)
     first = model.ny - model.arrays.size(m.N_INTERNAL)
-    for name, row in _rows(model).items():
+    for name, row in model.rows_of(Bushing).items():
         at = first + int(row["internal0"])
         angle = float(np.linalg.norm(y[at : at + 3])) if row["internal0"] >= 0 else 0.0
         if angle > 0.99 * LARGEST_ANGLE:
@@ -66,7 +58,7 @@ def explanation(engine: Engine) -> str | None:
 
 def give(model: Model, seen: Observed) -> Series:
     """Displacement [m] and rotation vector [rad] of each second frame in the first one's axes, and their coordinate."""
-    rows = _rows(model)
+    rows = model.rows_of(Bushing)
     displacement, rotation = (np.zeros((len(seen.state), len(rows), 3)) for _ in range(2))
     for k, row in enumerate(rows.values()):
         a, b = (seen.sites[:, row[end]] for end in ("a", "b"))

@@ -13,16 +13,14 @@ from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_
 
 def controllers(model: Model, seen: Observed) -> Series:
     """Force along the coordinate that a controller pushes, and its integral part [N or N m]."""
-    kinds = {name: load for name, load in model.scene.forces().items() if isinstance(load, (Pid, SampledPid))}
-    rows = {name: model.arrays.table(m.LOADS)[k] for k, (name, _) in enumerate(model.loads)}
-    first = model.ny - model.arrays.size(m.N_INTERNAL)
+    rows, first = model.rows_of(Pid, SampledPid), model.ny - model.arrays.size(m.N_INTERNAL)
     places = [
-        first + int(rows[name]["internal0"]) + (INTEGRAL if isinstance(load, SampledPid) else 0)
-        for name, load in kinds.items()
+        first + int(row["internal0"]) + (INTEGRAL if isinstance(model.scene.load[name], SampledPid) else 0)
+        for name, row in rows.items()
     ]
     dims = ("time", "controller")
-    forces = along_coordinates(model, seen, list(kinds))
+    forces = along_coordinates(model, seen, list(rows))
     return {"controller_force": (dims, forces), "controller_integral": (dims, seen.state[:, places])}, {
-        "controller": list(kinds),
-        "controller_motion": ("controller", [motion(turns) for turns in turning_loads(model, list(kinds))]),
+        "controller": list(rows),
+        "controller_motion": ("controller", [motion(turns) for turns in turning_loads(model, list(rows))]),
     }

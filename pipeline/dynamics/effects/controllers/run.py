@@ -27,11 +27,11 @@ LOST = 100.0
 def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     """The function sample(y, t): state after the samples that are due at time t, from that before; shape (NY,)."""
     model, gauges, numbers = engine.model, *(engine.model.arrays.table(one) for one in (m.GAUGES, m.LOAD_NUMBERS))
-    loads = zip((model.scene.load.get(name) for name, _ in model.loads), model.arrays.table(m.LOADS), strict=True)
-    sampled = [(load, row) for load, row in loads if isinstance(load, SampledPid)]
+    periods = {name: load.period for name, load in model.scene.load.items() if isinstance(load, SampledPid)}
+    sampled = model.rows_of(SampledPid)
 
     def sample(y: np.ndarray, t: float) -> np.ndarray:
-        due = [row for load, row in sampled if _is_due(load.period, t - engine.start)]
+        due = [row for name, row in sampled.items() if _is_due(periods[name], t - engine.start)]
         if not due:
             return y
         y = y.copy()

@@ -11,15 +11,10 @@ from __future__ import annotations
 from typing import Any
 
 from flexclear.pipeline.dynamics.equations import closures
+from flexclear.pipeline.dynamics.equations.closures import wrench_row
 from flexclear.pipeline.dynamics.gauge import bias, counted
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import add_wrench, dot_wrench, scale
-
-
-@kernel
-def wrench_row(d, c, part):
-    """Row of ROWS with the wrench of coupling c on its second joint (part 0), or on its first one (part 1)."""
-    return d.closures[c].row0 if part == 0 else d.n_closure_rows + d.closures[c].coupling
 
 
 @kernel
@@ -27,7 +22,7 @@ def row(d, c):
     """Wrenches, residual, its rate, and acceleration bias of coupling c."""
     closure = d.closures[c]
     coupling, numbers, k = d.couplings[closure.coupling], d.coupling_numbers[closure.coupling], closure.row0
-    ratio, on_second, on_first = numbers.ratio, d.rows[wrench_row(d, c, 0)], d.rows[wrench_row(d, c, 1)]
+    ratio, (on_second, on_first) = numbers.ratio, (d.rows[wrench_row(d, c, 0)], d.rows[wrench_row(d, c, 1)])
     q1, u1, moment1, force1 = counted(d, coupling.first)
     q2, u2, moment2, force2 = counted(d, coupling.second)
     on_second.moment, on_second.force = moment2, force2
@@ -65,17 +60,6 @@ def locate(d):
 
 
 @kernel
-def known_forces(d):
-    """See `closures.known_forces`."""
-    for e in range(d.n_known_entries):
-        c = d.known_entries[e].closure
-        first = d.closures[c].row0
-        if d.closures[c].coupling >= 0:
-            first = wrench_row(d, c, d.known_entries[e].part)
-        closures.take_share(d, e, first)
-
-
-@kernel
 def take_off_first_joints(d):
     """Take what couplings do to their first joints off the links that they act on."""
     for c in range(d.n_closures):
@@ -90,4 +74,4 @@ def take_off_first_joints(d):
 
 def make_coupled_closing(tree: Any) -> closures.Closing:
     """Return the kernels of all closures, couplings among them; see `closures.make_closing`."""
-    return closures.make_closing(tree, locate, known_forces)
+    return closures.make_closing(tree, locate)

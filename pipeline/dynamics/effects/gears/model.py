@@ -58,6 +58,16 @@ class Coupling:
         return f"gear {self.gear}"
 
     @property
+    def ends(self) -> list[tuple[Site, Site]]:
+        """Pairs of sites between which it acts: of its second joint, of its first one."""
+        return [(side.a, side.b) for side, _ in self.parts]
+
+    @property
+    def rows(self) -> list[tuple[int, int, int]]:
+        """Its row of the table CLOSURE_ROWS, of which only the kind counts."""
+        return [(int(self.second.coordinate.turning), 0, 0)]
+
+    @property
     def parts(self) -> tuple[tuple[Side, float], tuple[Side, float]]:
         """Both sides and how much of them is in the row that the coupling is: second - ratio * first."""
         return (self.second, 1.0), (self.first, -self.ratio)

@@ -35,7 +35,8 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose, nothing, repeat
 from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BALL, PIN, SLIDER
-from flexclear.pipeline.dynamics.equations.closures import respond
+from flexclear.pipeline.dynamics.equations.closures import closure_wrench, respond
+from flexclear.pipeline.dynamics.gauge import relative_twist
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
@@ -74,14 +75,6 @@ def bearing_frame(d, e):
 def bearing_axis(d, e):
     """Unit vector along bearing e, world axes."""
     return axis(bearing_frame(d, e).axes, d.bearings[e].axis)
-
-
-@kernel
-def relative_twist(a, b):
-    """Angular velocity of frame b against frame a, and velocity of its origin there."""
-    omega, r = a.omega, sub(b.origin, a.origin)
-    slide = sub(b.velocity, add(a.velocity, cross(omega, r)))
-    return sub(b.omega, omega), slide
 
 
 def make_unit_wrench(traction: Callable) -> Callable:
@@ -141,17 +134,6 @@ def load_coordinates(d, e, size):
         value = size * entry.sign * unit_power(d.bearing[e], d.columns[entry.column])
         if entry.coordinate < d.nv:
             d.force[entry.coordinate] += value
-
-
-@kernel
-def closure_wrench(d, c, part):
-    """Wrench of closure c on its second body, or of a coupling on its first joint (part 1)."""
-    closure, moment, force = d.closures[c], ZERO, ZERO
-    first = d.n_closure_rows + closure.coupling if part == 1 else closure.row0
-    for k in range(closure.n_kept):
-        size, row = d.multiplier[closure.kept0 + k], d.rows[first + k]
-        moment, force = add(moment, scale(size, row.moment)), add(force, scale(size, row.force))
-    return moment, force
 
 
 def make_reaction(demand: Callable) -> Callable:

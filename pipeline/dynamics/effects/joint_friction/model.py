@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BEARINGS, SLIDER
 from flexclear.pipeline.dynamics.model.components import Floors, Group
-from flexclear.pipeline.dynamics.model.contacts import friction_law
+from flexclear.pipeline.dynamics.model.contacts import bristle, friction_law
 from flexclear.pipeline.dynamics.model.filling import Filling
 from flexclear.pipeline.dynamics.model.guards import Guard, speeds
-from flexclear.pipeline.dynamics.model.mechanism import Closure, Mechanism
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
@@ -28,16 +27,10 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Grou
     """First the loss of each joint [J], then the bristles [m] of each bearing."""
     losses, bristles = list[Group](), list[Group]()
     for name, joint in mechanism.scene.rubbing().items():
-        part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), _bristle(name, joint)
+        part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), bristle(name, joint)
         losses.append((energies[part], 1, part))
         bristles += [] if size is None else [(size, 3, part)] * len(BEARINGS[joint.type])
     return losses + bristles
-
-
-def _bristle(name: str, joint: IdealJoint) -> float | None:
-    """Size of the bristles of each of its bearings, or None."""
-    size: float | None = friction_law(name, joint).bristle(joint.friction)
-    return size
 
 
 def guards(mechanism: Mechanism) -> Iterator[Guard]:
@@ -62,49 +55,39 @@ def fill(filling: Filling) -> dict[str, Any]:
     Articulated inertias find what a joint transmits without terms of reactions.
     """
     numbering, closures, articulated = filling.numbering, filling.closures, filling.parts.articulated
-    mechanism, ends, laws = (
-        numbering.mechanism,
-        closure_ends(numbering, closures),
-        filling.parts.kinds("joint_friction"),
-    )
-    bristle = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
+    mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
+    pairs = [(c, part, *both) for c, one in enumerate(closures) for part, both in enumerate(one.ends)]
+    ends = [(c, part, numbering.site(a), numbering.site(b)) for c, part, a, b in pairs]
+    slot = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
     tables: dict[str, list[Any]] = defaultdict(list)
     for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
         sites = numbering.site(a), numbering.site(b)
         link, reverse = _link(mechanism, name)
-        closure = next((c for c, one in enumerate(closures) if isinstance(one, Closure) and one.name == name), -1)
+        closure = next((c for c, one in enumerate(closures) if one.name == name), -1)
         entries = uncommon(closure_route(numbering, *sites))
-        reaction = _terms(numbering, link, ends, articulated) if link >= 0 else _Reaction([], [], [])
-        ranges = _add(tables, list(entries), reaction, len(BEARINGS[joint.type]))
-        tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges))
+        momenta, columns, loops = _reaction(numbering, link, ends, articulated) if link >= 0 else ([], [], [])
+        ranges = (
+            *_added(tables["rubbing_entries"], entries),
+            *_added(tables["reaction_terms"], momenta),
+            *_added(tables["reaction_terms"], columns),
+            *_added(tables["reaction_loops"], loops),
+        )
+        where = len(tables["bearings"]), len(BEARINGS[joint.type])
+        tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges, *where))
         for kind, side, axis in BEARINGS[joint.type]:
-            size = _bristle(name, joint)
+            size = bristle(name, joint)
             law = laws.index(joint.friction.law) if joint.friction is not None else -1
-            tables["bearings"].append((number, kind, law, side, axis, bristle if size is not None else -1))
+            tables["bearings"].append((number, kind, law, side, axis, slot if size is not None else -1))
             tables["bearing_numbers"].append(_numbers(name, joint, kind))
-            bristle += 3 if size is not None else 0
+            slot += 3 if size is not None else 0
     return tables
 
 
-class _Reaction(NamedTuple):
-    """What the reaction of a tree's joint consists of: terms of momenta and of columns, and closures beyond it."""
-
-    momenta: Rows
-    columns: Rows
-    loops: Rows
-
-
-def _add(tables: dict[str, list[Any]], entries: Rows, reaction: _Reaction, bearings: int) -> tuple[int, ...]:
-    """Add the rows of one joint; where they begin and how many there are, in the order of the table `rubbing`."""
-    terms, loops = tables["reaction_terms"], tables["reaction_loops"]
-    momenta, columns, first = len(reaction.momenta), len(reaction.columns), len(terms)
-    of_terms, of_loops = (first, momenta, first + momenta, columns), (len(loops), len(reaction.loops))
-    ranges = (len(tables["rubbing_entries"]), len(entries), *of_terms, *of_loops, len(tables["bearings"]), bearings)
-    tables["rubbing_entries"] += entries
-    terms += [*reaction.momenta, *reaction.columns]
-    loops += reaction.loops
-    return ranges
+def _added(table: Rows, rows: Sequence[tuple[int, ...]]) -> tuple[int, int]:
+    """Add rows to a table; where they begin there, and how many they are."""
+    table += rows
+    return len(table) - len(rows), len(rows)
 
 
 def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
@@ -128,8 +111,13 @@ def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
     return bearings[-1] if bearings else (-1, False)
 
 
-def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool) -> _Reaction:
-    """What the reaction of a link's joint consists of; ends: of all closures."""
+def _reaction(
+    numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool
+) -> tuple[Rows, Rows, Rows]:
+    """What the reaction of a link's joint consists of: terms of momenta and of columns, and closures beyond it.
+
+    ends: (closure, part, first site, second site) of all closures; a coupling has two parts.
+    """
     mechanism = numbering.mechanism
     beyond = {link}
     for i in range(link + 1, len(mechanism.links)):
@@ -147,13 +135,4 @@ def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]
         sign = int(numbering.sites[b].link in beyond) - int(numbering.sites[a].link in beyond)
         if sign:
             loops.append((c, sign, part))
-    return _Reaction(momenta, columns, loops)
-
-
-def closure_ends(numbering: Numbering, closures: Sequence[Closure | Coupling]) -> list[tuple[int, int, int, int]]:
-    """(closure, part, first site, second site) of all closures; a coupling has two parts."""
-    ends = []
-    for c, closure in enumerate(closures):
-        sides = [(side.a, side.b) for side, _ in closure.parts] if isinstance(closure, Coupling) else [closure[1:]]
-        ends += [(c, part, numbering.site(a), numbering.site(b)) for part, (a, b) in enumerate(sides)]
-    return ends
+    return momenta, columns, loops

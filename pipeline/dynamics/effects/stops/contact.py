@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
+from flexclear.pipeline.dynamics.bodies.rigid import apply_between
 from flexclear.pipeline.dynamics.contact.forces import make_normal_force
 from flexclear.pipeline.dynamics.gauge import counted
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -33,8 +33,7 @@ def make_stops(forms: tuple[Any, ...]) -> Callable:
         if d.mode[c] == 1:
             size = -sense * normal_force(d, c)
             touch.force = scale(size, force)
-            apply_wrench(d, contact.inner, scale(size, moment), scale(size, force))
-            apply_wrench(d, contact.outer, scale(-size, moment), scale(-size, force))
+            apply_between(d, contact.outer, contact.inner, scale(size, moment), scale(size, force))
 
     @kernel
     def stops(d):

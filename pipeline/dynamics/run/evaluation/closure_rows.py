@@ -67,7 +67,7 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
         engine.view(m.ROW_SCALE)[: len(row_scale)] = row_scale
     engine.view(m.Y)[:], engine.slope[:] = y, slope
     pivots[m.LAST_PIVOT] = ratio if better else present
-    pivots[m.WANTED_PIVOT] = WORN * ratio if better else WORN * present
+    pivots[m.LEAST_PIVOT] = WORN * ratio if better else WORN * present
     if better:
         engine.view(m.INDEPENDENCE.place)[:] = 0.0  # that of other rows
         engine.control[[m.PASS_TIME, m.MOST_REACH, m.LEFT]] = NEVER, NEVER, 1.0

@@ -93,9 +93,9 @@ def made(
         key = (parts, wired, name, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
-                source = sources.abreast(parts, wired, lanes)
+                source = sources.batched(parts, wired, lanes)
             else:
-                source = sources.along(parts, wired) if changes else sources.straight(parts, wired, name, exact=exact)
+                source = sources.tangent(parts, wired) if changes else sources.straight(parts, wired, name, exact=exact)
             try:
                 _known[key] = functions.straight(name, source, partial(progress, None))
             except UnsuitedError:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, separated_from
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
@@ -68,8 +68,8 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     change = (sides[1] - sides[0]) / (2.0 * steps[:, None])
     largest = metric.norms(metric.motion(engine, trajectory.rows)).max(axis=0, initial=0.0)
     separation = metric.distance(change, np.zeros_like(change), largest)
-    time, span = trajectory.time, engine.end - engine.start
-    first = lasting(time, separation > SEPARATED, LASTING * span)
+    time = trajectory.time
+    first = separated_from(time, separation, engine.end - engine.start)
     mean, error = _slope(time, np.log(np.maximum(np.linalg.norm(change, axis=1), 1e-300)))
     return Growth(mean, error, engine.end if first is None else float(time[first]))
 

@@ -2,13 +2,13 @@
 
 Impacts make neighbouring motions diverge exponentially, and with them the errors of any integration. The perturbed run
 starts with every contact moved by a small fraction of its clearance. The separation of the two runs is measured body by
-body in the norm of the kinetic energy, so that rotations, centres of mass and vibrations all count. Where a body stays
-visibly separated for some time, the horizon ends; beyond it, values of the run are one draw out of many. A difference
+body in the norm of the kinetic energy, so that rotations, centres of mass and vibrations all count. Where a body is
+visibly separated from then on, the horizon ends; beyond it, values of the run are one draw out of many. A difference
 that disappears again is none: an impact that comes a little earlier, or a perturbation that dies out.
 
 The perturbed run is stepped concurrently where a processor is free, else after the run. It takes the run's own steps
-from another start, with the same output times, and ends where the horizon is known: the result does not depend on
-which of the two was ahead.
+from another start, with the same output times, and ends where they have diverged: the result does not depend on which
+of the two was ahead.
 
 Source: finite-time growth rates: Ott, *Chaos in Dynamical Systems*, 2nd ed. (2002), sec. 4.4.
 """
@@ -21,7 +21,13 @@ from threading import Event
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.core.artifacts.quantities import (
+    LASTING,
+    PERTURBATION,
+    SEPARATED,
+    divergence,
+    separated_from,
+)
 from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import TICK
@@ -123,9 +129,9 @@ class Pair:
         return False
 
     def _enough(self, other: _Seen, alive: Progress) -> bool:
-        """Whether the perturbed run has gone far enough beyond the horizon.
+        """Whether the two have diverged, so that the horizon is known.
 
-        What is visible depends on the largest motion of the whole run. Where the two are separated by the largest one
+        What counts depends on the largest motion of the whole run. Where the two have diverged by the largest one
         so far, the perturbed run waits for the run to end instead of going on, since that seldom changes.
         """
         if not self._beyond(other):
@@ -134,10 +140,10 @@ class Pair:
         return self._complete and self._beyond(other)
 
     def _beyond(self, other: _Seen) -> bool:
-        """Whether the two have been visibly separated for long enough, by what is known of the run."""
+        """Whether the two have diverged for long enough, by what is known of the run."""
         self._look(self._run)
         self._look(other)
-        first = self._separated(self._separation(other))
+        first = self._diverged(self._separation(other))
         return first is not None and bool(other.rows[-1, 0] >= self._judged(first))
 
     def _await_run(self, alive: Progress) -> None:
@@ -150,11 +156,13 @@ class Pair:
         self._look(self._run)
         self._look(other)
         separation = self._separation(other)
-        time, k = self.times[: len(separation)], self._separated(separation)
+        time, diverged = self.times[: len(separation)], self._diverged(separation)
+        if diverged is not None:
+            shown = time <= self._judged(diverged)
+            time, separation = time[shown], separation[shown]
+        k = separated_from(time, separation, self._span)
         if k is None:
             return time, separation, None
-        shown = time <= self._judged(k)
-        time, separation = time[shown], separation[shown]
         finer = self.outputs[(self.outputs > self.times[max(k - 1, 0)]) & (self.outputs < self.times[k])]
         here, there = self._motion(self._run.rows, finer), self._motion(other.rows, finer)
         between = self._metric.distance(here, there, self._largest())
@@ -162,12 +170,12 @@ class Pair:
         horizon = float(finer[first[0]] if len(first) else time[k])
         return np.insert(time, k, finer[first]), np.insert(separation, k, between[first]), horizon
 
-    def _separated(self, separation: np.ndarray) -> int | None:
-        """Index of the comparison from which on the two stay visibly separated."""
-        return lasting(self.times[: len(separation)], separation > SEPARATED, LASTING * self._span)
+    def _diverged(self, separation: np.ndarray) -> int | None:
+        """Index of the comparison from which on the two diverge."""
+        return divergence(self.times[: len(separation)], separation, self._span)
 
     def _judged(self, k: int) -> float:
-        """Time [s] up to which a separation that begins at comparison k is examined."""
+        """Time [s] up to which a divergence that begins at comparison k is examined."""
         return min(float(self.times[k]) + LASTING * self._span, float(self.times[-1]))
 
     @property

@@ -20,8 +20,8 @@ from flexclear.pipeline.dynamics.specialise.straight import LONGEST_DIFFERENTIAT
 _INTEGER = ir.IntType(64)
 
 
-def along(rates: Callable, wiring: wired.Wiring) -> Any:
-    """Return along(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code: `straight`, with its tangent.
+def differentiated(rates: Callable, wiring: wired.Wiring) -> Any:
+    """Return run(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code: `straight`, with its tangent.
 
     f0, w0: indices where changes of the numbers, and of laws, impact rates and contacts, begin in f and w.
     change, rates_change: places in w of changes of the state and of its rates.
@@ -43,8 +43,8 @@ def along(rates: Callable, wiring: wired.Wiring) -> Any:
     return run
 
 
-def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any]:
-    """Functions of compiled code: note(h, f, numbers, lane) and abreast(addresses, numbers).
+def batched(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any]:
+    """Functions of compiled code: note(h, f, numbers, lane) and run(addresses, numbers).
 
     The second does the same for several states, each of a mechanism with numbers of its own, which the first has put
     where they are adjacent: numbers has room for all of f in all lanes.
