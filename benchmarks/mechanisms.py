@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised, straight_code
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
@@ -127,7 +127,7 @@ def evaluation_time(engine: Engine, state: State, repeat: int) -> float:
 @contextmanager
 def _as_steps(engine: Engine) -> Iterator[None]:
     """Let evaluations that Python asks for be those of the steps."""
-    specialised.settle(engine, silent)
+    engine.settle(silent)
     before, engine.h[m.EVALUATE] = int(engine.h[m.EVALUATE]), engine.h[m.RATES]
     try:
         yield

@@ -64,12 +64,11 @@ def processor_time() -> float:
 
 def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> Engine:
     """Compile or fetch what a run calls and call it, so that no measurement contains it; the engine."""
-    from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
     from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
     from flexclear.pipeline.dynamics.run.run import engine_of
 
     engine = engine_of(scene, reduced, progress)
     engine.entry.complete()
     consistent_start(engine)
-    settle(engine, progress)
+    engine.settle(progress)
     return engine

@@ -25,7 +25,6 @@ from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
@@ -217,7 +216,7 @@ def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeyp
 
 def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
     one = engine()
-    settle(one, silent)
+    one.settle(silent)
     straight, kept = int(one.h[m.RATES]), one.selected.copy()
     assert straight != one.h[m.EVALUATE]
     fewer = kept.copy()

@@ -179,12 +179,11 @@ def predict(d, step):
         departure, x = vector(d, DEPARTURE + e), 1.0 + C[e] * step / length if length > 0.0 else 1.0
         for c in range(d.ny):
             d.w[departure + c] = 0.0
-        for b in range(NODES):
-            rise = ((CUBIC[2, b] * x + CUBIC[1, b]) * x + CUBIC[0, b]) * x - (1.0 if b == NODES - 1 else 0.0)
-            if length > 0.0:
-                before = vector(d, BEFORE + b)
-                for c in range(d.ny):
-                    d.w[departure + c] += rise * d.w[before + c]
+        for b in range(NODES if length > 0.0 else 0):
+            rise, before = -1.0 if b == NODES - 1 else 0.0, vector(d, BEFORE + b)
+            rise += ((CUBIC[2, b] * x + CUBIC[1, b]) * x + CUBIC[0, b]) * x
+            for c in range(d.ny):
+                d.w[departure + c] += rise * d.w[before + c]
         read(d, departure, e)
 
 

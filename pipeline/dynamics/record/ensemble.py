@@ -27,7 +27,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
-from flexclear.pipeline.dynamics.run.evaluation import specialised, straight_code
+from flexclear.pipeline.dynamics.run.evaluation import straight_code
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
@@ -119,10 +119,10 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> P
     """
     engine.straight.exact, rows = True, engine.selected.tobytes()
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
-    together = members >= FEW * threads and specialised.side_by_side(engine)
+    together = members >= FEW * threads and engine.staged
     if together and straight_code.made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
         return Places(lanes, threads)
-    specialised.settle(engine, progress)
+    engine.settle(progress)
     return None
 
 

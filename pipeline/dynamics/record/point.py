@@ -29,7 +29,6 @@ from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.specialised import side_by_side
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
@@ -102,7 +101,7 @@ class Runner:
             self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
             return False  # as each point reports by itself
-        return self.engine is not None and side_by_side(self.engine)
+        return self.engine is not None and self.engine.staged
 
     def _rows(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[list[Values], int]:
         """Recorded values of each start, and the evaluations of all."""

@@ -19,7 +19,6 @@ from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
 from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Selections, Tape, in_order
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
@@ -135,7 +134,7 @@ def integrate(
     with stopping.heeded():
         engine.straight.rows.clear()
         tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
-        settle(engine, progress)
+        engine.settle(progress)
         tape.looks.append(look(engine))
         sample, control = _sampler(engine), engine.control
         for a, b in pairwise(engine.breaks):
@@ -253,7 +252,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
         if n[m.EVALUATIONS] >= n[m.BUDGET]:  # segments may be so short that no pause falls into one
             n[m.BUDGET] = n[m.EVALUATIONS] + (judge.every or SLICE)
         if engine.h[m.N_CHANGES]:  # only the steps' own code for the rows solved for now has derivatives
-            settle(engine, progress)
+            engine.settle(progress)
         known = n[m.N_EVENTS]  # with no more room than one step needs, the stepper returns after each event
         engine.advance(tape.outputs, tape.rows, tape.events if jumps is None else tape.events[: known + few])
         if jumps is not None and n[m.N_EVENTS] > known:
@@ -284,7 +283,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
             tape.looks.append(look(engine))
             if reason := judge.verdict(engine, tape.looks):
                 raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
-            settle(engine, progress)
+            engine.settle(progress)
             _warn(engine, tape, progress)
             if stop(_so_far(engine, tape)):
                 return True

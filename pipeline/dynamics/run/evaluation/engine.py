@@ -24,8 +24,10 @@ from flexclear.pipeline.dynamics.model.initial import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
-from flexclear.pipeline.dynamics.run.evaluation.straight_code import Straight, address, equations
+from flexclear.pipeline.dynamics.run.evaluation.straight_code import Straight, address, equations, made
 
+#: selections of closure rows for which the steps have code of their own, of one integration
+SELECTIONS = 4
 #: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
 
@@ -121,6 +123,28 @@ class Engine:
             self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
         self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
+
+    @property
+    def staged(self) -> bool:
+        """Whether its attempts can be made together with those of others."""
+        return bool(self.method.staged and self.has_straight_code)
+
+    def settle(self, progress: Progress) -> None:
+        """Let steps from here on evaluate with code of their own for the closure rows solved for, at a place together.
+
+        That is decided by what the integration has met, so one that was interrupted continues as it would, with the
+        code for all rows that it has met before.
+        """
+        straight, rows, changes = self.straight, self.selected.tobytes(), self.h[m.N_CHANGES]
+        if self.has_straight_code or changes:
+            if straight.place is not None and straight.group is None and self.staged:
+                where = made(self.model, self.h, rows, progress, lanes=straight.place.width, exact=straight.exact)
+                straight.group = straight.place.group(rows, where, len(self.model.arrays.f)) if where else None
+            if rows not in straight.rows and (len(straight.rows) < SELECTIONS or changes):
+                straight.rows.append(rows)
+            for met in straight.rows:
+                address(self.model, self.h, straight, met, progress=progress)
+        self.connect()
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate what is recorded of every row, in this thread."""

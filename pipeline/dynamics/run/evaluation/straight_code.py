@@ -35,7 +35,7 @@ _known: dict[tuple[Parts, Wiring, str, int, bool, bool], int] = {}
 
 @dataclass
 class Straight:
-    """Code for one wiring (`run.evaluation.specialised`), shared by the engines of one work space.
+    """Code for one wiring (`Engine.settle`), shared by the engines of one work space.
 
     exact: whether it is to give the same bits for one state as for several at once.
     place: where it may step together with others; by default each engine takes its own steps.
