@@ -5,6 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
+from flexclear.pipeline.post.cost.causes import causes_of
+from flexclear.pipeline.post.cost.study import Point, assemble, believed, cost, relative_errors, with_reference
+from flexclear.pipeline.post.cost.work_precision import Mark
+from flexclear.pipeline.post.plotting.table import files
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -22,12 +29,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     with its method, whether the study is `complete`, and `peers`, as of `flexclear.commands.cost.read_peers`.  The
     reference is the tightest run among the points, and a run by another method confirms it.
     """
-    from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
-    from flexclear.pipeline.post.cost.causes import causes_of
-    from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
-    from flexclear.pipeline.post.plotting.table import files
-
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
     chosen = [Quantity.read(data) for data in params["quantities"]]
@@ -37,7 +38,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     study.attrs["complete"] = int(params["complete"])
     asis = next(runs[p.key] for p in points if p.key == "as it is")
     study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
-    ensembles = _ensembles(inputs)
+    ensembles = {
+        name.removeprefix("ensemble:"): data
+        for name, data in inputs.items()
+        if name.startswith("ensemble:") and "refused" not in data.attrs
+    }
     # the last one is that at the tightest tolerance
     tightest = next(reversed(ensembles.values()), None)
     split = {q.name: causes_of(q, points, runs, LOCATED, tightest) for q in chosen}
@@ -61,17 +66,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     return result
 
 
-def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Ensembles that could be made, by what was varied."""
-    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
-    return {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
-
-
 def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> tuple[Any, ...]:
     """The scene as it is and the paper's choice of method and step, as marked points."""
-    from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
-    from flexclear.pipeline.post.cost.work_precision import Mark
-
     reference, marks = runs[next(p.key for p in points if p.group == "reference")], []
     for name, group in (("this scene", "sampling"), ("paper's choice", "paper")):
         run = next((runs[p.key] for p in points if p.group == group and "refused" not in runs[p.key].attrs), None)

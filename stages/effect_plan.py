@@ -10,6 +10,7 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, read_toml
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.plotting.table import files
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 
@@ -103,7 +104,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """``plan.nc`` with all decisions, the table of them and the chart; inputs are bundles, as of `task`."""
     from flexclear.pipeline.post.answers import plan as shown
     from flexclear.pipeline.post.answers.effect_sizes import chart
-    from flexclear.pipeline.post.plotting.table import files
 
     dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
     progress(None, "chart")
@@ -124,7 +124,8 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
         mine = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
         return simulation.rebuild(simulation.params(scene), mine)
 
-    own = {name: data for name, data in rigid.items() if _meshed(params["simulate"], name)}
+    bodies = params["simulate"]["scene"]["body"]  # those that are rigid in the scene itself
+    own = {name: data for name, data in rigid.items() if bodies[name.removeprefix(simulation.RIGID)]["type"] == "rigid"}
     scene = simulation.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
     meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
     return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress)
@@ -139,8 +140,3 @@ def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
             if data.sizes["mode"] < inputs[f"bundle/{body}"].sizes["mode"]:
                 fewer.setdefault(int(level), {})[body] = data
     return [fewer[level] for level in sorted(fewer)]
-
-
-def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
-    """Whether a body that a recipe describes is rigid in the scene itself."""
-    return bool(simulate["scene"]["body"][name.removeprefix(simulation.RIGID)]["type"] == "rigid")

@@ -68,17 +68,22 @@ def _ground(**frames: Any) -> Table:
 # Rotors -------------------------------------------------------------------------------------------------------------
 
 
-def rotor(speed: float, unbalance: float, axes: Mapping[str, list[float]] = UPRIGHT) -> Scene:
-    """A disc at the end of a massless shaft on a driven hub; unbalance of its centre of mass along x [m]."""
-    K = np.diag([SIDE, SIDE, 1e8, SLOPE, SLOPE, 1e5])
-    K[0, 4] = K[4, 0] = -MIXED
-    K[1, 3] = K[3, 1] = MIXED
-    z = np.array(axes["z"]) / np.linalg.norm(axes["z"])
-    hub = _body({"o": {}, "s": {"position": [0.0, 0.0, ARM]}}, pose={"axes": axes})
-    disc = _body({"o": {}}, MASS, com=[unbalance, 0.0, 0.0], pose={"position": (ARM * z).tolist(), "axes": axes})
+def rotor(speed: float, unbalance: float = 0.0, axes: Mapping[str, list[float]] = UPRIGHT, size: float = 1.0) -> Scene:
+    """A disc at the end of a massless shaft on a driven hub; unbalance of its centre of mass along x, per size [m].
+
+    size: all lengths are as much larger; forces per displacement, and frequencies, stay the same.
+    """
+    K = np.diag([SIDE, SIDE, 1e8, SLOPE * size**2, SLOPE * size**2, 1e5 * size**2])
+    K[0, 4] = K[4, 0] = -MIXED * size
+    K[1, 3] = K[3, 1] = MIXED * size
+    arm, z = ARM * size, np.array(axes["z"]) / np.linalg.norm(axes["z"])
+    hub = _body({"o": {}, "s": {"position": [0.0, 0.0, arm]}}, 1.0, 0.01 * size**2, pose={"axes": axes})
+    pose = {"position": (arm * z).tolist(), "axes": axes}
+    disc = _body({"o": {}}, MASS, com=[unbalance * size, 0.0, 0.0], pose=pose)
+    disc["inertia"] = [moment * size**2 for moment in (ACROSS, ACROSS, ALONG)]
     return _scene(
         0.01,
-        body={"ground": _ground(o={"axes": axes}), "hub": hub, "disc": disc | {"inertia": [ACROSS, ACROSS, ALONG]}},
+        body={"ground": _ground(o={"axes": axes}), "hub": hub, "disc": disc},
         joint={
             "axle": {"type": "revolute", "between": ["ground.o", "hub.o"]},
             "float": {"type": "free", "between": ["hub.s", "disc.o"]},
@@ -96,15 +101,21 @@ def _steady(scene: Scene) -> xr.Dataset:
 
 
 def _deflection(scene: Scene) -> float:
-    """Of the shaft's end from (K - w^2 diag(m, I_t - I_p)) (x, p) = (m w^2 e, 0); Genta (2005), sec. 2.6."""
-    unbalance, speed = 1e-5, 150.0
+    """Of the shaft's end, in comparison with its closed form."""
+    return abs(float(_steady(scene).frame_position.sel(frame="disc.o", axis="x")) / (deflection(150.0) * 1e-5) - 1.0)
+
+
+def deflection(speed: float) -> float:
+    """Deflection of the shaft's end per unbalance, in the axes that turn.
+
+    (K - Omega^2 diag(m, I_t - I_p)) (x, p) = (m Omega^2 e, 0); Genta (2005), Dynamics of Rotating Systems, sec. 2.6.
+    """
     K = np.array([[SIDE, -MIXED], [-MIXED, SLOPE]])
-    x = np.linalg.solve(K - speed**2 * np.diag([MASS, ACROSS - ALONG]), [MASS * speed**2 * unbalance, 0.0])[0]
-    return abs(float(_steady(scene).frame_position.sel(frame="disc.o", axis="x")) / float(x) - 1.0)
+    return float(np.linalg.solve(K - speed**2 * np.diag([MASS, ACROSS - ALONG]), [MASS * speed**2, 0.0])[0])
 
 
 def _as_upright(scene: Scene) -> float:
-    known = _steady(rotor(150.0, 0.0)).frequency.values
+    known = _steady(rotor(150.0)).frequency.values
     return float(np.abs(_steady(scene).frequency.values / known - 1.0).max())
 
 

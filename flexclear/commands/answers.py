@@ -18,6 +18,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.pages import prose
 from flexclear.stages import effect_study, kernels, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
@@ -58,7 +59,6 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
     """What is shown of the answer called accuracy, stability or matters."""
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
-    from flexclear.pipeline.post.pages import prose
 
     data = answer.dataset()
     if name == "accuracy":
@@ -77,18 +77,20 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
     return Said("Which effects matter", text, "matters.png", caption, table)
 
 
-def dataset(name: str, scene: Scene, budget: str | float | None) -> xr.Dataset:
-    """One of the three answers as a dataset that shows the answer in a notebook.
+def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
+    """One of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
 
-    budget: processor time [s], or text such as "2min".  Raises InputError for a scene that has nothing to answer.
+    budget: processor time [s], or text such as "2min".  models: of the study, as of `cost.bring`.
+    Raises InputError for a scene that has nothing to answer.
     """
     from flexclear.pipeline.post.answers.answered import answered
 
     # in this process: workers would run a caller's script again from its top
-    workplace = replace(open_workplace(), jobs=1)
-    answer = getattr(
-        Answers(scene, workplace, None if budget is None else seconds(budget, "budget"), questions=1), name
-    )
+    workplace, given = replace(open_workplace(), jobs=1), None if budget is None else seconds(budget, "budget")
+    if name == "cost":
+        name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET, models=models)
+    else:
+        answer = getattr(Answers(scene, workplace, given, questions=1), name)
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
     words = said(name, answer, scene)

@@ -301,18 +301,6 @@ def bring(
     return study.drawn()
 
 
-def dataset(scene: Scene, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
-    """The study as a dataset that shows its answer in a notebook; budget: [s], or text such as "2min"."""
-    from flexclear.pipeline.post.answers.answered import answered
-    from flexclear.pipeline.post.cost.answer import sentences
-
-    # in this process: workers would run a caller's script again from its top
-    workplace, given = replace(open_workplace(), jobs=1), BUDGET if budget is None else seconds(budget, "budget")
-    made = bring(scene, workplace, budget=given, models=models)
-    result = made.dataset()
-    return answered(result, sentences(result), made.read("accuracy.png"))
-
-
 def tables(made: Made) -> tuple[str, ...]:
     """Those tables of a study that there are, as Markdown."""
     return tuple(made.text(name) for name in PRINTED if name in made.record.files)

@@ -39,7 +39,10 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--at", "belongs to --what vibrations")
     time = scenes.moment(options.at)
     graphs, workplace = scenes.graphs(options.scenes, options.set), open_workplace(options)
-    made = [task for graph in graphs for task in _tasks(graph, requested, time)]
+    made = list[Task]()
+    for graph in graphs:
+        with scenes.in_file(graph.scene.path):
+            made += graph.render.values() if requested is None else [graph.picture(*requested, time)]
     if len(graphs) > 1 and requested == ("modes", "html"):
         made.append(_mode_sets(graphs))
     outcome = workplace.bring(made)
@@ -66,11 +69,6 @@ def _requested(what: str | None, kind: str | None) -> tuple[str, str] | None:
             f"--what {what} --format {kind}", f"{what} cannot be shown so", f"as {', '.join(FORMATS[what])}"
         )
     return what, kind
-
-
-def _tasks(graph: Graph, requested: tuple[str, str] | None, time: float | None) -> list[Task]:
-    with scenes.in_file(graph.scene.path):
-        return list(graph.render.values()) if requested is None else [graph.picture(*requested, time)]
 
 
 def _mode_sets(graphs: list[Graph]) -> Task:

@@ -8,7 +8,7 @@ But for what happens between these: a smooth motion can be interpolated with its
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 import xarray as xr
@@ -100,8 +100,7 @@ def moved(data: Data, model: Model, ideal_model: Model = IDEAL) -> Deviation:
     if f"{model.scene}:ensemble" not in data:
         return max_deviation(data[f"{model.scene}:run"], ideal, PLATFORM)
     members = ensemble_deviations(data[f"{model.scene}:ensemble"], ideal, PLATFORM)
-    names = ("angle", "rotation", "displacement", "velocity", "until")
-    return Deviation(**{name: float(np.mean([getattr(m, name) for m in members])) for name in names})
+    return Deviation(*np.mean([astuple(member) for member in members], axis=0).tolist())
 
 
 def sizes(data: Data, ideal_model: Model = IDEAL) -> Deviation:

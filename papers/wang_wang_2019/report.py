@@ -36,8 +36,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     are shown, and the digest of everything that is shown, so that the page is written again when any of it changes.
     """
     results = Path(params["results"])
-    by_scene = run_attributes({scene: results / path for scene, path in params["runs"].items()})
-    attributes = {scene: {**attributes_of, **params["origins"][scene]} for scene, attributes_of in by_scene.items()}
+    attributes = {}
+    for scene, path in params["runs"].items():
+        with xr.open_dataset(results / path) as one:
+            attributes[scene] = {**one.attrs, **params["origins"][scene]}
     content = collect(results, attributes, params["rendered"], TREE)
     return {"index.html": html_page(content).encode(), "paper.md": paper_markdown(content).encode()}
 
@@ -83,15 +85,6 @@ def _variants(folder: Path) -> list[tuple[str, str]]:
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
         variants.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
     return variants
-
-
-def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
-    """Attributes of the run datasets at these paths, by scene."""
-    by_scene = {}
-    for scene, path in paths.items():
-        with xr.open_dataset(path) as run:
-            by_scene[scene] = dict(run.attrs)
-    return by_scene
 
 
 def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> list[Assumption]:

@@ -22,6 +22,8 @@ RECIPE = {
     "frames": {"bottom": {"x": 0.0}, "top": {"x": PAPER_ROD.length}},
     "interfaces": ["bottom", "top"],
 }
+#: what a recipe of segments takes over
+WITHOUT_SHAPE = {name: RECIPE[name] for name in ("material", "frames", "interfaces")}
 #: motions of the section, as indices of ux uy uz rx ry rz in rod axes
 BENDING, BENDING_Z, TORSION, EXTENSION = (1, 5), (2, 4), (3,), (0,)
 #: what a letter holds: index into the motions above (deflection, slope); torsion and extension have the first only

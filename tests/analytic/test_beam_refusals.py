@@ -6,7 +6,7 @@ import pytest
 
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.kinds import kind
-from tests.analytic.beam_models import RECIPE
+from tests.analytic.beam_models import RECIPE, WITHOUT_SHAPE
 
 CIRCLE = {"type": "circle", "radius": "10 mm"}
 GENERAL = {"type": "general", "area": "300 mm^2", "torsion": 1e-8, "second_y": 8e-9, "second_z": 5e-9}
@@ -14,8 +14,7 @@ GENERAL = {"type": "general", "area": "300 mm^2", "torsion": 1e-8, "second_y": 8
 
 def segmented(*cuts: tuple[float, float], **more: Any) -> dict[str, Any]:
     segments = [{"start": a, "end": b, "elements": 3, "section": CIRCLE, **more} for a, b in cuts]
-    kept = {name: RECIPE[name] for name in ("material", "frames", "interfaces")}
-    return {**kept, "shape": {"type": "segmented-beam", "length": 0.24, "segments": segments}}
+    return {**WITHOUT_SHAPE, "shape": {"type": "segmented-beam", "length": 0.24, "segments": segments}}
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {

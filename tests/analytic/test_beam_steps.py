@@ -10,7 +10,7 @@ from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.slices import slices
 from flexclear.pipeline.structure.kinds import kind
-from tests.analytic.beam_models import RECIPE, build, lowest, order
+from tests.analytic.beam_models import WITHOUT_SHAPE, build, lowest, order
 from tests.analytic.beam_solutions import PAPER_ROD
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
 
@@ -45,9 +45,15 @@ def recipe(elements: tuple[int, int, int], theory: str, **changes: Any) -> dict[
         }
         for (start, end, section, material), n, kappa in zip(PLAN, elements, KAPPA, strict=True)
     ]
-    kept = {name: RECIPE[name] for name in ("material", "frames", "interfaces")}
     shape = {"type": "segmented-beam", "length": 0.24, "segments": segments}
-    return {**kept, "shape": shape, "theory": theory, "torsion": "quadratic", "extension": "quadratic", **changes}
+    return {
+        **WITHOUT_SHAPE,
+        "shape": shape,
+        "theory": theory,
+        "torsion": "quadratic",
+        "extension": "quadratic",
+        **changes,
+    }
 
 
 def pieces(theory: str) -> list[Piece]:
@@ -140,8 +146,7 @@ def test_segments_of_one_section_are_the_straight_rod() -> None:
     cuts = [(0.0, 0.08, 4), (0.08, 0.24, 8)]
     segments = [{"start": a, "end": b, "elements": n, "section": section} for a, b, n in cuts]
     shape = {"type": "segmented-beam", "length": 0.24, "segments": segments}
-    kept = {name: RECIPE[name] for name in ("material", "frames", "interfaces")}
-    cut, whole = kind.build({**kept, "shape": shape}), build()
+    cut, whole = kind.build({**WITHOUT_SHAPE, "shape": shape}), build()
     for name in whole.data_vars:
         # places are sums of lengths on two ways, which rounding may set some units of the last place apart
         np.testing.assert_allclose(cut[name].values, whole[name].values, rtol=1e-14, atol=1e-15, err_msg=str(name))

@@ -10,31 +10,20 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE
-from tests.properties.mechanisms import Table
+from tests.properties.mechanisms import Table, frame, ground, joint, rigid, scene
 
 
 def swinging_bar(size: float) -> Table:
     """A bar of 0.4 sizes on a hinge, whose swing ends at a stop."""
-    frames = {"p": {}, "e": {"position": [0.4 * size, 0.0, 0.0]}}
-    inertia = [0.01 * size**2] * 3
-    bar = {
-        "type": "rigid",
-        "mass": 1.0,
-        "com": [0.2 * size, 0.0, 0.0],
-        "inertia": inertia,
-        "pose": {},
-        "frames": frames,
-    }
+    bar = rigid(1.0, 0.01 * size**2, {"p": {}, "e": frame((0.4 * size, 0.0, 0.0))}, com=[0.2 * size, 0.0, 0.0], pose={})
     normal = {"law": "hunt-crossley", "restitution": 0.8, "stiffness": 1e3 * size**2}
-    return {
-        "title": "a swinging bar",
-        "time": {"end": 0.1},
-        "body": {"ground": {"type": "ground", "frames": {"o": {}}}, "bar": bar},
-        "joint": {"A": {"type": "revolute", "between": ["ground.o", "bar.p"]}},
-        "stop": {"A": {"joint": "A", "lower": -0.5, "normal": normal}},
-        "load": {"gravity": {"type": "gravity", "acceleration": [0.0, -9.81 * size, 0.0]}},
-        "output": {"interval": 0.01},
-    }
+    return scene(
+        {"ground": ground(o=(0, 0, 0)), "bar": bar},
+        {"A": joint("revolute", "ground.o", "bar.p")},
+        end=0.1,
+        stop={"A": {"joint": "A", "lower": -0.5, "normal": normal}},
+        load={"gravity": {"type": "gravity", "acceleration": [0.0, -9.81 * size, 0.0]}},
+    )
 
 
 def made(scene: Scene) -> tuple[Engine, float]:

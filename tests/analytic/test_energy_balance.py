@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from benchmarks.families import classes
 from flexclear.pipeline.core.system.errors import SolverError
-from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate
+from tests.properties.mechanisms import joint, rigid, scene, simulate, simulated
 
 
 def bounce(solver: dict[str, Any]) -> xr.Dataset:
     """A ball falls by 0.2 m on a hard plane and rebounds without loss: 1.96 J are exchanged."""
-    bodies = {
-        "ground": {"type": "ground", "frames": {"f": {}}},
-        "ball": rigid(1.0, 0.01, {"c": {}}, pose={"position": [0, 0, 0.3]}),
-    }
-    plane = joint("ball-on-plane", "ground.f", "ball.c")
-    plane |= {"ball_radius": 0.1, "normal": {"law": "hertz", "stiffness": 1e8}}
-    return simulate(scene(bodies, {"f": plane}, end=1.0, load=GRAVITY, output={"interval": 0.1}, solver=solver))
+    return simulated(classes.bounce(**solver))
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,16 @@ from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.stages import simulation
 from tests.properties import mechanisms
+from tests.properties.mechanisms import joint, rigid
 
 TREE = Path(__file__).resolve().parents[2]
 G, GROUND = 9.81, {"type": "ground", "frames": {"O": {}}}
 GRAVITY = {"type": "gravity", "acceleration": [0.0, -G, 0.0]}
+#: a wheel of 0.5 kg m^2 on an axle along z
+WHEEL: dict[str, Any] = {
+    "body": {"ground": GROUND, "wheel": rigid(1.0, 0.5, {"A": {}}, pose={})},
+    "joint": {"axle": joint("revolute", "ground.O", "wheel.A")},
+}
 
 
 def simulated(event: dict[str, Any], end: float, **parts: Any) -> xr.Dataset:
@@ -38,9 +44,9 @@ def simulated(event: dict[str, Any], end: float, **parts: Any) -> xr.Dataset:
 
 def pendulum(event: dict[str, Any], end: float = 1.0, **more: Any) -> xr.Dataset:
     """A mass of 1 kg with 0.2 kg m^2, its centre 1 m from a hinge, released from the horizontal."""
-    bob = {"type": "rigid", "mass": 1.0, "com": [-1.0, 0.0, 0.0], "inertia": [0.2] * 3, "pose": {}, "frames": {"H": {}}}
-    joint = {"hinge": {"type": "revolute", "between": ["ground.O", "bob.H"]}}
-    return simulated(event, end, body={"ground": GROUND, "bob": bob}, joint=joint, load={"g": GRAVITY}, **more)
+    bob = rigid(1.0, 0.2, {"H": {}}, com=[-1.0, 0.0, 0.0], pose={})
+    hinge = {"hinge": joint("revolute", "ground.O", "bob.H")}
+    return simulated(event, end, body={"ground": GROUND, "bob": bob}, joint=hinge, load={"g": GRAVITY}, **more)
 
 
 def slope(angle: float) -> float:
@@ -115,11 +121,11 @@ def test_a_condition_that_jumps_where_a_law_does() -> None:
 
 def block(event: dict[str, Any], push: dict[str, Any] | None = None, **spring: float) -> xr.Dataset:
     """A block of 2 kg that slides along z, with a load along its joint or on a spring, from 0.1 m beyond its rest."""
-    body = {"type": "rigid", "mass": 2.0, "inertia": [1.0] * 3, "pose": {}, "frames": {"B": {}}}
-    joint = {"slide": {"type": "prismatic", "between": ["ground.O", "block.B"]}}
+    bodies = {"ground": GROUND, "block": rigid(2.0, 1.0, {"B": {}}, pose={})}
+    slide = {"slide": joint("prismatic", "ground.O", "block.B")}
     pull = {"type": "joint-spring", "joint": "slide", "stiffness": 50.0, "rest": -0.1, **spring}
     load = {"push": push} if push else {"spring": pull}
-    return simulated(event, 1.0, body={"ground": GROUND, "block": body}, joint=joint, load=load)
+    return simulated(event, 1.0, body=bodies, joint=slide, load=load)
 
 
 def test_a_spring_that_is_unhooked() -> None:
@@ -152,17 +158,13 @@ def test_laws_of_a_switched_load_count_from_the_event() -> None:
 
 def disks(event: dict[str, Any], **more: Any) -> xr.Dataset:
     """A disk of 0.3 kg m^2 that turns at 40 rad/s about z, and one of 0.2 kg m^2 on it at rest, the clutch between."""
-    disk = {"type": "rigid", "mass": 1.0, "pose": {}, "frames": {"A": {}}}
-    body = {
+    bodies = {
         "ground": GROUND,
-        "one": {**disk, "inertia": [0.3] * 3, "angular_velocity": [0.0, 0.0, 40.0]},
-        "two": {**disk, "inertia": [0.2] * 3, "angular_velocity": [0.0, 0.0, 0.0]},
+        "one": rigid(1.0, 0.3, {"A": {}}, pose={}, angular_velocity=[0.0, 0.0, 40.0]),
+        "two": rigid(1.0, 0.2, {"A": {}}, pose={}, angular_velocity=[0.0, 0.0, 0.0]),
     }
-    joint = {
-        "bearing": {"type": "revolute", "between": ["ground.O", "one.A"]},
-        "clutch": {"type": "revolute", "between": ["one.A", "two.A"]},
-    }
-    return simulated(event, 1.0, body=body, joint=joint, **more)
+    joints = {"bearing": joint("revolute", "ground.O", "one.A"), "clutch": joint("revolute", "one.A", "two.A")}
+    return simulated(event, 1.0, body=bodies, joint=joints, **more)
 
 
 def test_a_clutch_that_engages_and_opens_again() -> None:
@@ -193,14 +195,12 @@ def test_a_clutch_that_engages_and_opens_again() -> None:
 
 def test_a_torque_that_the_brake_does_not_hold() -> None:
     """The recorded torque of a lock may release it: 3 t N m on a locked wheel of 0.5 kg m^2 that holds 1.2 N m."""
-    wheel = {"type": "rigid", "mass": 1.0, "inertia": [0.5] * 3, "pose": {}, "frames": {"A": {}}}
     motor = {"type": "joint-force", "joint": "axle", "force": {"type": "polynomial", "coefficients": [0.0, 3.0]}}
     event = {
         "brake": {"at": 0.1, "lock": "joint.axle"},
         "slip": {"at": "brake.force < -1.2 N m", "release": "event.brake"},
     }
-    joint = {"axle": {"type": "revolute", "between": ["ground.O", "wheel.A"]}}
-    run = simulated(event, 1.0, body={"ground": GROUND, "wheel": wheel}, joint=joint, load={"motor": motor})
+    run = simulated(event, 1.0, **WHEEL, load={"motor": motor})
     assert float(event_of(run, "slip").event_time) == pytest.approx(0.4, abs=1e-11)
     assert float(event_of(run, "brake").event_impulse) == pytest.approx(-0.015, rel=1e-10)
     assert run["angular_velocity"].values[-1, 0, 2] == pytest.approx(1.5 * (1.0 - 0.16) / 0.5, rel=1e-10)
@@ -210,7 +210,6 @@ def test_a_torque_that_the_brake_does_not_hold() -> None:
 
 def test_a_drive_that_is_switched_lets_go_and_is_locked() -> None:
     """The motor's new speed takes the impulse I (w2 - w1) at once; ideal drives bring in w2 times that."""
-    wheel = {"type": "rigid", "mass": 1.0, "inertia": [0.5] * 3, "pose": {}, "frames": {"A": {}}}
     faster = {"law": {"type": "polynomial", "coefficients": [0.0, 10.0, -2.0]}}
     event = {
         "faster": {"at": "axle.position > 1.2 rad", "switch": "drive.motor", "to": faster},
@@ -220,8 +219,7 @@ def test_a_drive_that_is_switched_lets_go_and_is_locked() -> None:
     run = simulated(
         event,
         1.0,
-        body={"ground": GROUND, "wheel": wheel},
-        joint={"axle": {"type": "revolute", "between": ["ground.O", "wheel.A"]}},
+        **WHEEL,
         drive={"motor": {"joint": "axle", "law": {"type": "polynomial", "coefficients": [0.0, 4.0]}}},
     )
     change = event_of(run, "faster")
@@ -240,26 +238,23 @@ def slider_crank(event: dict[str, Any], **more: Any) -> xr.Dataset:
     """A crank of 1 m at 5 rad/s, a rod of 2 m and a slider, from the pose with the crank upright."""
     lean = float(np.arcsin(0.5))
     rod = {"position": [float(np.cos(lean)), 0.5, 0.0], "rotation_vector": [0.0, 0.0, -lean]}
-    frames = {"crank": [-0.5, 0.5], "rod": [-1.0, 1.0]}
-    ends = {n: dict(zip("AB", ({"position": [x, 0.0, 0.0]} for x in at), strict=True)) for n, at in frames.items()}
-    inertia = [0.1, 0.1, 0.1]
-    body = {
-        "ground": {"type": "ground", "frames": {"O": {}, "G": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}}},
-        "crank": {"type": "rigid", "mass": 1.0, "inertia": inertia, "frames": ends["crank"],
-                  "pose": {"position": [0.0, 0.5, 0.0], "rotation_vector": [0.0, 0.0, float(np.pi / 2)]},
-                  "angular_velocity": [0.0, 0.0, 5.0]},
-        "rod": {"type": "rigid", "mass": 2.0, "inertia": inertia, "frames": ends["rod"], "pose": rod},
-        "slider": {"type": "rigid", "mass": 3.0, "inertia": inertia,
-                   "frames": {"P": {}, "S": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}},
-                   "pose": {"position": [2.0 * float(np.cos(lean)), 0.0, 0.0]}},
-    }  # fmt: skip
-    joint = {
-        "main": {"type": "revolute", "between": ["ground.O", "crank.A"]},
-        "pin": {"type": "revolute", "between": ["crank.B", "rod.A"]},
-        "wrist": {"type": "revolute", "between": ["rod.B", "slider.P"]},
-        "guide": {"type": "prismatic", "between": ["ground.G", "slider.S"]},
+    upright = {"position": [0.0, 0.5, 0.0], "rotation_vector": [0.0, 0.0, float(np.pi / 2)]}
+    guide = {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}
+
+    def ends(reach: float) -> dict[str, Any]:
+        return {"A": {"position": [-reach, 0.0, 0.0]}, "B": {"position": [reach, 0.0, 0.0]}}
+
+    bodies = {
+        "ground": {"type": "ground", "frames": {"O": {}, "G": guide}},
+        "crank": rigid(1.0, 0.1, ends(0.5), pose=upright, angular_velocity=[0.0, 0.0, 5.0]),
+        "rod": rigid(2.0, 0.1, ends(1.0), pose=rod),
+        "slider": rigid(3.0, 0.1, {"P": {}, "S": guide}, pose={"position": [2.0 * float(np.cos(lean)), 0.0, 0.0]}),
     }
-    return simulated(event, 1.0, body=body, joint=joint, load={"g": GRAVITY}, **more)
+    joints = {
+        "main": joint("revolute", "ground.O", "crank.A"), "pin": joint("revolute", "crank.B", "rod.A"),
+        "wrist": joint("revolute", "rod.B", "slider.P"), "guide": joint("prismatic", "ground.G", "slider.S"),
+    }  # fmt: skip
+    return simulated(event, 1.0, body=bodies, joint=joints, load={"g": GRAVITY}, **more)
 
 
 def test_a_lock_in_a_loop_takes_all_kinetic_energy() -> None:

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from flexclear.pipeline.core.scene.load import scene_of
 from flexclear.pipeline.core.system.errors import InputError
 from tests.analytic.test_events import GROUND, event_of, require_balanced, simulated
+from tests.properties.mechanisms import frame, joint, rigid
 
 INERTIA = 0.5
 NONE = {"type": "joint-force", "joint": "axle", "force": 0.0}
@@ -26,11 +27,10 @@ WINDING = {
 
 def scene_with(load: dict[str, Any], speed: float | None = None) -> dict[str, Any]:
     """A wheel of 0.5 kg m^2 on an axle along z."""
-    wheel: dict[str, Any] = {"type": "rigid", "mass": 1.0, "inertia": [INERTIA] * 3, "pose": {}, "frames": {"A": {}}}
-    wheel["frames"]["rim"] = {"position": [0.1, 0.0, 0.0]}
-    joint = {"axle": {"type": "revolute", "between": ["ground.O", "wheel.A"]}}
-    wheel |= {} if speed is None else {"angular_velocity": [0.0, 0.0, speed]}
-    return {"body": {"ground": GROUND, "wheel": wheel}, "joint": joint, "load": load}
+    turning = {} if speed is None else {"angular_velocity": [0.0, 0.0, speed]}
+    wheel = rigid(1.0, INERTIA, {"A": {}, "rim": frame([0.1, 0.0, 0.0])}, pose={}, **turning)
+    axle = {"axle": joint("revolute", "ground.O", "wheel.A")}
+    return {"body": {"ground": GROUND, "wheel": wheel}, "joint": axle, "load": load}
 
 
 def wheel(event: dict[str, Any], speed: float | None = 0.0, load: Any = None, **more: Any) -> xr.Dataset:

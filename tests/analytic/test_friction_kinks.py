@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.analytic.mechanism_runs import run
-from tests.reference import sps4
-from tests.reference.clearance_contact import friction_coefficient
+from tests.reference.contact_solutions import modified_coulomb
 
 PLANE = "checks/ball_on_plane"
 G, SLOPE, RADIUS, MASS, INERTIA = 9.81, np.radians(30.0), 0.1, 1.0, 0.004
@@ -40,13 +39,10 @@ def slid(rtol: float) -> tuple[np.ndarray, np.ndarray]:
 
 def known(times: np.ndarray) -> np.ndarray:
     """Sliding speeds at these times: s' = g sin - mu(s) g cos (1 + m r^2 / J), from kink to kink."""
-    law = sps4.Contact(
-        mu_static=LAW["static"], mu_dynamic=LAW["dynamic"], v_static=LAW["v_static"], v_dynamic=LAW["v_dynamic"]
-    )
     grip = G * np.cos(SLOPE) * (1.0 + MASS * RADIUS**2 / INERTIA)
 
     def rate(_: float, s: np.ndarray) -> list[float]:
-        return [G * np.sin(SLOPE) - grip * friction_coefficient(law, float(s[0]))]
+        return [G * np.sin(SLOPE) - grip * modified_coulomb(float(s[0]), **LAW)]
 
     found, t, s = np.empty(len(times)), 0.0, SPEED
     for kink in (LAW["v_dynamic"], LAW["v_static"], 0.0):

@@ -16,8 +16,7 @@ from scipy.integrate import solve_ivp
 from tests.analytic.mechanism_runs import run
 from tests.analytic.test_joint_friction import ACROSS, guide
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene, simulate
-from tests.reference import sps4
-from tests.reference.clearance_contact import friction_coefficient
+from tests.reference.contact_solutions import modified_coulomb
 from tests.reference.rubbing_slider_crank import released
 
 G, MASS, INERTIA, RADIUS = 9.81, 2.0, 5e-4, 0.02
@@ -42,13 +41,7 @@ class Slide:
 
 
 def coulomb(speed: float) -> float:
-    law = sps4.Contact(
-        mu_static=COULOMB["static"],
-        mu_dynamic=COULOMB["dynamic"],
-        v_static=COULOMB["v_static"],
-        v_dynamic=COULOMB["v_dynamic"],
-    )
-    return friction_coefficient(law, speed)
+    return modified_coulomb(speed, **{name: value for name, value in COULOMB.items() if name != "law"})
 
 
 def ramp(speed: float) -> float:

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from benchmarks.families.classes import ACROSS, ALONG, ARM, MASS, MIXED, SIDE, SLOPE, deflection, rotor
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
+from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
@@ -12,64 +14,17 @@ from flexclear.pipeline.dynamics import analyses
 from tests.analytic.mechanism_runs import frequencies
 from tests.properties.mechanisms import GRAVITY, Table, joint, rigid, scene
 
-#: a disc at the end of a shaft of 0.25 m: mass [kg], inertia across and along [kg m^2]
-MASS, ACROSS, ALONG, ARM = 3.0, 0.02, 0.036, 0.25
-#: stiffness of the shaft's end: deflection [N/m], mixed [N/rad], slope [N m/rad]
-SIDE, MIXED, SLOPE = 164163.04446739165, 20520.380558423956, 3420.0634264039927
 #: no turn, and two about axes that are parallel to none of the world's
 TURNS = {"upright": (0.0, 0.0, 0.0), "oblique": (0.7, -1.9, 0.4), "over": (2.0, 1.0, -2.0)}
 
 
-def rotor(
-    speed: float,
-    unbalance: float = 0.0,
-    turn: tuple[float, float, float] = TURNS["upright"],
-    size: float = 1.0,
-    damping: float = 0.0,
-    **more: object,
-) -> Table:
-    """The disc on a bushing at a driven hub; unbalance: of its centre of mass along x, per size [m].
-
-    size: all lengths are as much larger; forces per displacement, and frequencies, stay the same.
-    """
-    K = np.diag([SIDE, SIDE, 1e8, SLOPE * size**2, SLOPE * size**2, 1e5 * size**2])
-    K[0, 4] = K[4, 0] = -MIXED * size
-    K[1, 3] = K[3, 1] = MIXED * size
-    R = rotation_vector_to_matrix(np.array(turn))
-    axes = {"z": R[:, 2].tolist(), "x": R[:, 0].tolist()}
-    bodies: Table = {
-        "ground": {"type": "ground", "frames": {"o": {"axes": axes}}},
-        "hub": rigid(1.0, 0.01 * size**2, {"o": {}, "s": {"position": [0.0, 0.0, ARM * size]}}, pose={"axes": axes}),
-        "disc": rigid(
-            MASS,
-            [ACROSS * size**2, ACROSS * size**2, ALONG * size**2],
-            {"o": {}},
-            com=[unbalance * size, 0.0, 0.0],
-            pose={"position": (R[:, 2] * ARM * size).tolist(), "axes": axes},
-        ),
-    }
-    mount = {"type": "bushing", "between": ["hub.s", "disc.o"], "stiffness": K.tolist()}
-    mount["damping"] = [damping, damping, 0.0, 0.0, 0.0, 0.0]
-    return scene(
-        bodies,
-        {"axle": joint("revolute", "ground.o", "hub.o"), "float": joint("free", "hub.s", "disc.o")},
-        load={"shaft": mount},
-        drive={"motor": {"joint": "axle", "law": {"type": "polynomial", "coefficients": [0.0, speed]}}},
-        **more,
-    )
+def axes(turn: str) -> dict[str, list[float]]:
+    R = rotation_vector_to_matrix(np.array(TURNS[turn]))
+    return {"z": R[:, 2].tolist(), "x": R[:, 0].tolist()}
 
 
-def steady(table: Table) -> xr.Dataset:
-    return analyses.frequencies(Scene.model_validate(table), {}, silent, moving=True)
-
-
-def deflection(speed: float) -> float:
-    """Deflection of the shaft's end per unbalance, in the axes that turn.
-
-    (K - Omega^2 diag(m, I_t - I_p)) (x, p) = (m Omega^2 e, 0); Genta (2005), Dynamics of Rotating Systems, sec. 2.6.
-    """
-    K = np.array([[SIDE, -MIXED], [-MIXED, SLOPE]])
-    return float(np.linalg.solve(K - speed**2 * np.diag([MASS, ACROSS - ALONG]), [MASS * speed**2, 0.0])[0])
+def steady(scene: Scene) -> xr.Dataset:
+    return analyses.frequencies(scene, {}, silent, moving=True)
 
 
 def test_the_disc_turns_inside_of_its_unbalance_above_the_critical_speed() -> None:
@@ -93,7 +48,7 @@ def test_the_disc_turns_inside_of_its_unbalance_above_the_critical_speed() -> No
 )
 def test_an_unbalanced_disc_turns_where_its_equations_say(speed: float, size: float, turn: str) -> None:
     unbalance = 1e-5
-    found = steady(rotor(speed, unbalance, TURNS[turn], size))
+    found = steady(rotor(speed, unbalance, axes(turn), size))
     x = deflection(speed)
     # the deflection, 1e-4 of the arm at most, enters in second order
     R = rotation_vector_to_matrix(np.array(TURNS[turn]))
@@ -108,7 +63,7 @@ def test_an_unbalanced_disc_turns_where_its_equations_say(speed: float, size: fl
 )
 def test_neither_direction_nor_unbalance_makes_a_rotor_unsteady(unbalance: float, turn: str) -> None:
     """Nor does it change the frequencies, but for the unbalance's own inertia: m e^2 is 1.5e-4 of I_t at 1 mm."""
-    found = steady(rotor(20.0, unbalance, TURNS[turn]))
+    found = steady(rotor(20.0, unbalance, axes(turn)))
     upright = steady(rotor(20.0))
     assert found.frequency.values == pytest.approx(upright.frequency.values, rel=2e-4 if unbalance > 1e-4 else 1e-8)
 
@@ -120,25 +75,25 @@ def test_weight_across_an_axle_is_unsteady_still() -> None:
         steady(heavy(1e-4))
 
 
-def heavy(g: float) -> Table:
+def heavy(g: float) -> Scene:
     """The oblique rotor in a gravity field."""
-    table = rotor(20.0, 1e-6, TURNS["oblique"])
-    table["load"]["weight"] = {**GRAVITY["gravity"], "acceleration": [0.0, 0.0, -g]}
-    return table
+    weight = {**GRAVITY["gravity"], "acceleration": [0.0, 0.0, -g]}
+    return edited(rotor(20.0, 1e-6, axes("oblique")), {"load.weight": weight})
 
 
 @pytest.mark.parametrize("speed, turn", [(200.0, "upright"), (300.0, "oblique")])
 def test_damping_in_the_shaft_makes_the_forward_whirl_grow_above_the_critical_speed(speed: float, turn: str) -> None:
     """In turning axes m (r'' + 2 i Omega r' - Omega^2 r) + c r' + k r = 0; Genta (2005), sec. 2.5.2."""
     damping = 20.0
-    table = rotor(speed, 1e-6, TURNS[turn], damping=damping)
-    stiffness = np.diag([SIDE, SIDE, 1e8, 1e6, 1e6, 1e6])
-    table["load"]["shaft"]["stiffness"] = stiffness.tolist()
+    shaft = {"damping": [damping, damping, 0, 0, 0, 0], "stiffness": [SIDE, SIDE, 1e8, 1e6, 1e6, 1e6]}
+    changes = {f"load.shaft.{name}": value for name, value in shaft.items()}
     roots = np.roots([MASS, 2j * MASS * speed + damping, SIDE - MASS * speed**2])
     growth = float(max(roots.real))
     assert (growth > 0.0) == (speed > np.sqrt(SIDE / MASS))
     # differences of forces to 1e-9, frequencies up to 1e4 rad/s
-    assert steady(table).attrs["growth"] == pytest.approx(max(growth, 0.0), rel=1e-4)
+    assert steady(edited(rotor(speed, 1e-6, axes(turn)), changes)).attrs["growth"] == pytest.approx(
+        max(growth, 0.0), rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("speed, unbalance", [(40.0, 1e-3), (100.0, 1e-3), (100.0, 1e-6)])
@@ -171,10 +126,9 @@ def test_no_motion_of_an_undamped_rotor_grows_by_rounding(speed: float, unbalanc
 
 
 def test_a_rotor_on_a_bushing_alone_is_refused_with_its_remedy() -> None:
-    table = rotor(20.0, 1e-6)
-    del table["joint"]["float"]
+    alone = edited(rotor(20.0, 1e-6), {"joint.float": None})
     with pytest.raises(SolverError, match=r'disc is held by no joint.*type `free`.*between = \["hub.s", "disc.o"\]'):
-        steady(table)
+        steady(alone)
 
 
 @pytest.mark.parametrize("speed", [4.0, 12.0])
@@ -193,7 +147,7 @@ def test_an_arm_that_turns_fast_rises_to_its_stable_angle(speed: float) -> None:
         start={"joint": {"hinge": {"position": 0.1}}},
         drive={"motor": {"joint": "axle", "law": {"type": "polynomial", "coefficients": [0.0, speed]}}},
     )
-    found = steady(table)
+    found = steady(Scene.model_validate(table))
     height = -found.frame_position.sel(frame="bob.tip", axis="z").item() / length
     # the bob's own inertia is 6e-6 of m l^2
     assert height == pytest.approx(min(1.0, 9.81 / (length * speed**2)), rel=1e-5)

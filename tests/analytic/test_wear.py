@@ -9,7 +9,7 @@ from flexclear.pipeline.core.artifacts.schema import RUN
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.post.single_run.series import PIECES, derive, spread_over_surface
 from tests.analytic.mechanism_runs import run
-from tests.properties.mechanisms import Table, joint, scene, simulate
+from tests.properties.mechanisms import Table, frame, joint, rigid, scene, simulate
 
 RADIUS, LENGTH, WEIGHT, STIFFNESS, CLEARANCE = 0.01, 0.02, 50.0, 1e6, 1e-4
 TURNS, SECONDS = 2, 0.25
@@ -20,16 +20,11 @@ ACROSS = {"axes": {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}}
 
 def hanging() -> Table:
     """A carrier that hangs on a turning shaft by a hole with clearance, and cannot turn."""
+    start = CLEARANCE + WEIGHT / STIFFNESS
     bodies: Table = {
         "ground": {"type": "ground", "frames": {"bearing": ACROSS, "guide": {}}},
-        "shaft": {"type": "rigid", "mass": 1.0, "inertia": [0.01] * 3, "pose": {}, "frames": {"pin": ACROSS}},
-        "carrier": {
-            "type": "rigid",
-            "mass": WEIGHT / 10.0,
-            "inertia": [0.01] * 3,
-            "pose": {"position": [0.0, 0.0, -CLEARANCE - WEIGHT / STIFFNESS]},
-            "frames": {"guide": {}, "hole": ACROSS},
-        },
+        "shaft": rigid(1.0, 0.01, {"pin": ACROSS}, pose={}),
+        "carrier": rigid(WEIGHT / 10.0, 0.01, {"guide": {}, "hole": ACROSS}, pose=frame((0.0, 0.0, -start))),
     }
     hole = joint("clearance-revolute", "carrier.hole", "shaft.pin") | {
         "clearance": CLEARANCE,

@@ -105,7 +105,7 @@ for solver in ({"rtol": 1e-6}, {"step": 0.004}):
 designs = [(d.group, d.scene.solver) for d in cost_design.wide(own, ("heun",))]
 closure = Sources(Path.cwd()).closure
 print(json.dumps({
-    "schema": scene_schema()["$defs"]["PlainIntegrator"]["properties"]["integrator"]["enum"],
+    "schema": scene_schema()["$defs"]["Solver"]["properties"]["integrator"]["enum"],
     "ends": ends,
     "designs": [[group, solver.rtol, solver.step] for group, solver in designs if solver.integrator == "heun"],
     "looks": LOOKS,

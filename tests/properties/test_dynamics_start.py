@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate, two_loops
+from tests.properties.mechanisms import body, frame, ground, joint, rigid, scene, simulate, two_loops
 
 
 @pytest.mark.slow
@@ -102,15 +102,10 @@ def driven(given: float, law: float, **crank: Any) -> dict[str, Any]:
     a, b, c = angles(given)
     pins = {"crank": (0.0, 0.0), "coupler": (CRANK * np.cos(a), CRANK * np.sin(a)), "rocker": (GROUND, 0.0)}
     lengths = {"crank": (CRANK, a), "coupler": (COUPLER, b), "rocker": (ROCKER, c)}
-    bodies: dict[str, Any] = {"world": {"type": "ground", "frames": {"a": {}, "b": {"position": [GROUND, 0.0, 0.0]}}}}
+    bodies: dict[str, Any] = {"world": ground(a=(0.0, 0.0, 0.0), b=(GROUND, 0.0, 0.0))}
     for name, (length, angle) in lengths.items():
-        bodies[name] = {
-            "type": "rigid",
-            "mass": 1.0,
-            "inertia": [1e-3, 1e-3, 1e-3],
-            "pose": {"position": [*pins[name], 0.0], "rotation_vector": [0.0, 0.0, angle]},
-            "frames": {"near": {}, "far": {"position": [length, 0.0, 0.0]}},
-        }
+        pose = frame((*pins[name], 0.0), (0.0, 0.0, angle))
+        bodies[name] = rigid(1.0, 1e-3, {"near": {}, "far": frame((length, 0.0, 0.0))}, pose=pose)
     bodies["crank"] |= crank
     pairs = ("world.a", "crank.near"), ("crank.far", "coupler.near"), ("coupler.far", "rocker.far")
     joints = {f"j{k}": joint("revolute", *pair) for k, pair in enumerate((*pairs, ("world.b", "rocker.near")))}

@@ -13,6 +13,7 @@ from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import observed
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
+from tests.properties.mechanisms import ground, joint, rigid, scene
 
 ADAPTIVE = [name for name, traits in INTEGRATORS.items() if traits.estimates]
 SOLVERS = [{"integrator": name, "step": 0.004} for name in INTEGRATORS] + [{"integrator": name} for name in ADAPTIVE]
@@ -61,26 +62,16 @@ def test_a_right_hand_side_that_is_no_number_is_refused(solver: dict[str, Any]) 
 
 def driven_pendulum() -> dict[str, Any]:
     """A pendulum hung from a slide that a step law moves until 0.05 s and leaves alone then."""
-    bar = {"type": "rigid", "mass": 1.0, "inertia": [0.02, 0.03, 0.04]}
-    turned = {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}
-    return {
-        "title": "driven pendulum",
-        "body": {
-            "ground": {"type": "ground", "frames": {"rail": {}}},
-            "slide": {**bar, "pose": {}, "frames": {"rail": {}, "pin": {"axes": turned}}},
-            "bob": {**bar, "com": [0.0, 0.1, -0.3], "pose": {}, "frames": {"pin": {"axes": turned}}},
-        },
-        "joint": {
-            "rail": {"type": "prismatic", "between": ["ground.rail", "slide.rail"]},
-            "pin": {"type": "revolute", "between": ["slide.pin", "bob.pin"]},
-        },
-        "drive": {
-            "rail": {"joint": "rail", "law": {"type": "step", "start": [0.0], "end": [0.05], "change": [0.05]}},
-        },
-        "load": GRAVITY,
-        "time": {"end": 0.1},
-        "output": {"interval": 0.1},
+    inertia, turned = [0.02, 0.03, 0.04], {"axes": {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}}
+    bodies = {
+        "ground": ground(rail=(0, 0, 0)),
+        "slide": rigid(1.0, inertia, {"rail": {}, "pin": turned}, pose={}),
+        "bob": rigid(1.0, inertia, {"pin": turned}, com=[0.0, 0.1, -0.3], pose={}),
     }
+    joints = {"rail": joint("prismatic", "ground.rail", "slide.rail"), "pin": joint("revolute", "slide.pin", "bob.pin")}
+    law = {"type": "step", "start": [0.0], "end": [0.05], "change": [0.05]}
+    drive = {"rail": {"joint": "rail", "law": law}}
+    return scene(bodies, joints, end=0.1, drive=drive, load=GRAVITY, output={"interval": 0.1})
 
 
 @pytest.mark.parametrize("integrator", ["rk4", pytest.param("adams-bashforth-moulton", marks=pytest.mark.slow)])

@@ -11,6 +11,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.assembly import assembled, residuals
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.mechanism import build
+from tests.properties.mechanisms import Table, joint, rigid, scene
 
 
 def four_bar(random: Random, miss: float, tolerance: float) -> Scene:
@@ -24,26 +25,19 @@ def four_bar(random: Random, miss: float, tolerance: float) -> Scene:
         for name, p in (("a", np.zeros(3)), ("b", turn.T @ (corners[k + 1] - corners[k]))):
             wrong = np.array([random.gauss(0.0, 1.0) for _ in range(3)])
             frames[name] = {"position": (p + off * wrong / np.linalg.norm(wrong)).tolist()}
-        pose = {"position": corners[k].tolist(), "axes": axes}
         tolerances = {"frame_tolerance": tolerance} if off else {}
-        return {"type": "rigid", "mass": 1.0, "inertia": [0.01] * 3, "pose": pose, "frames": frames} | tolerances
+        return rigid(1.0, 0.01, frames, pose={"position": corners[k].tolist(), "axes": axes}, **tolerances)
 
-    ground = {f"o{k}": {"position": corners[k].tolist(), "axes": axes} for k in (0, 3)}
-    return Scene.model_validate(
-        {
-            "title": "four-bar",
-            "time": {"end": 1.0},
-            "output": {"interval": 0.1},
-            "body": {"ground": {"type": "ground", "frames": ground}}
-            | {name: body(k, miss if k == 1 else 0.0) for k, name in enumerate(("crank", "coupler", "rocker"))},
-            "joint": {
-                "o0": {"type": "revolute", "between": ["ground.o0", "crank.a"]},
-                "A": {"type": "revolute", "between": ["crank.b", "coupler.a"]},
-                "B": {"type": "revolute", "between": ["coupler.b", "rocker.a"]},
-                "o3": {"type": "revolute", "between": ["ground.o3", "rocker.b"]},
-            },
+    bodies: Table = {
+        "ground": {
+            "type": "ground",
+            "frames": {f"o{k}": {"position": corners[k].tolist(), "axes": axes} for k in (0, 3)},
         }
-    )
+    }
+    bodies |= {name: body(k, miss if k == 1 else 0.0) for k, name in enumerate(("crank", "coupler", "rocker"))}
+    pins = (("o0", "ground.o0", "crank.a"), ("A", "crank.b", "coupler.a"), ("B", "coupler.b", "rocker.a"))
+    joints = {name: joint("revolute", *pair) for name, *pair in (*pins, ("o3", "ground.o3", "rocker.b"))}
+    return Scene.model_validate(scene(bodies, joints))
 
 
 @pytest.mark.parametrize("seed", range(8))

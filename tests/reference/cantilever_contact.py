@@ -13,6 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
+from tests.reference.contact_solutions import modified_coulomb
 from tests.reference.rod_basis import AREA, DENSITY, ELEMENTS, SECOND, STEP, YOUNGS_MODULUS, gauss, hermite
 
 Array = np.ndarray
@@ -66,17 +67,6 @@ def rod(bending: int, axial: int) -> Rod:
     return Rod(omega, tip, np.append(shapes[-1], never), np.append(load[2:] @ shapes, never))
 
 
-def friction(pin: Pin, speed: float) -> float:
-    """Signed coefficient of the modified Coulomb law."""
-    size = abs(speed)
-    if size < pin.v_static:
-        mu = 0.5 * pin.static * size / pin.v_static * (3.0 - (size / pin.v_static) ** 2)
-    else:
-        x = min(1.0, (size - pin.v_static) / (pin.v_dynamic - pin.v_static))
-        mu = pin.static + (pin.dynamic - pin.static) * x * x * (3.0 - 2.0 * x)
-    return math.copysign(mu, speed)
-
-
 def simulate(beam: Rod, pin: Pin, gravity: float, end: float, count: int) -> list[tuple[float, float, float, float]]:
     """(begin, approach, end, separation) of the first contacts of the rod let go straight, at rest."""
     loaded = np.eye(len(beam.omega)) + pin.mass * beam.tip.T @ beam.tip + pin.inertia * np.outer(beam.turn, beam.turn)
@@ -96,7 +86,8 @@ def simulate(beam: Rod, pin: Pin, gravity: float, end: float, count: int) -> lis
             along = np.array([-normal[1], normal[0]])
             slip = float(along @ (beam.tip @ y[k:])) + pin.radius * float(beam.turn @ y[k:])
             pressed = pin.stiffness * max(0.0, -gap) ** 1.5 * (1.0 + hysteresis * rate / impact_rate)
-            rubbing = -max(0.0, pressed) * friction(pin, slip)
+            mu = modified_coulomb(abs(slip), pin.static, pin.dynamic, pin.v_static, pin.v_dynamic)
+            rubbing = -max(0.0, pressed) * math.copysign(mu, slip)
             force = -max(0.0, pressed) * normal + rubbing * along
             pushed = pushed + beam.tip.T @ force + beam.turn * pin.radius * rubbing
         return np.concatenate([y[k:], np.linalg.solve(loaded, pushed)])

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.reference import sps4
+from tests.reference.contact_solutions import modified_coulomb
 from tests.reference.ideal_motion import cross
 
 Array = np.ndarray
@@ -26,17 +27,6 @@ class Touch:
     normal: float
     force: Array
     reach: Array
-
-
-def friction_coefficient(c: sps4.Contact, speed: float) -> float:
-    """Modified Coulomb law, eqs. (27)-(29), of the sliding speed [m/s]."""
-    if speed >= c.v_dynamic:
-        return c.mu_dynamic
-    if speed >= c.v_static:
-        x = (speed - c.v_static) / (c.v_dynamic - c.v_static)
-        return c.mu_static + (c.mu_dynamic - c.mu_static) * x * x * (3.0 - 2.0 * x)
-    x = (speed + c.v_static) / (2.0 * c.v_static)
-    return -c.mu_static + 2.0 * c.mu_static * x * x * (3.0 - 2.0 * x)
 
 
 def press(
@@ -60,5 +50,6 @@ def press(
     speed = np.sqrt(slip @ slip)
     force = -normal * n
     if speed > 0.0:
-        force = force - normal * friction_coefficient(c, speed) * slip / speed
+        mu = modified_coulomb(speed, c.mu_static, c.mu_dynamic, c.v_static, c.v_dynamic)
+        force = force - normal * mu * slip / speed
     return Touch(c.clearance - distance, float(rate), float(normal), force, reach)

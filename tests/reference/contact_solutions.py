@@ -14,6 +14,14 @@ from scipy.optimize import brentq
 from scipy.special import beta, ellipk
 
 
+def modified_coulomb(speed: float, static: float, dynamic: float, v_static: float, v_dynamic: float) -> float:
+    """Coefficient of the paper's friction, of a sliding speed >= 0 [m/s] (Wang & Wang 2019, eqs. 27-29)."""
+    if speed < v_static:
+        return 0.5 * static * speed / v_static * (3.0 - (speed / v_static) ** 2)
+    x = min(1.0, (speed - v_static) / (v_dynamic - v_static))
+    return static + (dynamic - static) * x * x * (3.0 - 2.0 * x)
+
+
 def hysteresis(restitution: float) -> float:
     """Factor a of Lankarani and Nikravesh for a requested coefficient of restitution (Wang & Wang 2019, eq. 25)."""
     return 0.75 * (1.0 - restitution**2)

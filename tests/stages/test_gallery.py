@@ -15,7 +15,6 @@ from scipy.optimize import brentq
 
 from benchmarks.families.gallery import ENTRIES, scene_of, solved
 from flexclear.commands.scenes import bundles
-from tests.properties.mechanisms import simulated
 
 #: kinds of mechanisms that whoever looks for a beginning expects to find
 EXPECTED = {"four_bar", "clearance_slider_crank", "scott_russell", "stewart", "robot_arm", "universal_shaft"}
@@ -235,8 +234,7 @@ def test_a_mechanism_answers_what_its_page_says(name: str, root: Path) -> None:
     reported = re.search(rf"^\*{re.escape(entry.question)}\* (.+)$", page, re.MULTILINE)
     assert reported is not None
     scene = scene_of(entry)
-    reduced = bundles(scene)
-    run = solved(entry, scene, reduced) if entry.linear else simulated(scene, reduced)  # no answer needs a horizon
+    run = solved(entry, scene, bundles(scene))
     if name in CLOSED_FORMS:
         CLOSED_FORMS[name](run)
     answer = entry.answer(run, scene)

@@ -18,32 +18,32 @@ if TYPE_CHECKING:
 
 KIND = "figure or table"
 NAMES = {
-    "fig01": "structure:FIG01",
+    "fig01": "structure:mechanism",
     "fig03": "structure:FIG03",
     "fig04": "structure:FIG04",
-    "fig05": "joint:FIG05",
-    "fig06": "joint:FIG06",
-    "fig08": "panels:FIG08",
-    "fig09": "panels:FIG09",
-    "fig10": "structure:FIG10",
+    "fig05": "joint:kinematics",
+    "fig06": "joint:friction_law",
+    "fig08": "panels:tilt",
+    "fig09": "panels:response",
+    "fig10": "structure:steps",
     "fig11": "panels:FIG11",
     "fig12": "panels:FIG12",
     "fig13": "panels:FIG13",
     "fig14": "phase:FIG14",
     "fig15": "phase:FIG15",
     "fig16": "phase:FIG16",
-    "fig17": "joint:FIG17",
-    "table01": "given:TABLE01",
-    "table02": "given:TABLE02",
-    "table03": "given:TABLE03",
+    "fig17": "joint:trajectory",
+    "table01": "given:parts",
+    "table02": "given:material",
+    "table03": "given:joint_with_clearance",
     "table04": "given:TABLE04",
     "table05": "given:TABLE05",
-    "table06": "given:TABLE06",
-    "table07": "errors:TABLE07",
-    "table08": "errors:TABLE08",
-    "table09": "errors:TABLE09",
-    "table10": "table10:TABLE",
-    "table_verdicts": "table_verdicts:TABLE",
+    "table06": "given:simulation",
+    "table07": "errors:of_rods",
+    "table08": "errors:of_clearance",
+    "table09": "errors:of_all",
+    "table10": "table10:costs",
+    "table_verdicts": "table_verdicts:verdicts",
 }
 #: in tables, what is not there
 ABSENT = "–"
@@ -64,6 +64,13 @@ class Figure:
     needs: tuple[str, ...]
     make: Callable[[Data], Drawing | Table]
     files: tuple[str, ...] = ()
+
+
+def drawn(
+    title: str, *needs: str, files: tuple[str, ...] = ()
+) -> Callable[[Callable[[Data], Drawing | Table]], Figure]:
+    """Makes a `Figure` of the function that draws it."""
+    return lambda make: Figure(title, needs, make, files)
 
 
 def figure(name: str) -> Figure:

@@ -14,7 +14,7 @@ from flexclear.papers.wang_wang_2019.deviations import (
     max_deviation,
     velocity_at_events,
 )
-from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, drawn
 from flexclear.papers.wang_wang_2019.published import TABLE7, TABLE8, TABLE9, MaximumError
 from flexclear.pipeline.post.plotting.table import Table
 from flexclear.pipeline.post.single_run.series import parameters
@@ -107,7 +107,12 @@ def number(value: float) -> str:
     return f"{value:.3f}" if 0.1 <= abs(value) < 1e4 else f"{value:.3e}"
 
 
-def _of_rods(data: Data) -> Table:
+@drawn(
+    "Table 7: largest errors of the FAR model against the ideal model",
+    *paper.references((paper.IDEAL, *paper.FAR), "run", "tight"),
+)
+def of_rods(data: Data) -> Table:
+    """Single runs, with what a tighter tolerance changes."""
     (free, free_t), (fixed, fixed_t), (both, both_t) = (
         _both(data, model) for model in (paper.FAR_FREE, paper.FAR_FIXED, paper.FAR_CB)
     )
@@ -152,7 +157,13 @@ def _contradiction(ours: Deviation) -> str:
     )
 
 
-def _of_clearance(data: Data) -> Table:
+@drawn(
+    "Table 8: largest errors of the CSJ model against the ideal model",
+    *paper.references((paper.IDEAL, paper.CSJ, *paper.FIRST), "run", "tight"),
+    *paper.references((paper.CSJ, paper.FIRST_CSJ), "post"),
+)
+def of_clearance(data: Data) -> Table:
+    """The layout of the scenes and the first one, up to the horizon."""
     post = data[f"{paper.CSJ.scene}:post"]
     (ours, tighter), (first, first_tighter) = (
         _both(data, model, ideal, paper.believed_until(data[f"{model.scene}:post"]))
@@ -165,9 +176,11 @@ def _of_clearance(data: Data) -> Table:
     )
     clearance = 1e3 * float(post.clearance.sel(contact=paper.JOINT))
     count, peak = int(post.impact_count.sel(contact=paper.JOINT)), float(post.peak_force.sel(contact=paper.JOINT))
+    cut = int(np.isnan(post.impact_duration.values).sum())
+    unfinished = f" ({cut} of them still in contact at the end)" if cut else ""
     notes = (
         comparison("CSJ model", ours, TABLE8),
-        f"The run has {count} impacts{_unfinished(post)}; the largest contact force is {peak:.0f} N, the platform's "
+        f"The run has {count} impacts{unfinished}; the largest contact force is {peak:.0f} N, the platform's "
         f"largest vertical acceleration {float(post.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} m/s².",
         _restitution(data[f"{paper.CSJ.scene}:run"], post),
         "Angle and displacement are fitted, not predicted: once the ball rests against the socket, leg 1 is "
@@ -206,11 +219,6 @@ def _between_outputs(data: Data) -> str:
     )
 
 
-def _unfinished(post: xr.Dataset) -> str:
-    cut = int(np.isnan(post.impact_duration.values).sum())
-    return f" ({cut} of them still in contact at the end)" if cut else ""
-
-
 def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
     """What is asked for, what the law gives a free impact, and what the impacts of the run show."""
     asked = parameters(run)["joint"][paper.JOINT]["normal"]["restitution"]
@@ -224,7 +232,13 @@ def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
     )
 
 
-def _of_all(data: Data) -> Table:
+@drawn(
+    "Table 9: largest errors of the FAR-CSJ model against the ideal model",
+    *paper.references((paper.IDEAL, *paper.FAR_CSJ), "run", "tight"),
+    *paper.references((paper.CSJ, *paper.FAR_CSJ), "post"),
+    *paper.references(paper.FAR_CSJ, "ensemble"),
+)
+def of_all(data: Data) -> Table:
     """Within the horizon one run, over the whole stroke the ensemble."""
     columns: list[Column] = []
     for model, name in ((paper.FAR_CSJ_FREE, "free-free"), (paper.FAR_CSJ_FIXED, "fixed-fixed")):
@@ -280,27 +294,3 @@ def _largest(data: Data, what: str, which: dict[str, str], unit: str) -> str:
         peak = data[f"{model.scene}:ensemble"][what].sel(which).values
         texts.append(f"{paper.mode_set(model)} {peak.mean():.0f} ± {peak.std(ddof=1):.0f} {unit}")
     return "; ".join(texts)
-
-
-TABLE07 = Figure(
-    "Table 7: largest errors of the FAR model against the ideal model",
-    paper.references((paper.IDEAL, *paper.FAR), "run", "tight"),
-    _of_rods,
-)
-TABLE08 = Figure(
-    "Table 8: largest errors of the CSJ model against the ideal model",
-    (
-        *paper.references((paper.IDEAL, paper.CSJ, *paper.FIRST), "run", "tight"),
-        *paper.references((paper.CSJ, paper.FIRST_CSJ), "post"),
-    ),
-    _of_clearance,
-)
-TABLE09 = Figure(
-    "Table 9: largest errors of the FAR-CSJ model against the ideal model",
-    (
-        *paper.references((paper.IDEAL, *paper.FAR_CSJ), "run", "tight"),
-        *paper.references((paper.CSJ, *paper.FAR_CSJ), "post"),
-        *paper.references(paper.FAR_CSJ, "ensemble"),
-    ),
-    _of_all,
-)

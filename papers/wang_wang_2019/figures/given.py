@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.papers.wang_wang_2019 import published
-from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure
+from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure, drawn
 from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
 from flexclear.papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
 from flexclear.pipeline.post.plotting.table import Table
@@ -150,7 +150,9 @@ BODIES = {
 }
 
 
-def _parts(data: Data) -> Table:
+@drawn("Table 1: physical parameters of the parts, the paper's and those of the scenes", f"{IDEAL.scene}:run")
+def parts(data: Data) -> Table:
+    """Mass, length and moments of inertia, ours as the run has them."""
     bodies = parameters(data[f"{IDEAL.scene}:run"])["body"]
     rows = tuple(_part(member, bodies) for member in TABLE1)
     heads = ("member", "body here", "mass, paper (kg)", "mass, ours (kg)", "length, paper (mm)",
@@ -197,7 +199,8 @@ MATERIAL = {
 }
 
 
-def _material(data: Data) -> Table:
+@drawn("Table 2: material of the flexible actuated rod, the paper's and that of its mesh", ROD)
+def material(data: Data) -> Table:
     """Read off the mesh that the modes are made of."""
     mesh = data[ROD]
     young, shear = (float(np.ravel(mesh[name].values)[0]) for name in ("youngs_modulus", "shear_modulus"))
@@ -218,7 +221,9 @@ def _material(data: Data) -> Table:
     return Table("Table 2: the flexible rod", HEADS, rows, notes)
 
 
-def _joint(data: Data) -> Table:
+@drawn("Table 3: the spherical joint with clearance, the paper's and that of the scenes", f"{CSJ.scene}:run")
+def joint_with_clearance(data: Data) -> Table:
+    """Ours as the run has them, with the stiffness that follows."""
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
     ball, young = joint["ball_radius"], f"{1e-9 * TABLE3['youngs_modulus']:g}"
     rows = (
@@ -248,7 +253,9 @@ def _stiffness(joint: dict) -> str:
     return f"Stiffness by eq. (26): K = {K:.4g} N/m^1.5."
 
 
-def _simulation(data: Data) -> Table:
+@drawn("Table 6: parameters of the simulation, the paper's and those of the scenes", f"{CSJ.scene}:run")
+def simulation(data: Data) -> Table:
+    """Ours as the CSJ run has them."""
     run = data[f"{CSJ.scene}:run"]
     given = parameters(run)
     joint, solver = given["joint"][JOINT], given.get("solver", {})
@@ -274,15 +281,3 @@ def _simulation(data: Data) -> Table:
         "Table 10.",
     )
     return Table("Table 6: parameters of the simulation", HEADS, rows, notes)
-
-
-TABLE01 = Figure(
-    "Table 1: physical parameters of the parts, the paper's and those of the scenes", (f"{IDEAL.scene}:run",), _parts
-)
-TABLE02 = Figure("Table 2: material of the flexible actuated rod, the paper's and that of its mesh", (ROD,), _material)
-TABLE03 = Figure(
-    "Table 3: the spherical joint with clearance, the paper's and that of the scenes", (f"{CSJ.scene}:run",), _joint
-)
-TABLE06 = Figure(
-    "Table 6: parameters of the simulation, the paper's and those of the scenes", (f"{CSJ.scene}:run",), _simulation
-)

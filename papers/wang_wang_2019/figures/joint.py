@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import Data, drawn
 from flexclear.papers.wang_wang_2019.figures.phase import at_times
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, believed_until, references
 from flexclear.pipeline.dynamics.contact.friction import modified_coulomb
@@ -20,7 +20,11 @@ TURN = np.linspace(0.0, 2.0 * np.pi, 361)
 CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
 
 
-def _kinematics(data: Data) -> Drawing:
+@drawn(
+    "Figure 5: kinematics of the spherical joint with clearance, as named here and in the paper",
+    *references([CSJ], "run", "post"),
+)
+def kinematics(data: Data) -> Drawing:
     """Before and during contact; the clearance is drawn larger than it is."""
     post = data[f"{CSJ.scene}:post"]
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
@@ -79,14 +83,8 @@ def _arrow(
     axes.annotate(name, 0.5 * (start + end) + shift, ha="center", va="center", fontsize=9.5, color=color, zorder=6)
 
 
-FIG05 = Figure(
-    "Figure 5: kinematics of the spherical joint with clearance, as named here and in the paper",
-    references([CSJ], "run", "post"),
-    _kinematics,
-)
-
-
-def _friction(data: Data) -> Drawing:
+@drawn("Figure 6: modified Coulomb friction, coefficient over sliding velocity, and what a run did", "sps4/csj:run")
+def friction_law(data: Data) -> Drawing:
     """Eqs. (28), (29) with the scene's parameters; dots from the run."""
     run = data[f"{CSJ.scene}:run"]
     friction = parameters(run)["joint"][JOINT]["friction"]
@@ -95,7 +93,9 @@ def _friction(data: Data) -> Drawing:
     figure, axes = style.grid(1, 2, (9.6, 3.7), width_ratios=[1.25, 1])
     _law(axes[0, 0], limits, 1.5 * limits[1])
     axes[0, 0].set_title("(a) the law")
-    _label(axes[0, 0], limits)
+    text = f"μs = {limits[2]:g} at vs = {1e3 * limits[0]:g} mm/s\nμd = {limits[3]:g} from vd = {1e3 * limits[1]:g} mm/s"
+    look = {"ha": "right", "va": "center", "color": style.SOFT, "linespacing": 1.6}
+    axes[0, 0].text(0.97, 0.30, text, transform=axes[0, 0].transAxes, **look)
     _law(axes[0, 1], limits, 3.0 * limits[0], marks=False)
     for panel in axes.flat:
         panel.scatter(1e3 * v, mu, s=7, color=CSJ.color, lw=0, zorder=3, label=f"run {CSJ.scene}, in contact")
@@ -139,23 +139,14 @@ def _law(axes: style.Axes, limits: tuple[float, ...], reach: float, *, marks: bo
             axes.axvline(1e3 * side * value, color="#bdbdbd", lw=0.8, ls=":")
 
 
-def _label(axes: style.Axes, limits: tuple[float, ...]) -> None:
-    v_static, v_dynamic, static, dynamic = limits
-    text = f"μs = {static:g} at vs = {1e3 * v_static:g} mm/s\nμd = {dynamic:g} from vd = {1e3 * v_dynamic:g} mm/s"
-    axes.text(0.97, 0.30, text, transform=axes.transAxes, ha="right", va="center", color=style.SOFT, linespacing=1.6)
-
-
-FIG06 = Figure(
-    "Figure 6: modified Coulomb friction, coefficient over sliding velocity, and what a run did",
-    ("sps4/csj:run",),
-    _friction,
-)
-
-
 PLANES = (("x", "y"), ("x", "z"))
 
 
-def _trajectory(data: Data) -> Drawing:
+@drawn(
+    "Figure 17: trajectory of the ball's centre in the socket, CSJ and FAR-CSJ models",
+    *references((CSJ, *FAR_CSJ), "run", "post"),
+)
+def trajectory(data: Data) -> Drawing:
     """Two projections per model, socket axes, with the clearance circle."""
     models = (CSJ, *FAR_CSJ)
     figure, axes = style.grid(len(PLANES), len(models), (11.6, 6.5), sharex=True, sharey=True)
@@ -191,10 +182,3 @@ def _projection(axes: style.Axes, plane: tuple[str, str], model: Model, data: di
         when, x, y = at_times(time, post.impact_time.values, time, x, y)
         axes.plot(x[when <= horizon], y[when <= horizon], "o", ms=2.6, color=style.INK)
     axes.set_aspect("equal")
-
-
-FIG17 = Figure(
-    "Figure 17: trajectory of the ball's centre in the socket, CSJ and FAR-CSJ models",
-    references((CSJ, *FAR_CSJ), "run", "post"),
-    _trajectory,
-)

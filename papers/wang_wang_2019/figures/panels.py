@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from flexclear.papers.wang_wang_2019 import models as paper
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import Data, Figure, drawn
 from flexclear.papers.wang_wang_2019.models import Quantity
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
@@ -57,8 +57,9 @@ def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], col
             strip.set(xlabel="time (s)", ylabel=f"zoom\n{quantity.unit}")
         else:
             difference(strip, quantity, reference, others)
-    for other in others:
-        _peaks(axes[4, 0], other)
+    for other in others:  # the outputs in between may miss the largest force of an impact
+        inside = other.impacts[:, 0] <= other.horizon
+        axes[4, 0].plot(*other.impacts[inside].T, "o", ms=2.2, color=other.model.color)
     ball_deviation(axes[4, 1], reference, others, clearance)
     axes[4, 1].set_title("(f) centre of ball A1, minus ideal, global frame")
     ball_distance(axes[5, 1], reference, others)
@@ -180,12 +181,6 @@ def _envelope(axes: Axes, motion: paper.Motion, values: np.ndarray, time: np.nda
     axes.plot([], [], color=motion.model.color, lw=1.6, label=motion.model.label)
 
 
-def _peaks(axes: Axes, motion: paper.Motion) -> None:
-    """Largest force of each impact inside the horizon; the outputs in between may miss it."""
-    inside = motion.impacts[:, 0] <= motion.horizon
-    axes.plot(*motion.impacts[inside].T, "o", ms=2.2, color=motion.model.color)
-
-
 def _band(axes: Axes, quantity: Quantity, motion: paper.Motion, reference: paper.Motion | None = None) -> None:
     """Middle nine tenths of the ensemble and its median, beyond the horizon only; less the reference where given.
 
@@ -257,7 +252,12 @@ def _of_both(ideal: paper.Motion, others: Sequence[paper.Motion]) -> tuple[str, 
     )
 
 
-def _tilt(data: Data) -> Drawing:
+@drawn(
+    "Figure 8: trajectory of the moving platform about the y0 axis, ideal model",
+    *paper.references([paper.IDEAL], "run", "post"),
+)
+def tilt(data: Data) -> Drawing:
+    """The angle over the stroke, its largest value marked."""
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(1, 1, (6.4, 3.5))
     _alone(axes[0, 0], paper.ANGLE, ideal, 1.8)
@@ -286,7 +286,12 @@ def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None
     axes.annotate(text, (time[i], angle[i]), xytext=shift, **look)
 
 
-def _response(data: Data) -> Drawing:
+@drawn(
+    "Figure 9: dynamic response of the ideal mechanism: z displacement, velocity, acceleration, reaction at A1",
+    *paper.references([paper.IDEAL], "run", "post"),
+)
+def response(data: Data) -> Drawing:
+    """Four panels over the stroke."""
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(2, 2, (9.4, 5.8))
     shown = QUANTITIES[1:]
@@ -316,15 +321,4 @@ FIG13 = _figure(
     _of_both,
     (paper.CSJ, *paper.FAR_CSJ),
     3,
-)
-
-FIG08 = Figure(
-    "Figure 8: trajectory of the moving platform about the y0 axis, ideal model",
-    paper.references([paper.IDEAL], "run", "post"),
-    _tilt,
-)
-FIG09 = Figure(
-    "Figure 9: dynamic response of the ideal mechanism: z displacement, velocity, acceleration, reaction at A1",
-    paper.references([paper.IDEAL], "run", "post"),
-    _response,
 )

@@ -19,7 +19,6 @@ from flexclear.papers.wang_wang_2019.models import (
     FAR_CSJ,
     IDEAL,
     VELOCITY,
-    Model,
     Motion,
     Quantity,
     minus,
@@ -51,7 +50,8 @@ def _maps(plane: Plane, data: Data) -> Drawing:
     figure, axes = style.grid(2, len(MODELS), (13.2, 5.9), sharex=True, sharey="row")
     for column, (model, run) in enumerate(zip(MODELS, motions, strict=True)):
         trajectory(axes[0, column], plane, run)
-        axes[0, column].set_title(_short(model), fontsize=8.4)
+        short = model.label.replace(" modes", "").replace("Craig-Bampton (added)", "CB (added)")
+        axes[0, column].set_title(short, fontsize=8.4)
         at_impacts(axes[1, column], plane, run, motions[0])
         axes[1, column].set_xlabel(plane.x.label)
     _say(axes[1, 0], "no impacts")
@@ -104,10 +104,6 @@ def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion) -> None:
 
 def _say(axes: Axes, text: str) -> None:
     axes.set_title(text, fontsize=8.0, fontweight="normal", color=style.SOFT)
-
-
-def _short(model: Model) -> str:
-    return model.label.replace(" modes", "").replace("Craig-Bampton (added)", "CB (added)")
 
 
 def at_times(time: np.ndarray, requested: np.ndarray, *values: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 from matplotlib.text import Text
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import Data, Figure, drawn
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CB, FAR_CSJ_CB, IDEAL, JOINT
 from flexclear.papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE5_NORMAL_MODE
 from flexclear.pipeline.post.plotting import style
@@ -30,7 +30,11 @@ LABELS = {1: (0.07, 0.0), 2: (-0.065, 0.0), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
 STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
 
 
-def _drawn(data: Data) -> Drawing:
+@drawn(
+    "Figure 1: structure of the 4-SPS/PS mechanism, with the names of its parts and the joint coordinates in use",
+    "sps4/ideal:run",
+)
+def mechanism(data: Data) -> Drawing:
     """The mechanism at its start, drawn to scale, and its joints seen from above."""
     run = data[f"{IDEAL.scene}:run"]
     points = {str(name): run.frame_position.values[0, k] for k, name in enumerate(run.frame.values)}
@@ -151,13 +155,6 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
     axes.set_aspect("equal")
 
 
-FIG01 = Figure(
-    "Figure 1: structure of the 4-SPS/PS mechanism, with the names of its parts and the joint coordinates in use",
-    ("sps4/ideal:run",),
-    _drawn,
-)
-
-
 #: boxes of the three columns: text, and the paper's step that it is
 STRUCTURE = (
     ("recipe → mesh of beam elements", ""),
@@ -180,7 +177,8 @@ BLUE, GREEN, ORANGE = "#0072B2", "#009E73", "#E69F00"
 ROWS = ((0.92, 0.72, 0.52), (0.28, 0.08), (0.92, 0.71, 0.49, 0.27, 0.08))
 
 
-def _steps(data: Data) -> Drawing:
+@drawn("Figure 10: how the dynamics are computed, next to the paper's steps 1 to 9", "sps4/far_csj_cb:run")
+def steps(data: Data) -> Drawing:
     """The boxes, with the counts of the paper's full model."""
     attributes = data[f"{FAR_CSJ_CB.scene}:run"].attrs
     figure, axes = style.grid(1, 2, (9.0, 5.2))
@@ -223,13 +221,6 @@ def _arrow(axes: Axes, first: Text, second: Text, way: str) -> None:
     look = {"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3, "connectionstyle": way, "shrinkA": 2, "shrinkB": 2}
     patches = {"patchA": first.get_bbox_patch(), "patchB": second.get_bbox_patch()}
     axes.annotate("", second.get_position(), first.get_position(), arrowprops=look | patches)
-
-
-FIG10 = Figure(
-    "Figure 10: how the dynamics are computed, next to the paper's steps 1 to 9",
-    ("sps4/far_csj_cb:run",),
-    _steps,
-)
 
 
 #: drawn size of the largest displacement, as a fraction of the body's length

@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.papers.wang_wang_2019 import deviations
 from flexclear.papers.wang_wang_2019 import models as paper
 from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.figures import Data, drawn
 from flexclear.papers.wang_wang_2019.figures.errors import NOISE
 from flexclear.papers.wang_wang_2019.figures.table10 import ratios
 from flexclear.papers.wang_wang_2019.models import mode_set
@@ -32,7 +32,15 @@ HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
 Outcome = tuple[str, str]  #: verdict, and the numbers that say so
 
 
-def _verdicts(data: Data) -> Table:
+@drawn(
+    "Verdicts (added): what the paper states in section 6, and whether it holds here",
+    *paper.references((paper.IDEAL, *paper.FAR, paper.CSJ, *paper.FIRST), "run", "post"),
+    *paper.references(paper.FAR_CSJ, "post", "ensemble"),
+    "sps4:timing",
+    files=(SECTIONS,),
+)
+def verdicts(data: Data) -> Table:
+    """Each statement with the verdict of its test."""
     said = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
@@ -75,7 +83,8 @@ def _same_path(data: Data, models: Sequence[paper.Model]) -> Outcome:
     ideal = deviations.ball_centre(data[f"{paper.IDEAL.scene}:run"])
     stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
     off = {m: float(np.linalg.norm(difference(data, m, deviations.ball_centre), axis=1).max()) for m in models}
-    words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
+    lengths = {m: f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing" for m, far in off.items()}
+    words = ", ".join(f"{mode_set(model) or model.label} {length}" for model, length in lengths.items())
     numbers = f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
     return _verdict(*(far < SMALL * stroke for far in off.values())), numbers
 
@@ -84,10 +93,6 @@ def _other_path(data: Data) -> Outcome:
     """The contrary statement on the same numbers."""
     verdict, numbers = _same_path(data, [paper.CSJ])
     return {HOLDS: NOT, NOT: HOLDS}[verdict], f"{numbers}: by the measure of the platform's displacement no influence"
-
-
-def _length(far: float) -> str:
-    return f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing"
 
 
 def _slight_vibration(data: Data) -> Outcome:
@@ -227,13 +232,10 @@ def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
     for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
         costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
         tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
-        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in costs.items()))
+        said = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
+        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in said.items()))
     printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
     return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
-
-
-def _ratio(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "fails"
 
 
 def _becomes_chaotic(data: Data) -> Outcome:
@@ -317,14 +319,3 @@ TESTS: dict[str, Callable[[Data], Outcome]] = {
     "costs of both": partial(_costs, models=(paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)),
     "becomes chaotic": _becomes_chaotic,
 }
-
-TABLE = Figure(
-    "Verdicts (added): what the paper states in section 6, and whether it holds here",
-    (
-        *paper.references((paper.IDEAL, *paper.FAR, paper.CSJ, *paper.FIRST), "run", "post"),
-        *paper.references(paper.FAR_CSJ, "post", "ensemble"),
-        "sps4:timing",
-    ),
-    _verdicts,
-    (SECTIONS,),
-)

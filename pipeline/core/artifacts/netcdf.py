@@ -39,7 +39,8 @@ def write(path: Path, data: LabelledArrays) -> None:
     compress = data.nbytes >= COMPRESSED
     with _alone(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
         for name, value in {**data.attrs, **whole}.items():
-            _set_attribute(file, name, value)
+            texts = isinstance(value, (list, tuple)) and len(value) and all(isinstance(one, str) for one in value)
+            (file.setncattr_string if texts else file.setncattr)(name, value)
         for dim, length in data.sizes.items():
             file.createDimension(dim, length)
         every = [_define(file, name, one, listed.get(name, {}), compress) for name, one in data.variables.items()]
@@ -75,11 +76,6 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
     variable.setncatts({**array.attrs, **listed, **truth})
     variable.set_auto_maskandscale(False)
     return variable
-
-
-def _set_attribute(file: Any, name: str, value: Any) -> None:
-    texts = isinstance(value, (list, tuple)) and len(value) and all(isinstance(one, str) for one in value)
-    (file.setncattr_string if texts else file.setncattr)(name, value)
 
 
 def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:

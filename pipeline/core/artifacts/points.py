@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION
-from flexclear.pipeline.core.scene.design import Axis, Design
+from flexclear.pipeline.core.scene.design import Design
 from flexclear.pipeline.core.scene.quantity import Recorded
 from flexclear.pipeline.core.scene.units import udunits
 
@@ -19,8 +20,13 @@ Values = dict[str, np.ndarray]
 STATUS = ("done", "refused", "not_run")
 DONE, REFUSED, NOT_RUN = range(3)
 #: what is recorded of each quantity: its value, and where asked for the difference from a run at a tighter tolerance,
-#: or the standard deviation over members
-STATISTICS = ("values", "error", "deviation")
+#: or the standard deviation over members; and what that adds to its meaning
+MEANINGS = {
+    "values": "",
+    "error": "; distance from the value at a hundredth of the tolerance",
+    "deviation": "; standard deviation over the members",
+}
+STATISTICS = tuple(MEANINGS)
 
 
 @dataclass(frozen=True)
@@ -28,8 +34,7 @@ class Point:
     """What is left of one point.
 
     values: by the names of the recorded quantities, in SI; with members their mean.  error: distance from the values at
-    a tighter
-    tolerance.  deviation: standard deviation over the members.  Both are empty where nobody asked.
+    a tighter tolerance.  deviation: standard deviation over the members.  Both are empty where nobody asked.
     evaluations: of the right-hand side, all runs of the point together.
     refused: why there are no values; else empty.  members: values of each start; artifacts lack them.
     """
@@ -45,7 +50,12 @@ class Point:
 def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Dataset:
     """Finished points by their keys, as a dataset."""
     done = list(points.values())
-    variables = _arrays(done, recorded, ("point",), (len(done),))
+    variables: dict[str, Any] = {}
+    for statistic, one in itertools.product(STATISTICS, recorded):
+        there = [getattr(point, statistic)[one.name] for point in done if one.name in getattr(point, statistic)]
+        if there:
+            rows = _rows(done, one.name, statistic, np.shape(there[0]))
+            variables[variable(one, statistic)] = (("point", *one.dims), rows)
     variables["evaluations"] = (("point",), np.array([point.evaluations for point in done], dtype=np.int64))
     variables["refused"] = (("point",), np.array([point.refused for point in done], dtype=object))
     return xr.Dataset(variables, coords={"key": ("point", np.array(list(points), dtype=object))})
@@ -88,11 +98,12 @@ def dataset(
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
     lengths = dimensions(time, sections)
-    variables = _arrays(every, recorded, dims, shape)
-    for one, statistic in itertools.product(recorded, statistics):  # where no point is done
-        if variable(one, statistic) not in variables:
-            inner = [lengths[dim] for dim in one.dims]
-            variables[variable(one, statistic)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
+    variables: dict[str, Any] = {}
+    for one, statistic in itertools.product(recorded, statistics):
+        inner = tuple(lengths[dim] for dim in one.dims)
+        rows = _rows(every, one.name, statistic, inner).reshape((*shape, *inner))
+        described = {"units": udunits(one.unit), "long_name": f"{one.meaning}{MEANINGS[statistic]}"}
+        variables[variable(one, statistic)] = ((*dims, *one.dims), rows, described)
     status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
     plain = {
         "status": (np.array(status, dtype=np.int8), "what became of the point"),
@@ -103,19 +114,17 @@ def dataset(
         ),
         "key": (np.array(keys, dtype=object), "digest of all that decides the point"),
     }
-    for name, (values, _) in plain.items():
-        variables[name] = (dims, values.reshape(shape))
-    sizes = {str(dim) for names, _ in variables.values() for dim in names}
-    coordinates: dict[str, object] = {}
+    for name, (values, meaning) in plain.items():
+        variables[name] = (dims, values.reshape(shape), {"long_name": meaning})
+    sizes = {dim for names, *_ in variables.values() for dim in names}
+    coordinates: dict[str, Any] = {}
     for axis in design.axes:
-        coordinates[axis.name] = (axis.name if design.grid else "point", np.array(axis.coordinate))
+        described = {"long_name": ", ".join(axis.places)} | ({"units": u} if (u := udunits(axis.unit)) else {})
+        coordinates[axis.name] = (axis.name if design.grid else "point", np.array(axis.coordinate), described)
     coordinates |= {"axis": list(AXES)} if "axis" in sizes else {}
     coordinates |= {"quat": list(QUATERNION)} if "quat" in sizes else {}
-    coordinates |= {"time": time} if "time" in sizes else {}
+    coordinates |= {"time": ("time", time, {"units": "s", "long_name": "time"})} if "time" in sizes else {}
     result = xr.Dataset(variables, coords=coordinates)
-    _describe(result, design.axes, recorded)
-    for name, (_, meaning) in plain.items():
-        result[name].attrs = {"long_name": meaning}
     result["status"].attrs |= {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(STATUS)}
     finished = int(NOT_RUN not in status)
     return result.assign_attrs({"Conventions": CONVENTIONS, "complete": finished, **attributes})
@@ -126,41 +135,10 @@ def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
     return {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
 
 
-def _arrays(
-    points: Sequence[Point | None], recorded: Sequence[Recorded], dims: tuple[str, ...], shape: tuple[int, ...]
-) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-    """Values of points, row by row in the order of the dimensions; nan where there are none."""
-    arrays = {}
-    done = next((point for point in points if point is not None and not point.refused), None)
-    for statistic in STATISTICS if done is not None else ():
-        for one in recorded:
-            if one.name not in getattr(done, statistic):
-                continue
-            inner = np.shape(getattr(done, statistic)[one.name])
-            rows = np.full((len(points), *inner), np.nan)
-            for k, point in enumerate(points):
-                if point is not None and not point.refused:
-                    rows[k] = getattr(point, statistic)[one.name]
-            arrays[variable(one, statistic)] = ((*dims, *one.dims), rows.reshape((*shape, *inner)))
-    return arrays
-
-
-def _describe(result: xr.Dataset, axes: Sequence[Axis], recorded: Sequence[Recorded]) -> None:
-    """Units and meanings."""
-    words = {
-        "values": "",
-        "error": "; distance from the value at a hundredth of the tolerance",
-        "deviation": "; standard deviation over the members",
-    }
-    for one in recorded:
-        for statistic, more in words.items():
-            if variable(one, statistic) in result:
-                result[variable(one, statistic)].attrs = {
-                    "units": udunits(one.unit),
-                    "long_name": f"{one.meaning}{more}",
-                }
-    for axis in axes:
-        units = {"units": udunits(axis.unit)} if udunits(axis.unit) else {}
-        result[axis.name].attrs = {"long_name": ", ".join(axis.places), **units}
-    if "time" in result.coords:
-        result["time"].attrs = {"units": "s", "long_name": "time"}
+def _rows(points: Sequence[Point | None], name: str, statistic: str, inner: tuple[int, ...]) -> np.ndarray:
+    """Values of points, shape (points, *inner); nan where there are none."""
+    rows = np.full((len(points), *inner), np.nan)
+    for k, point in enumerate(points):
+        if point is not None and name in getattr(point, statistic):
+            rows[k] = getattr(point, statistic)[name]
+    return rows

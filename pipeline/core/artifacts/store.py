@@ -135,7 +135,8 @@ class Store:
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else _written(path, content)
-            said = {name: str(value) for name, value in _attributes(product).items() if name in REPORTED and value}
+            attributes = getattr(product.get(MAIN), "attrs", {})  # none where it is no dataset
+            said = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
             record = Record(stage, key, digests, dict(facts), said, computed_by or {})
             publish(self.path(stage, key, "json"), checked(record.table()))
         return record
@@ -279,7 +280,8 @@ def read_record(path: Path) -> Record | None:
     """The record in a file; None when there is none, it is damaged, or it cannot be understood."""
     try:
         table = read_checked(path) or {}
-        files, facts, *others = (_texts(table.get(name, {})) for name in ("files", "facts", "said", "computed_by"))
+        named = (table.get(name, {}).items() for name in ("files", "facts", "said", "computed_by"))
+        files, facts, *others = ({str(name): str(value) for name, value in texts} for texts in named)
         record = Record(str(table["stage"]), str(table["key"]), files, facts, *others)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
@@ -288,18 +290,9 @@ def read_record(path: Path) -> Record | None:
     return record if inside and (record.files or record.key == FAMILY) else None
 
 
-def _texts(table: Mapping[object, object]) -> dict[str, str]:
-    return {str(name): str(value) for name, value in table.items()}
-
-
 def _partial(shown: Path) -> Path:
     """Where what is left of a stopped run is, next to the shown file of a whole one."""
     return shown.with_name(f"{shown.stem}{PARTIAL}{shown.suffix}")
-
-
-def _attributes(product: Product) -> Mapping[str, object]:
-    """Attributes of the main file; none where it is no dataset."""
-    return getattr(product.get(MAIN), "attrs", {})
 
 
 def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:

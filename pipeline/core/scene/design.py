@@ -31,7 +31,11 @@ class Axis:
     def coordinate(self) -> list[float] | list[str]:
         """The values as numbers in SI; as text where they are none."""
         numeric = all(_is_number(value) for value in self.values)
-        return [number_and_unit(v)[0] for v in self.values] if numeric else [_text(v) for v in self.values]
+        return (
+            [number_and_unit(v)[0] for v in self.values]
+            if numeric
+            else [v if isinstance(v, str) else repr(v) for v in self.values]
+        )
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,3 @@ def _is_number(value: Value) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _text(value: Value) -> str:
-    return value if isinstance(value, str) else repr(value)

@@ -1,7 +1,7 @@
 """What each integrator is, said once: for scenes, stages, studies and refusals, which must not import its code.
 
 To add one: a module of `pipeline.dynamics.integrate` with a `METHOD` (`pipeline.dynamics.integrate.method`), and a line
-in `INTEGRATORS`. A method with parameters of its own also has a model in `pipeline.core.scene.solver`.
+in `INTEGRATORS`. A method with parameters of its own also has their keys in `pipeline.core.scene.solver`.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ It looks at the plain table, so that a scene with other mistakes is searched, to
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from itertools import product
 from typing import Any
 
 from flexclear.pipeline.core.scene.registry import suggestion
@@ -13,6 +14,9 @@ from flexclear.pipeline.core.system.errors import InputError
 
 #: names of the frames in the mesh recipe of this path; None where that cannot be determined
 Recipe = Callable[[str], Collection[str] | None]
+#: keys of parts that name frames, and joints, alone or in front of a coordinate
+FRAMES = (("joint", "between"), ("load", "between"), ("drive", "frame"), ("load", "frame"))
+JOINTS = (*product(("drive", "load", "stop"), ("joint", "actuators")), ("gear", "first"), ("gear", "second"))
 
 
 def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
@@ -20,9 +24,10 @@ def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputE
     frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
     joints = [name for name, _ in _tables(table.get("joint"))]
     errors: list[InputError] = []
-    for where, name in _named_frames(table):
+    for where, name in _named(table, FRAMES):
         errors += _frame(f"{path} [{where}]", name, frames)
-    for where, name in _named_joints(table):
+    for where, text in _named(table, JOINTS):
+        name = text if where.endswith(".joint") else text.partition(".")[0]
         if name not in joints:
             errors.append(InputError(f"{path} [{where}]", f"there is no joint '{name}'", suggestion(name, joints)))
     ensemble = table.get("ensemble")
@@ -75,27 +80,11 @@ def _interfaces(where: str, body: Mapping[str, Any], frames: Collection[str] | N
 
 
 def _texts(value: object) -> list[str]:
-    return [name for name in value if isinstance(name, str)] if isinstance(value, (list, tuple)) else []
+    values = value if isinstance(value, (list, tuple)) else [value]
+    return [name for name in values if isinstance(name, str)]
 
 
-def _named_frames(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for family in ("joint", "load"):
+def _named(table: Mapping[str, Any], keys: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    for family, key in keys:
         for name, part in _tables(table.get(family)):
-            yield from ((f"{family}.{name}.between", frame) for frame in _texts(part.get("between")))
-    for family in ("drive", "load"):
-        for name, part in _tables(table.get(family)):
-            if isinstance(part.get("frame"), str):
-                yield f"{family}.{name}.frame", part["frame"]
-
-
-def _named_joints(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for family in ("drive", "load", "stop"):
-        for name, part in _tables(table.get(family)):
-            if isinstance(part.get("joint"), str):
-                yield f"{family}.{name}.joint", part["joint"]
-            for actuator in _texts(part.get("actuators")):
-                yield f"{family}.{name}.actuators", actuator.partition(".")[0]
-    for name, part in _tables(table.get("gear")):
-        for key in ("first", "second"):
-            if isinstance(part.get(key), str):
-                yield f"gear.{name}.{key}", part[key].partition(".")[0]
+            yield from ((f"{family}.{name}.{key}", text) for text in _texts(part.get(key)))

@@ -33,7 +33,7 @@ from flexclear.pipeline.core.scene.parts import (
     Stop,
 )
 from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
-from flexclear.pipeline.core.scene.solver import NAMING, PlainIntegrator, Solver
+from flexclear.pipeline.core.scene.solver import NAMING, Solver
 from flexclear.pipeline.core.scene.start import Start
 from flexclear.pipeline.core.scene.units import any_quantity, measured, quantity
 from flexclear.pipeline.core.system import file_names
@@ -206,7 +206,7 @@ class Scene(Part):
     """begin and end of the run"""
     start: Start | None = None
     """how the run begins, beyond poses and velocities of bodies"""
-    solver: Solver = PlainIntegrator()
+    solver: Solver = Solver()
     """integrator and tolerance"""
     output: Output = Output()
     """what is recorded"""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
+from pydantic import Field, WithJsonSchema, model_validator
 
 from flexclear.pipeline.core.scene.fields import Number, Part, Time
 from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS
@@ -11,12 +11,14 @@ from flexclear.pipeline.core.scene.registry import suggestion
 
 #: keys by which a scene says how it is integrated
 NAMING = ("integrator", "rtol", "step")
+#: keys of the integrators that have parameters of their own: which one, and its default
+OWN: Mapping[str, tuple[str, float]] = {"rho_inf": ("generalized-alpha", 0.8)}
 
 
-class Stepping(Part):
-    """What all integrators have."""
+class Solver(Part):
+    """An integrator and its tolerance."""
 
-    integrator: str
+    integrator: Annotated[str, WithJsonSchema({"type": "string", "enum": list(INTEGRATORS)})] = DEFAULT
     """name, as docs/integrators.md lists them"""
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
     """relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations"""
@@ -33,6 +35,22 @@ class Stepping(Part):
     by_need: bool | None = None
     """whether an expensive run gets another integrator and tolerance, where the scene has no `[accuracy]`; by default
     it does where `[solver]` gives neither of them and no step"""
+    rho_inf: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
+    """of generalized-alpha alone: spectral radius at infinite frequency, 1 damps nothing; default 0.8"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, table: Any) -> Any:
+        """Refuse a name that no integrator has, and a parameter that belongs to another one."""
+        if not isinstance(table, Mapping):
+            return table
+        name = str(table.get("integrator", DEFAULT))
+        if name not in INTEGRATORS:
+            raise ValueError(f"no integrator is called '{name}'; {suggestion(name, INTEGRATORS)}")
+        for key, (owner, _) in OWN.items():
+            if table.get(key) is not None and owner != name:
+                raise ValueError(f"{key} belongs to {owner}, {name} does not have it: remove it")
+        return {key: default for key, (owner, default) in OWN.items() if owner == name} | dict(table)
 
     @model_validator(mode="after")
     def _located_unless_fixed(self) -> Self:
@@ -47,54 +65,7 @@ class Stepping(Part):
         return self
 
 
-class GeneralizedAlpha(Stepping):
-    """Implicit structural integrator;"""
-
-    integrator: Literal["generalized-alpha"]
-    """name, as docs/integrators.md lists them"""
-    rho_inf: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.8
-    """spectral radius at infinite frequency, 1 damps nothing"""
-
-
-#: models of the integrators that have parameters of their own
-OWN: Mapping[str, type[Stepping]] = {"generalized-alpha": GeneralizedAlpha}
-PLAIN = [name for name in INTEGRATORS if name not in OWN]
-
-
-class PlainIntegrator(Stepping):
-    """Every integrator without parameters of its own."""
-
-    integrator: Annotated[str, WithJsonSchema({"type": "string", "enum": PLAIN})] = DEFAULT
-    """name, as docs/integrators.md lists them"""
-
-
-def _known(value: Any) -> Any:
-    """Refuse a name that no integrator has, and a parameter that belongs to another one."""
-    if isinstance(value, Mapping):
-        name = str(value.get("integrator", DEFAULT))
-        if name not in INTEGRATORS:
-            raise ValueError(f"no integrator is called '{name}'; {suggestion(name, INTEGRATORS)}")
-        for owner, model in OWN.items():
-            for key in model.model_fields.keys() - Stepping.model_fields.keys():
-                if key in value and owner != name:
-                    raise ValueError(f"{key} belongs to {owner}, {name} does not have it: remove it")
-    return value
-
-
-def _tag(value: Any) -> str:
-    """Tag of the model that knows the named integrator; in angles, because error messages leave those out."""
-    name = value.get("integrator", DEFAULT) if isinstance(value, Mapping) else getattr(value, "integrator", DEFAULT)
-    return f"<{name}>" if name in OWN else "<plain>"
-
-
-Solver = Annotated[
-    Annotated[PlainIntegrator, Tag("<plain>")] | Annotated[GeneralizedAlpha, Tag("<generalized-alpha>")],
-    Discriminator(_tag),
-    BeforeValidator(_known),
-]
-
-
-def of_run(solver: Stepping, by_need: bool, attributes: Mapping[str, Any]) -> tuple[str, float]:
+def of_run(solver: Solver, by_need: bool, attributes: Mapping[str, Any]) -> tuple[str, float]:
     """Integrator and relative tolerance that a finished run began with.
 
     solver, by_need: of its scene.  attributes: of its dataset, which count where the scene left them open.

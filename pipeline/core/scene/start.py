@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Number, OnCoordinate, Part, PartName, given
 
@@ -50,16 +50,8 @@ class ModalStart(Part):
     """their rates [m/s]; without them, the bodies'"""
 
 
-class _Either:
-    """Lets the JSON schema say that both forms are written."""
-
-    @staticmethod
-    def __get_pydantic_json_schema__(schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        several = handler(schema)
-        return {"anyOf": [several["additionalProperties"], several]}
-
-
-JointStarts = Annotated[dict[str, JointStart], BeforeValidator(_coordinates), _Either()]
+_ONE_OR_SEVERAL = BeforeValidator(_coordinates, json_schema_input_type=JointStart | dict[str, JointStart])
+JointStarts = Annotated[dict[str, JointStart], _ONE_OR_SEVERAL]
 
 
 class Branch(OnCoordinate):
@@ -87,7 +79,9 @@ class Start(Part):
     """of joints, by name; those with several coordinates by the coordinate's name below"""
     modal: dict[PartName, ModalStart] = Field(default_factory=dict)
     """of flexible bodies, by name"""
-    branch: Annotated[tuple[Branch, ...], BeforeValidator(_several)] = ()
+    branch: Annotated[
+        tuple[Branch, ...], BeforeValidator(_several, json_schema_input_type=Branch | tuple[Branch, ...])
+    ] = ()
     """in a change point, which of the branches that cross there the motion takes; with several loops a list, each
     choosing among what those before it have left"""
 

@@ -49,8 +49,6 @@ TAGS = {
     "MeshedRigidBody": ("meshed",),
     "JointDrive": ("joint-drive",),
     "PathDrive": ("path-drive",),
-    "PlainIntegrator": ("<plain>",),
-    "GeneralizedAlpha": ("<generalized-alpha>",),
     "RatioPerMode": ("RatioPerMode",),
     "Rayleigh": ("Rayleigh",),
 }

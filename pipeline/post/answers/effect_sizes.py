@@ -191,16 +191,10 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         dataset = dataset.isel(effect=alone, other=alone)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
-    columns = min(2, len(chosen))
-    rows = -(-len(chosen) // columns)
     kinds = [kind for kind in ("dropped", "added") if kind in dataset]
     with style.style():
-        height = 1.1 + rows * (0.9 + 0.3 * len(names))
-        figure, axes = style.grid(rows, columns, (10.0, height), sharey=True)
-        for k, panel in enumerate(axes.flat):
-            if k >= len(chosen):
-                panel.set_visible(False)
-                continue
+        figure, axes = style.panels(len(chosen), min(2, len(chosen)), 10.0, 1.1, 0.9 + 0.3 * len(names), sharey=True)
+        for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
                 values = dataset[kind].values[:, k]
                 place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
@@ -219,9 +213,10 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
-            least = min((bar.get_width() for bar in panel.patches if bar.get_width() > 0.0), default=0.0)
-            if least > 0.0:  # bars that begin near their ends would make small differences look large
-                panel.set_xlim(left=0.1 * least)
+            sizes = np.array([dataset[kind].values[:, k] for kind in kinds])
+            drawn = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+            if len(drawn):  # bars that begin near their ends would make small differences look large
+                panel.set_xlim(left=0.1 * float(drawn.min()))
             if requested and np.isfinite(requested.get(chosen[k], np.nan)):
                 panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
             low, high = panel.get_xlim()
@@ -231,7 +226,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 panel.xaxis.set_minor_formatter(NullFormatter())
             panel.set_yticks(np.arange(len(names)), names, fontsize=7.6)
             panel.set_title(f"{chosen[k]} [{dataset['unit'].values[k]}]")
-        axes.flat[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and room for the last without a bar
+        axes[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and room for the last without a bar
         style.heading(figure, title)
-        style.shared_legend(figure, axes.flat[0], 3)
+        style.shared_legend(figure, axes[0], 3)
         return style.files(name, figure)

@@ -163,9 +163,10 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     undone = [f"The budget did not reach {result.attrs['undone']}."] if result.attrs["undone"] else []
     if not single.sizes["effect"]:
         return " ".join(undone) or "The scene has no effect that could be taken away."
-    levels = [("The requested accuracy", _limits(result, requested))] if requested else [
-        (f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS
-    ]  # fmt: skip
+    levels = [(f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
+    if requested:
+        asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
+        levels = [("The requested accuracy", asked)]
     said, before, calm = list[str](), list[str](), list[str]()
     for name, limits in levels:
         now, perhaps = _called_for(single, limits)
@@ -182,10 +183,6 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     said += [f"{name} calls for {more}." for name in calm[:1]]
     said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
     return " ".join(said + undone)
-
-
-def _limits(result: xr.Dataset, requested: Mapping[str, float]) -> np.ndarray:
-    return np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
 
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:

@@ -10,7 +10,9 @@ import xarray as xr
 
 from flexclear.pipeline.post.cost.causes import CAUSES, dominant
 from flexclear.pipeline.post.cost.study import methods, recording, resolved
+from flexclear.pipeline.post.cost.work_precision import LOOKS
 from flexclear.pipeline.post.overview.curves import size_of
+from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
 
 #: a setting that is as accurate as the scene's own is named where it costs less than this fraction
@@ -93,9 +95,6 @@ def undone(study: xr.Dataset) -> list[str]:
 
 def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
     """``<name>.png`` and ``.svg``: the largest error of any quantity against processor time, this scene as a star."""
-    from flexclear.pipeline.post.cost.work_precision import LOOKS
-    from flexclear.pipeline.post.plotting import style
-
     by_method: dict[str, list[Choice]] = {}
     for choice in choices(study):
         by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
@@ -248,7 +247,8 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
         best = min(choices(one), key=lambda c: c.error, default=NOTHING)
-        cells = (_cell(cheapest(one, target), _absent(study)) for target in TARGETS)
+        best_for = [cheapest(one, target) for target in TARGETS]
+        cells = (f"{c.name} ({c.seconds:.2g} s)" if c is not None else _absent(study) for c in best_for)
         rows.append((str(name), *cells, f"{best.error:.1e}"))
     heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
     return Table(title, heads, tuple(rows), ("In brackets: processor time of the integration of one run.",))
@@ -257,10 +257,6 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
 def _absent(study: xr.Dataset) -> str:
     """What is said of an accuracy that no run of a study has."""
     return "cannot be had" if study.attrs.get("complete", 1) else "not reached yet"
-
-
-def _cell(choice: Choice | None, absent: str) -> str:
-    return absent if choice is None else f"{choice.name} ({choice.seconds:.2g} s)"
 
 
 @dataclass(frozen=True, slots=True)

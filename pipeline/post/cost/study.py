@@ -115,7 +115,8 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         mine = [p for p in points if p.group == group]
         if not mine:
             continue
-        values = {factor: _sorted({p.factors[factor] for p in mine}) for factor in factors}
+        every = {factor: {p.factors[factor] for p in mine} for factor in factors}
+        values = {name: sorted(of, reverse=all(isinstance(v, float) for v in of)) for name, of in every.items()}
         coordinates |= values
         over, each = partial(_over_factors, values, mine, runs), (len(chosen),)
         distance = over(lambda run: np.nan if asis is None else errors(run, asis), each)
@@ -212,10 +213,6 @@ def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
 def relative(error: float, scale: float) -> float:
     """An error as a fraction of a size; the error itself where there is no size."""
     return error / scale if scale > 0.0 else error
-
-
-def _sorted(values: set[Any]) -> list[Any]:
-    return sorted(values, reverse=all(isinstance(v, float) for v in values))
 
 
 def _described(points: Sequence[Point], group: str) -> str:

@@ -131,7 +131,7 @@ def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
 def scaled(largest: float, unit: str) -> tuple[float, str]:
     """Factor and unit in which values up to `largest` [SI] have digits before the point."""
     choices = PREFIXES.get(unit, ((1.0, unit),))
-    good = [pair for pair in choices if pair[0] * largest >= 1.0]
+    good = [pair for pair in choices if pair[0] * largest >= 1.0 - 1e-9]  # a bar of 1 mm may be less by rounding
     return good[0] if good else choices[-1] if largest > 0.0 else choices[0]
 
 

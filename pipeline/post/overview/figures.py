@@ -96,18 +96,15 @@ def _sheet(
 
     heading: title, and what is below it.  height: of a row (inches).  legend: columns of the one legend.
     """
-    rows = -(-len(panels) // columns)
-    figure, axes = style.grid(rows, columns, (width, 0.9 + height * rows), sharex=True, **options)
-    for panel, (title, lines) in zip(axes.flat, panels, strict=False):
+    figure, axes = style.panels(len(panels), columns, width, 0.9, height, sharex=True, **options)
+    for panel, (title, lines) in zip(axes, panels, strict=True):
         for label, (values, look) in lines.items():
             panel.plot(1e3 * time, values, label=label, **look)
         panel.set(title=title, xlim=(1e3 * time[0], 1e3 * time[-1]))
-    for panel in axes.flat[len(panels) :]:
-        panel.set_visible(False)
-    for panel in axes[-1]:
+    for panel in figure.axes[-columns:]:
         panel.set_xlabel("time (ms)")
     if legend:
-        style.shared_legend(figure, axes[0, 0], legend)
+        style.shared_legend(figure, axes[0], legend)
     style.heading(figure, *heading)
     return style.files(name, figure)
 
@@ -212,10 +209,12 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     ball the two axes of the socket along which the centre moves most.
     """
     offset = 1e3 * _without_noise(run, run["contact_offset"].values[:, contact], "m")
-    i, j = _plane(run, offset, contact)
+    moving = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
+    i, j = PLANES.get(_type(run, contact), moving)
     radius = 1e3 * clearance
     if _type(run, contact) == "ball-on-plane":  # which has a floor and no socket
-        axes.axhline(1e3 * _ball(run, contact), color="#a8a8a8", lw=1.0)
+        joint = parameters(run)["joint"][str(run["contact"].values[contact])]
+        axes.axhline(1e3 * float(joint["ball_radius"]), color="#a8a8a8", lw=1.0)
         axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
         axes.plot(offset[-1:, i], offset[-1:, j], "o", color="#009E73", ms=4)  # of a ball that stays where it is
         axes.margins(y=0.15)
@@ -239,19 +238,9 @@ def centre(run: xr.Dataset, contact: int) -> str:
     return f"centre {HOLDERS.get(_type(run, contact), 'in its socket')} (mm)"
 
 
-def _ball(run: xr.Dataset, contact: int) -> float:
-    """Radius of a ball [m]."""
-    return float(parameters(run)["joint"][str(run["contact"].values[contact])]["ball_radius"])
-
-
 def _type(run: xr.Dataset, contact: int) -> str:
     joint = parameters(run).get("joint", {}).get(str(run["contact"].values[contact]), {})
     return str(joint.get("type", ""))
-
-
-def _plane(run: xr.Dataset, offset: np.ndarray, contact: int) -> tuple[int, int]:
-    i, j = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
-    return PLANES.get(_type(run, contact), (i, j))
 
 
 def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:

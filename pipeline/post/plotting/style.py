@@ -96,10 +96,12 @@ def grid(rows: int, columns: int, size: tuple[float, float], **options: Any) -> 
     return plt.subplots(rows, columns, figsize=size, squeeze=False, **options)
 
 
-def panels(count: int, columns: int, width: float, above: float, height: float) -> tuple[Figure, list[Axes]]:
+def panels(
+    count: int, columns: int, width: float, above: float, height: float, **options: Any
+) -> tuple[Figure, list[Axes]]:
     """A figure and the axes of so many panels, row by row; above: what the figure is higher than its rows (inches)."""
     rows = -(-count // columns)
-    figure, axes = grid(rows, columns, (width, above + height * rows))
+    figure, axes = grid(rows, columns, (width, above + height * rows), **options)
     for left in axes.flat[count:]:
         left.set_visible(False)
     return figure, list(axes.flat[:count])

@@ -48,7 +48,7 @@ def as_markdown(table: Table) -> str:
 def pipe_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Markdown that reads the same on a terminal: the first column is text, the others are numbers."""
     width = [max(3, *(len(row[i]) for row in (columns, *rows))) for i in range(len(columns))]
-    rule = "|" + "|".join(_rule(i, w) for i, w in enumerate(width)) + "|"
+    rule = "|".join(["", "-" * (width[0] + 2), *("-" * (w + 1) + ":" for w in width[1:]), ""])
     return "\n".join([_line(columns, width), rule, *(_line(row, width) for row in rows)])
 
 
@@ -81,7 +81,3 @@ def as_html(table: Table, *, prose: bool = False) -> str:
 def _line(cells: Sequence[str], width: list[int]) -> str:
     padded = (c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(cells, width, strict=True)))
     return "| " + " | ".join(padded) + " |"
-
-
-def _rule(i: int, width: int) -> str:
-    return "-" * (width + 2) if i == 0 else "-" * (width + 1) + ":"

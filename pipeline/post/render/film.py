@@ -13,6 +13,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.post.overview.curves import in_unit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import film_speed, mechanism, ruler
 from flexclear.pipeline.post.render.panel import panel
@@ -79,7 +80,7 @@ def frames(
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
             picture = image(scene)
-            caption.onto(picture, f"{film_speed.speed_text(float(shown.slower[k]))}{larger}, bar: {ruler.words(bar)}")
+            caption.onto(picture, f"{film_speed.speed_text(float(shown.slower[k]))}{larger}, bar: {in_unit(bar, 'm')}")
             picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
             if legend is not None:
                 ruler.with_color_bar(picture, legend)

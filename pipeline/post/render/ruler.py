@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.post.overview.curves import rounded, scaled
+from flexclear.pipeline.post.overview.curves import in_unit, rounded, scaled
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render.mechanism import SOCKET, Mechanism
 from flexclear.pipeline.post.render.view import ANGLE, axes_of, eye
@@ -96,14 +96,6 @@ def with_color_bar(pixels: np.ndarray, bar: np.ndarray) -> np.ndarray:
     return pixels
 
 
-def words(value: float) -> str:
-    """A length [m] in the unit in which it has few digits."""
-    for unit, size in (("km", 1e3), ("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9)):
-        if abs(value) >= 0.9995 * size:
-            return f"{value / size:.4g} {unit}"
-    return f"{value:.3g} m"
-
-
 def ruler(axes: style.Axes, drawn: Mechanism, size: tuple[int, int], margin: int = 0) -> None:
     """A bar of a round length at the lower right; the axes count pixels from the upper left."""
     scale = pixels_per_metre(drawn, size, margin)
@@ -113,4 +105,6 @@ def ruler(axes: style.Axes, drawn: Mechanism, size: tuple[int, int], margin: int
     axes.plot(
         [start, start, start, end, end, end], [y - half, y + half, y, y, y - half, y + half], color=style.INK, lw=1.6
     )
-    axes.text(0.5 * (start + end), y - 13.0, words(metres), fontsize=9.5, color=style.INK, ha="center", va="center")
+    axes.text(
+        0.5 * (start + end), y - 13.0, in_unit(metres, "m"), fontsize=9.5, color=style.INK, ha="center", va="center"
+    )

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.post.overview.curves import in_unit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import forms, mechanism, player, surfaces
 from flexclear.pipeline.post.render.mechanism import Mechanism
-from flexclear.pipeline.post.render.ruler import exaggeration, project, ruler, words
+from flexclear.pipeline.post.render.ruler import exaggeration, project, ruler
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import flat, gravity
 from flexclear.pipeline.post.shapes.body_shape import has_edges
@@ -53,7 +54,7 @@ class Missing:
         """Distance and angle, as a picture says them."""
         distance = float(np.linalg.norm(self.end - self.start))
         turned = f"{np.degrees(self.angle):.3g}° off" if self.angle > 1e-7 else ""
-        return " and ".join(filter(None, [f"gap {words(distance)}" if distance > 0.0 else "", turned]))
+        return " and ".join(filter(None, [f"gap {in_unit(distance, 'm')}" if distance > 0.0 else "", turned]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +184,7 @@ def _marks(
     for name, joint in text.get("joint", {}).items():
         used |= set(joint["between"])
         clear = joint.get("clearance")
-        played = f" {words(clear)}" if clear else ""
+        played = f" {in_unit(clear, 'm')}" if clear else ""
         detail = f"{joint['type']}{played}: {' – '.join(joint['between'])}"
         yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
     for name, drive in text.get("drive", {}).items():

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import stats
 
 #: frequencies that the 0-1 test tries; close to 0 and pi it resonates with slow drifts and with motions of period two
-FREQUENCIES = 100
+FREQUENCIES, SEED = 100, 20190310
 AWAY = np.pi / 5.0
 #: batches of the exponent's confidence interval: enough for a t distribution, few enough to be nearly independent
 BATCHES = 20
@@ -53,7 +53,7 @@ def exponent(growth: np.ndarray, period: float) -> Interval:
     return Interval(mean, mean - half, mean + half)
 
 
-def zero_one(series: np.ndarray, seed: int = 20190310) -> float:
+def zero_one(series: np.ndarray) -> float:
     """K of the 0-1 test, close to 0 for regular and close to 1 for chaotic motion; NaN for a series that is still.
 
     series: one observable, shape (n,), of some hundreds at least.  Its mean is taken off, so that the mean square
@@ -67,7 +67,7 @@ def zero_one(series: np.ndarray, seed: int = 20190310) -> float:
     j, cut = np.arange(1, n + 1), n // 10
     lags = np.arange(1, cut + 1)
     correlations = list[float]()
-    for c in np.random.default_rng(seed).uniform(AWAY, np.pi - AWAY, FREQUENCIES):
+    for c in np.random.default_rng(SEED).uniform(AWAY, np.pi - AWAY, FREQUENCIES):
         path = np.cumsum(x * np.exp(1j * c * j))
         displacement = [float(np.mean(np.abs(path[k : k + n - cut] - path[: n - cut]) ** 2)) for k in lags]
         correlations.append(float(np.corrcoef(lags, displacement)[0, 1]))
@@ -124,15 +124,15 @@ def few_lines(series: np.ndarray) -> float:
     return fraction
 
 
-def principal(states: np.ndarray, count: int = 3) -> np.ndarray:
-    """The states along their directions of largest variance, each component of unit size at first; (n, <= count)."""
+def principal(states: np.ndarray) -> np.ndarray:
+    """The states along their directions of largest variance, each component of unit size at first; (n, <= 3)."""
     centred = states - states.mean(axis=0)
     scale = centred.std(axis=0)
     moving = scale > STANDING * max(float(np.abs(states).max()), 1e-300)
     if not np.any(moving):
         return np.zeros((len(states), 1))
     U, S, _ = np.linalg.svd(centred[:, moving] / scale[moving], full_matrices=False)
-    return (U * S)[:, :count]
+    return (U * S)[:, :3]
 
 
 def autocorrelation(series: np.ndarray, lags: int = 20) -> np.ndarray:
