@@ -13,7 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -54,9 +54,13 @@ _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": 
 
 
 @cache
-def prototype(name: str) -> Any:
-    """The C function type of a compiled function, which Python calls."""
-    return ctypes.CFUNCTYPE(ctypes.c_int64, *(_TYPES[kind] for kind in SIGNATURES[name] if kind != " "))
+def function(name: str, address: int) -> Callable:
+    """A compiled function that Python calls, by its name and where it is; calls let other threads run."""
+    if INTERPRETED:
+        return interpreted[address]
+    types = (_TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
+    made: Callable = ctypes.CFUNCTYPE(ctypes.c_int64, *types)(address)
+    return made
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
@@ -68,10 +72,7 @@ def place(array: np.ndarray, kind: type = np.float64) -> Any:
 
 @dataclass(frozen=True)
 class Entry:
-    """The compiled functions of a mechanism, by their addresses; h must have been given those.
-
-    Calls let other threads run.
-    """
+    """The compiled functions of a mechanism, by their addresses; h must have been given those."""
 
     addresses: Mapping[str, int]
 
@@ -122,16 +123,8 @@ class Entry:
         given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
         self._function("observe")(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
 
-    @cached_property
-    def _known(self) -> dict[str, Callable]:
-        return {}
-
     def _function(self, name: str) -> Callable:
-        function = self._known.get(name)
-        if function is None:
-            address = self.addresses[name]
-            function = self._known[name] = interpreted[address] if INTERPRETED else prototype(name)(address)
-        return function
+        return function(name, self.addresses[name])
 
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
