@@ -68,7 +68,6 @@ def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> E
     from flexclear.pipeline.dynamics.run.run import engine_of
 
     engine = engine_of(scene, reduced, progress)
-    engine.entry.complete()
     consistent_start(engine)
     engine.settle(progress)
     return engine

@@ -65,17 +65,12 @@ def _absent(effect: str) -> Record:
     times = interleaved({label: _evaluation(engine, EVALUATIONS) for label, engine in engines.items()}, ROUNDS)
     return {
         "scene": without.name,
-        "same_code": _code(engines["stripped"]) == _code(engines["without"]),
+        "same_code": engines["stripped"].entry.addresses == engines["without"].entry.addresses,
         "stripped_us": 1e6 * times["stripped"].median,
         "without_us": 1e6 * times["without"].median,
         "ratio": times["stripped"].over(times["without"]),
         "spread": max(t.spread for t in times.values()),
     }
-
-
-def _code(engine: Engine) -> dict[str, int]:
-    """Where each compiled function of an engine is: one and the same is loaded once."""
-    return {**engine.entry.addresses, "late": engine.entry.late.address()}
 
 
 def stripped(full: Mechanism, effect: str) -> Mechanism:

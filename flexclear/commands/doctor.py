@@ -251,4 +251,4 @@ def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress
 
     model = warm(scene, reduced, progress).model
     for scheme in schemes(scene):
-        functions.entry(model.parts, scheme, lambda text: progress(None, text)).complete()
+        functions.entry(model.parts, scheme, lambda text: progress(None, text))

@@ -20,9 +20,8 @@ from flexclear.pipeline.core.workflow import cores, schedule
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.dynamics.compile import compiler_process, folder, functions, sources
+from flexclear.pipeline.dynamics.compile import compiler_process, folder, functions
 from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, loaded, take
-from flexclear.pipeline.dynamics.effects import Parts, Scheme
 from tests.stages.conftest import PATIENCE
 
 SOURCE = """from numba import cfunc
@@ -112,47 +111,6 @@ def held(path: Path, root: Path) -> Iterator[subprocess.Popen[str]]:
             yield at
         finally:
             at.kill()
-
-
-def test_what_is_not_needed_yet_is_not_waited_for(files: list[Path], root: Path) -> None:
-    with held(files[0], root):
-        assert bring(files, lambda _: None, late=files[:1]) == files[:1]
-    assert results(files[1:]) == [11, 12]
-    assert bring(files[:1], lambda _: None, late=files[:1]) == []  # nobody else is at it
-
-
-def test_a_run_begins_while_what_is_recorded_is_still_being_compiled(
-    tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """And waits for it in the end; the second process is there as long as the functions are."""
-    ended: list[bool] = []
-
-    @contextmanager
-    def helper(paths: list[Path]) -> Iterator[None]:
-        yield
-        ended.append(True)
-
-    monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path))
-    monkeypatch.setattr(functions, "second_process", helper)
-    texts = {
-        name: f"NAME = {name!r}\n{SOURCE.format(k=k)}" for k, name in enumerate(("evaluate", "observe", "advance"))
-    }
-    monkeypatch.setattr(sources, "sources", lambda parts, scheme: texts)
-    late = functions._file(folder.writable(kernel_root(), nothing), "observe", texts["observe"])  # type: ignore[arg-type]
-    parts, scheme = Parts(("free",)), Scheme("dop853")
-    with held(late, root):
-        found = functions.entry(parts, scheme, lambda _: None)
-        assert set(found.addresses) == {"evaluate", "advance"}
-        assert late.stem not in loaded
-        assert not ended
-    found.complete()
-    assert results([late]) == [11]
-    assert ended == [True, True]  # of the first call, and of that for what was left
-    ended.clear()
-    del loaded[late.stem]
-    dropped = functions.entry(parts, scheme, lambda _: None)
-    del dropped
-    assert ended == [True]
 
 
 @pytest.mark.parametrize("command", ["raise SystemExit(1)", "import os; os.abort()"])

@@ -12,7 +12,7 @@ import contextlib
 import gc
 import hashlib
 import os
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -47,22 +47,16 @@ SIGNATURES = {
 }
 
 
-def bring(paths: list[Path], tell: Tell, late: Collection[Path] = ()) -> list[Path]:
-    """Load files, compiling them in this order; those that another process is compiling come last.
-
-    late: files that are not waited for.  Those of them that another process is at, when all others are there.
-    """
+def bring(paths: list[Path], tell: Tell) -> None:
+    """Load files, compiling them in this order; those that another process is compiling come last."""
     left = list(paths)
     while left:
         path = next((path for path in left if take(path, tell)), None)
         if path is None:
-            path = next((path for path in left if path not in late), None)
-            if path is None:
-                break
+            path = left[0]
             tell(path)
             take(path, lambda _: None, wait=True)
         left.remove(path)
-    return left
 
 
 def take(path: Path, tell: Tell, *, wait: bool = False) -> bool:

@@ -11,15 +11,12 @@ import ctypes
 import hashlib
 import sys
 import time
-from collections.abc import Callable, Collection, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
-from threading import Lock
 from types import MappingProxyType
 from typing import Any
-from weakref import finalize
 
 import numpy as np
 
@@ -52,16 +49,18 @@ FUNCTIONS: dict[str, tuple[str, int | None]] = {
     SPECIALISED: ("equations of motion of this mechanism alone", None),
     "resolve": ("integrator's events", m.RESOLVE),
 }
-#: what is called first when a run has come to its end: without waiting where the second process is at it
-LATE = "observe"
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
 
 
 @cache
-def prototype(name: str) -> Any:
-    """The C function type of a compiled function, which Python calls."""
-    return ctypes.CFUNCTYPE(ctypes.c_int64, *(_TYPES[kind] for kind in SIGNATURES[name] if kind != " "))
+def function(name: str, address: int) -> Callable:
+    """A compiled function that Python calls, by its name and where it is; calls let other threads run."""
+    if INTERPRETED:
+        return interpreted[address]
+    types = (_TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
+    made: Callable = ctypes.CFUNCTYPE(ctypes.c_int64, *types)(address)
+    return made
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
@@ -73,15 +72,9 @@ def place(array: np.ndarray, kind: type = np.float64) -> Any:
 
 @dataclass(frozen=True)
 class Entry:
-    """The compiled functions of a mechanism, by their addresses; h must have been given those.
-
-    Calls let other threads run.
-
-    late: where `LATE` is, when it is there.
-    """
+    """The compiled functions of a mechanism, by their addresses; h must have been given those."""
 
     addresses: Mapping[str, int]
-    late: Late
 
     def connect(self, h: np.ndarray) -> None:
         """Write into the header where this process has put the functions that others call."""
@@ -128,22 +121,10 @@ class Entry:
     ) -> None:
         """Evaluate what is recorded of every row."""
         given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
-        self._function(LATE)(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
-
-    def complete(self) -> None:
-        """Wait for what is still being compiled."""
-        self.late.address()
-
-    @cached_property
-    def _known(self) -> dict[str, Callable]:
-        return {}
+        self._function("observe")(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
 
     def _function(self, name: str) -> Callable:
-        function = self._known.get(name)
-        if function is None:
-            address = self.late.address() if name == LATE else self.addresses[name]
-            function = self._known[name] = interpreted[address] if INTERPRETED else prototype(name)(address)
-        return function
+        return function(name, self.addresses[name])
 
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
@@ -152,22 +133,6 @@ def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple
 
 def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple:
     return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
-
-
-class Late:
-    """A function that may still be in the making, in a process that ends with this one."""
-
-    def __init__(self, path: Path, bring_it: Callable[[], None], helpers: ExitStack) -> None:
-        self._path, self._bring, self._making = path, bring_it, Lock()
-        self._end = finalize(self, helpers.close)
-
-    def address(self) -> int:
-        """Where it is, once it is there."""
-        with self._making:  # members of ensembles run side by side
-            if self._end.alive:
-                self._bring()
-                self._end()
-        return loaded[self._path.stem].address
 
 
 def entry(
@@ -183,20 +148,12 @@ def entry(
     folder, began = writable(kernel_root(), tell), time.monotonic()
     texts = {**sources.sources(parts, scheme), **equations}
     files = {name: _file(folder, name, source) for name, source in texts.items()}
-    with ExitStack() as helpers:
-        late = files[LATE]
-
-        def bring_late() -> None:
-            with ExitStack() as more:
-                _bring(folder, {LATE: late}, tell, began, more)
-
-        _bring(folder, files, tell, began, helpers, {late})
-        if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
-            kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
-            _bring(folder, kernels, tell, began, helpers)
-            files |= kernels
-        left = Late(late, bring_late, helpers.pop_all())
-    return Entry({name: loaded[path.stem].address for name, path in files.items() if path != late}, left)
+    _bring(folder, files, tell, began)
+    if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
+        kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
+        _bring(folder, kernels, tell, began)
+        files |= kernels
+    return Entry({name: loaded[path.stem].address for name, path in files.items()})
 
 
 def straight(name: str, source: str, tell: Callable[[str], None]) -> int:
@@ -204,29 +161,18 @@ def straight(name: str, source: str, tell: Callable[[str], None]) -> int:
     there is none of several lanes or with changes."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     path = _file(folder, name, source)
-    with ExitStack() as helpers:
-        _bring(folder, {name: path}, tell, began, helpers)
+    _bring(folder, {name: path}, tell, began)
     return loaded[path.stem].address
 
 
-def _bring(
-    folder: Path,
-    files: Mapping[str, Path],
-    tell: Callable[[str], None],
-    began: float,
-    helpers: ExitStack,
-    late: Collection[Path] = (),
-) -> None:
-    """Load files by the names of their functions, from disk or compiled there.
-
-    helpers: gets the second process, where there is one.  late: files of which that may still be at work.
-    """
+def _bring(folder: Path, files: Mapping[str, Path], tell: Callable[[str], None], began: float) -> None:
+    """Load files by the names of their functions, from disk or compiled there."""
     names = {path: name for name, path in files.items() if path.stem not in loaded}
     requested = sorted(names, key=lambda path: [*FUNCTIONS].index(names[path]))
     with disk_limits(folder):
         missing = [path for path in requested if not compiled(path)]
-        helpers.enter_context(second_process(missing[::-1]))
-        bring(requested, lambda path: _announce(tell, FUNCTIONS[names[path]][0], began), late)
+        with second_process(missing[::-1]):
+            bring(requested, lambda path: _announce(tell, FUNCTIONS[names[path]][0], began))
         if missing:
             prune(folder)
 

@@ -1,4 +1,7 @@
-"""Ball above a plane, which is that of x and y of the outer frame; z points out of the ground towards the ball."""
+"""Ball above a plane, which is that of x and y of the outer frame; z points out of the ground towards the ball.
+
+Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,6 @@ def separation(axes, numbers, p, v):
     return height - numbers.radius, -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
 
 
-#: source: Wang & Wang (2019), eq. (26), with a plane for the socket
 stiffness = published({1.5: plane_stiffness})
 
 

@@ -9,6 +9,8 @@ Exponent 1.5: K [N/m^1.5] of two spheres of these radii, as is usual for revolut
 clearance (Flores et al. 2008, sec. 3.1, after Lankarani & Nikravesh); the length does not enter.
 Exponent 1: two parallel cylinders; the radii do not enter. Both hold while the contact's
 half-width is small against the pin's radius (below about 0.3 of it).
+Source: Wang & Wang (2019), eq. (26), of spheres; Popov (2017), Contact Mechanics and Friction, sec. 5.3, of
+cylinders.
 """
 
 from __future__ import annotations
@@ -33,7 +35,6 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, p
 
 
-#: sources: Wang & Wang (2019), eq. (26), of spheres; Popov (2017), Contact Mechanics and Friction, sec. 5.3
 stiffness = published({1.0: cylinder_stiffness, 1.5: sphere_stiffness})
 
 

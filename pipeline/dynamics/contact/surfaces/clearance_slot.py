@@ -5,6 +5,7 @@ beyond them from the end. Axial motion and tilt are held as a planar joint holds
 
 The walls are planes; the round ends are given their stiffness. Exponent 1.5: K of a sphere on a plane, as is usual for
 revolute joints (see `clearance_revolute`). Exponent 1: a cylinder on a plane.
+Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
 """
 
 from __future__ import annotations
@@ -31,7 +32,6 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, across
 
 
-#: source: Wang & Wang (2019), eq. (26), with a plane for the socket
 stiffness = published({1.0: cylinder_stiffness, 1.5: plane_stiffness})
 
 

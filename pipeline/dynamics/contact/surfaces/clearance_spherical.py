@@ -1,6 +1,7 @@
 """Ball in a socket with clearance: the surfaces part along the line of centres, in space.
 
 Nothing but the contact (`contact.forces`) joins the bodies.
+Source: Wang & Wang (2019), eq. (26).
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, p
 
 
-#: source: Wang & Wang (2019), eq. (26)
 stiffness = published({1.5: sphere_stiffness})
 
 

@@ -38,7 +38,7 @@ class LaneGroup:
 
     def __init__(self, rows: bytes, address: int, numbers: int, width: int) -> None:
         self.rows = rows
-        self._run = functions.prototype("lanes")(address)
+        self._run = functions.function("lanes", address)
         self._table = np.zeros(m.LANES_HEAD + m.LANE_WORDS * width, np.int64)
         self._words = self._table[m.LANES_HEAD :].reshape(width, m.LANE_WORDS)
         self._places = np.zeros(7 * width, np.int64)
