@@ -10,7 +10,7 @@ from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene import units
 from flexclear.pipeline.core.scene.fields import Inertia, Position
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.units import UNITS, quantity, unit
+from flexclear.pipeline.core.scene.units import UNITS, unit
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.assembly import assembled
 from flexclear.pipeline.dynamics.model.mechanism import build
@@ -142,22 +142,6 @@ law = "0.305 m"
         assembled(build(load_scene(path), {}))
     assert "[drive.far.law]" in str(error.value)
     assert "out of reach" in str(error.value)
-
-
-@pytest.mark.parametrize(
-    "text, dimension, value",
-    [
-        ("3 N*mm/deg", "torsional stiffness", 3e-3 * 57.29577951308232),
-        ("2 kg·m²", "inertia", 2.0),
-        ("9810 mm/s²", "acceleration", 9.81),
-        ("1 mm/ms^2", "acceleration", 1000.0),
-        ("4 g cm^2", "inertia", 4e-7),
-        ("210000 N/mm^2", "pressure", 2.1e11),
-        ("1 rev/min", "angular velocity", 0.10471975511965977),
-    ],
-)
-def test_products_of_units_are_understood(text: str, dimension: str, value: float) -> None:
-    assert quantity(text, dimension) == pytest.approx(value, rel=1e-14)
 
 
 @pytest.mark.parametrize("moments", [(0.0, 1e-5, 1e-5), (1e-5, 1e-5, 2e-5), (1e-5, 2e-5, 2.5e-5)])

@@ -128,6 +128,13 @@ def test_a_line_that_holds_no_quantity_is_left_to_the_reader_of_toml(tmp_path: P
         ("1 h", "time", 3600.0),
         ("600 rpm", "angular velocity", 20.0 * np.pi),
         ("30 deg/s", "angular velocity", np.pi / 6.0),
+        ("1 rev/min", "angular velocity", np.pi / 30.0),
+        ("3 N*mm/deg", "torsional stiffness", 3e-3 * 180.0 / np.pi),
+        ("2 kg·m²", "inertia", 2.0),
+        ("4 g cm^2", "inertia", 4e-7),
+        ("9810 mm/s²", "acceleration", 9.81),
+        ("1 mm/ms^2", "acceleration", 1000.0),
+        ("210000 N/mm^2", "pressure", 2.1e11),
     ],
 )
 def test_units_that_users_of_mechanisms_write(text: str, dimension: str, value: float | None) -> None:

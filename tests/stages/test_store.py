@@ -305,27 +305,29 @@ def test_what_the_dead_left_is_swept_and_what_is_held_stays(store: Store):
     assert not (folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp").exists()
 
 
-def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.fixture
+def forced(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Files and folders in the order in which they are forced to the disk."""
+    found: list[Path] = []
+    real = os.fsync
+
+    def noted(handle: int) -> None:
+        found.append(Path(os.readlink(f"/proc/self/fd/{handle}")))
+        real(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    return found
+
+
+def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, forced: list[Path]):
     """The folder is forced to the disk after the file has got its name there."""
-    forced: list[str] = []
-    real = os.fsync
-    monkeypatch.setattr(
-        os, "fsync", lambda handle: (forced.append(os.readlink(f"/proc/self/fd/{handle}")), real(handle))
-    )
     publish(tmp_path / "a.bin", b"content")
-    assert forced[0].endswith(".tmp")
-    assert forced[1:] == [str(tmp_path)]
+    assert forced[0].suffix == ".tmp"
+    assert forced[1:] == [tmp_path]
 
 
-def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(
-    store: Store, monkeypatch: pytest.MonkeyPatch
-):
+def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(store: Store, forced: list[Path]):
     """Each takes milliseconds of a disk, and an artifact is what has a record."""
-    forced: list[Path] = []
-    real = os.fsync
-    monkeypatch.setattr(
-        os, "fsync", lambda handle: (forced.append(Path(os.readlink(f"/proc/self/fd/{handle}"))), real(handle))
-    )
     store.put("simulate", KEY, {"nc": dataset()}, {})
     folder = store.path("simulate", KEY, "nc").parent
     assert [path.parent for path in forced[:2]] == [folder, folder]
