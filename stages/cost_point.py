@@ -6,22 +6,20 @@ The cost of a point is that of its integration: the record is of as many rows at
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import parse
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.platforms import peak_memory
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.kernels import warm
 from flexclear.stages.simulation import bundles, rebuild
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
 from flexclear.pipeline.post.cost.causes import causes_of
 from flexclear.pipeline.post.cost.study import Point, assemble, believed, cost, relative_errors, with_reference
 from flexclear.pipeline.post.cost.work_precision import Mark
 from flexclear.pipeline.post.plotting.table import files
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.system.progress import Progress
 
 #: contact events are located to this fraction of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12

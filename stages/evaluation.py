@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.post.answers import stability as checked
 from flexclear.pipeline.post.overview import comparison as compared_runs
 from flexclear.pipeline.post.overview import figures
 from flexclear.pipeline.post.plotting.table import files
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.system.progress import Progress
 
 
 def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -5,20 +5,17 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import graphs, joined, pictures, print_files, scene_arguments, tables
 from flexclear.pipeline.core.artifacts.store import publish
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import EFFECTS, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.pages import Part, page
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, check, open_workplace
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
 
 #: what `--ideal` takes away: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")

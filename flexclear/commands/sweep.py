@@ -10,24 +10,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from flexclear.commands import export, scenes
 from flexclear.commands.export import as_json
+from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.artifacts.store import disk_limits, publish, write_dataset
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep, read_sweep
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages.sweeps import sweep_large, sweep_plan
 from flexclear.stages.sweeps.sweep_engine import Engine, Job, engine
 from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.scene.schema import Scene
 
 #: of the shown files, without their endings
 NAME = "sweep"

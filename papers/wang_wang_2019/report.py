@@ -10,18 +10,16 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 from flexclear.papers.wang_wang_2019 import DOCUMENTS, figures
 from flexclear.papers.wang_wang_2019.published import CITATION, DISCREPANCIES
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.pages import Part, downloads, figures_of, media, page, prose
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, from_markdown
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.system.progress import Progress
 
 #: place, text and scenes
 Assumption = tuple[str, str, tuple[str, ...]]

@@ -8,17 +8,22 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+import xarray as xr
 
 from flexclear.pipeline.core.artifacts import points as results
+from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.artifacts.quantities import regular_times
-from flexclear.pipeline.core.artifacts.store import FAMILY
+from flexclear.pipeline.core.artifacts.store import FAMILY, Record, Store
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.limits import check_members, require_scatter
 from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.registry import module_of
-from flexclear.pipeline.core.scene.schema import Sections
+from flexclear.pipeline.core.scene.schema import Scene, Sections
+from flexclear.pipeline.core.scene.sweep import Sweep
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.machine import instruction_set
 from flexclear.pipeline.core.workflow.task import Task, facts, key
@@ -27,15 +32,6 @@ from flexclear.stages.graph import Graph
 from flexclear.stages.sweeps.sweep_engine import Job
 from flexclear.stages.sweeps.sweep_points import Family as Work
 from flexclear.stages.workplace import Workplace, check
-
-if TYPE_CHECKING:
-    import numpy as np
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.artifacts.store import Record, Store
-    from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.core.scene.sweep import Sweep
 
 #: numeric values of a parameter that are all checked beforehand; of more, the least and the largest
 CHECKED = 200
