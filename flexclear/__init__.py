@@ -6,23 +6,24 @@ looked through.
 """
 
 import os
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if not os.path.isdir(os.path.join(os.path.dirname(__file__), "pipeline")):
     __path__.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
 from flexclear.pipeline.core.system import threads as threads  # isort: skip  (before NumPy is loaded)
-from flexclear import public
-from flexclear.public import __all__ as __all__
 
 if TYPE_CHECKING:
     from flexclear.public import *  # noqa: F403  (listed there)
 
 
 def __getattr__(name: str) -> object:
-    """The functions of `public`, listed there alone, `Scene`, the errors and the version."""
-    return getattr(public, name)
+    """What `public` lists, which is imported when it is asked for, and the version."""
+    if name.startswith("__") and name not in ("__all__", "__version__"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module("flexclear.public"), name)
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    return [*globals(), *import_module("flexclear.public").__all__]

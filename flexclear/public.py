@@ -12,15 +12,24 @@ The same things that the command ``flexclear`` does, from Python::
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from flexclear.commands import answers, scenes
+from flexclear.commands import compare as compare_command
+from flexclear.commands import effects as effects_command
+from flexclear.commands import plan as plan_command
+from flexclear.commands import report as report_command
+from flexclear.commands import show as show_command
+from flexclear.pipeline.core.scene import load
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError, SolverError
+from flexclear.pipeline.core.system.version import version
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import open_workplace, seconds
+
 if TYPE_CHECKING:
     import xarray as xr
-
-    from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError, SolverError
 
 __all__ = [
     "FlexclearError",
@@ -47,19 +56,7 @@ __all__ = [
     "stability",
     "sweep",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """`Scene` and the errors, imported on demand, and the version."""
-    if name.endswith("Error") and name in __all__:
-        return getattr(import_module("flexclear.pipeline.core.system.errors"), name)
-    if name == "Scene":
-        return import_module("flexclear.pipeline.core.scene.schema").Scene
-    if name == "__version__":
-        from flexclear.pipeline.core.system.version import version
-
-        return version()
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__version__ = version()
 
 
 def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
@@ -72,10 +69,7 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
     >>> fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
     <Scene checks/pendulum: 1 rigid body, 1 joint, 1 load; 0 to 0.2 s>
     """
-    from flexclear.pipeline.core.scene.load import load_scene as load
-    from flexclear.pipeline.core.scene.load import scene_of
-
-    return scene_of(source, override) if isinstance(source, Mapping) else load(source, override)
+    return load.scene_of(source, override) if isinstance(source, Mapping) else load.load_scene(source, override)
 
 
 def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
@@ -87,9 +81,7 @@ def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
     >>> fc.edited(fc.load_scene("scenes/checks/pendulum.toml"), {"body.bob.mass": "200 g"}).body["bob"].mass
     0.2
     """
-    from flexclear.pipeline.core.scene.load import edited as changed
-
-    return changed(scene, changes)
+    return load.edited(scene, changes)
 
 
 def run(scene: Scene | str | Path) -> xr.Dataset:
@@ -102,8 +94,6 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     >>> round(float(run["joint_position"].sel(coordinate="hinge")[-1]), 4)  # [rad]
     0.1959
     """
-    from flexclear.commands import scenes
-
     return scenes.run(_loaded(scene))
 
 
@@ -114,8 +104,6 @@ def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models
     take [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets.
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import answers
-
     return answers.dataset("cost", _loaded(scene), budget, models=models)
 
 
@@ -126,8 +114,6 @@ def stability(scene: Scene | str | Path, budget: str | float | None = None) -> x
     singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
     the dataset shows the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import answers
-
     return answers.dataset("stability", _loaded(scene), budget)
 
 
@@ -173,10 +159,6 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
     """
-    from flexclear.commands import scenes
-    from flexclear.stages.graph import Graph
-    from flexclear.stages.workplace import open_workplace
-
     one = _loaded(scene)
     graph = Graph(one, shown=scenes.as_in_its_file(one))
     made = open_workplace().datasets(graph.sections, graph.verdict, jobs=1)
@@ -199,10 +181,6 @@ def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str
     >>> result["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
     (3,)
     """
-    from flexclear.commands import scenes
-    from flexclear.stages.graph import Graph
-    from flexclear.stages.workplace import open_workplace
-
     scenes.examine(one := _loaded(scene))
     return open_workplace().datasets(Graph(one, shown=False).sensitivities(of, to), jobs=1)[0]
 
@@ -239,8 +217,6 @@ def equilibrium(
     >>> round(rest["position"].sel(body="mass", axis="z").item(), 9)  # where its spring is free [m]
     0.25
     """
-    from flexclear.commands import scenes
-
     return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, vibrations=False)
 
 
@@ -263,8 +239,6 @@ def frequencies(
     >>> round(result["frequency"].item(), 4), round(result["damping_ratio"].item(), 6)  # [Hz], [-]
     (1.5836, 0.1)
     """
-    from flexclear.commands import scenes
-
     return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, speeds=speeds, drive=drive)
 
 
@@ -278,9 +252,6 @@ def compare(
     with each of these.  The first run is the reference; its variables are reported in
     `pipeline.post.overview.comparison`. Raises FlexclearError.
     """
-    from flexclear.commands import compare as compare_command
-    from flexclear.stages.workplace import open_workplace
-
     without = "both" if ideal is True else ideal or None
     return compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
 
@@ -293,10 +264,6 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
     important ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows
     the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import answers
-    from flexclear.commands import effects as effects_command
-    from flexclear.stages.workplace import open_workplace
-
     if budget is not None:
         return answers.dataset("matters", _loaded(scene), budget)
     return effects_command.bring(_loaded(scene), open_workplace()).dataset()
@@ -314,17 +281,11 @@ def plan(
     `allowed` there, the `horizon` as a fraction of the run and the `scatter` of single runs.
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import plan as plan_command
-
     return plan_command.dataset(_loaded(scene), accuracy, budget)
 
 
 def render(scene: Scene | str | Path) -> Path:
     """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
-    from flexclear.commands import scenes
-    from flexclear.stages.graph import Graph
-    from flexclear.stages.workplace import open_workplace
-
     scenes.require_names(one := _loaded(scene))
     return open_workplace().made(*Graph(one).render.values(), jobs=1)[0].folder
 
@@ -341,8 +302,6 @@ def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
     >>> [mark.text for mark in seen.view.marks], seen.refused
     (['bob', 'hinge'], None)
     """
-    from flexclear.commands import show as show_command
-
     return show_command.start(_loaded(scene), None if folder is None else Path(folder))
 
 
@@ -352,11 +311,6 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
     whether those are there that take further runs.  Raises FlexclearError.
     """
-    from flexclear.commands import report as report_command
-    from flexclear.commands import scenes
-    from flexclear.stages.graph import Graph
-    from flexclear.stages.workplace import open_workplace, seconds
-
     given = None if budget is None else seconds(budget, "budget")
     scenes.examine(one := _loaded(scene))
     graph = Graph(one, shown=one.path is None or scenes.as_in_its_file(one))
@@ -370,13 +324,9 @@ def open(scene: Scene | str | Path) -> xr.DataTree:
     The path of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that one, under the file's name.
     Nothing is run.  Raises InputError when there is nothing yet, or the file is no dataset of a scene.
     """
-    from flexclear.commands import scenes
-
     return scenes.results(scene)
 
 
 def _loaded(scene: Scene | str | Path) -> Scene:
     """A scene, or the one in a file, or of a name below scenes/."""
-    from flexclear.commands import scenes
-
     return load_scene(scenes.find_scene(str(scene))) if isinstance(scene, (str, Path)) else scene

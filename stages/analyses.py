@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.simulation import bundles, check_run, in_time, rebuild
 
 if TYPE_CHECKING:
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 def ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
-    from flexclear.pipeline.dynamics import analyses
-
     scene = rebuild(params, inputs)
     check_run(scene, results_root())
     with in_time(scene):
@@ -27,8 +26,6 @@ def ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progre
 
 def sections(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Sections of a periodic motion (schema SECTIONS); inputs are ``bundle/<body>``."""
-    from flexclear.pipeline.dynamics import analyses
-
     scene = rebuild(params, inputs)
     with in_time(scene):
         return {"nc": analyses.sections(scene, bundles(inputs), progress)}
@@ -39,11 +36,10 @@ def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], p
 
     inputs: ``bundle/<body>``, and ``run`` of a scene with contacts, which has the horizon.
     """
-    from flexclear.pipeline.dynamics.analyses import require_without_events
     from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
 
     scene = rebuild(params, inputs)
-    require_without_events(scene, "derivatives")
+    analyses.require_without_events(scene, "derivatives")
     horizon = float(inputs["run"]["horizon"]) if "run" in inputs else math.inf
     with in_time(scene):
         names = params["of"], params["to"]
@@ -53,7 +49,6 @@ def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], p
 def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The equilibrium in a `pose` (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); over the speeds of a
     drive these alone (schema CAMPBELL).  Inputs are ``bundle/<body>``."""
-    from flexclear.pipeline.dynamics import analyses
     from flexclear.pipeline.dynamics.linear.campbell import campbell
 
     pose, scene, reduced = params["pose"], rebuild(params, inputs), bundles(inputs)

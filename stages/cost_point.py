@@ -8,14 +8,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.scene.quantity import parse
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.platforms import peak_memory
 from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.kernels import warm
 from flexclear.stages.simulation import bundles, rebuild
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from flexclear.pipeline.core.scene.schema import Scene
 
 
@@ -27,14 +32,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     `analyses.cost`.  inputs: bundles, and `kernels`, the artifact of `stages.kernels`.  A run that the solver refuses
     leaves an empty dataset whose attribute `refused` says why: that, too, is a result of the study.
     """
-    import numpy as np
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts import quantities
-    from flexclear.pipeline.core.scene.quantity import parse
-    from flexclear.pipeline.core.system.errors import SolverError
-    from flexclear.pipeline.dynamics import analyses
-
     scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
     warm(scene, reduced, progress)
@@ -59,14 +56,6 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
 
     params: `simulate`, with the ensemble, and `quantities`.  inputs: as of `run`.
     """
-    import numpy as np
-    import xarray as xr
-
-    from flexclear.pipeline.core.artifacts import quantities
-    from flexclear.pipeline.core.scene.quantity import parse
-    from flexclear.pipeline.core.system.errors import SolverError
-    from flexclear.pipeline.dynamics import analyses
-
     scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)
     try:

@@ -5,6 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
+from flexclear.pipeline.post.cost.causes import causes_of
+from flexclear.pipeline.post.cost.study import Point, assemble, believed, cost, relative_errors, with_reference
+from flexclear.pipeline.post.cost.work_precision import Mark
+from flexclear.pipeline.post.plotting.table import files
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -22,12 +29,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     with its method, whether the study is `complete`, and `peers`, as of `flexclear.commands.cost.read_peers`.  The
     reference is the tightest run among the points, and a run by another method confirms it.
     """
-    from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
-    from flexclear.pipeline.post.cost.causes import causes_of
-    from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
-    from flexclear.pipeline.post.plotting.table import files
-
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
     chosen = [Quantity.read(data) for data in params["quantities"]]
@@ -67,9 +68,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> tuple[Any, ...]:
     """The scene as it is and the paper's choice of method and step, as marked points."""
-    from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
-    from flexclear.pipeline.post.cost.work_precision import Mark
-
     reference, marks = runs[next(p.key for p in points if p.group == "reference")], []
     for name, group in (("this scene", "sampling"), ("paper's choice", "paper")):
         run = next((runs[p.key] for p in points if p.group == group and "refused" not in runs[p.key].attrs), None)

@@ -10,6 +10,7 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, read_toml
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.plotting.table import files
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 
@@ -103,7 +104,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """``plan.nc`` with all decisions, the table of them and the chart; inputs are bundles, as of `task`."""
     from flexclear.pipeline.post.answers import plan as shown
     from flexclear.pipeline.post.answers.effect_sizes import chart
-    from flexclear.pipeline.post.plotting.table import files
 
     dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
     progress(None, "chart")

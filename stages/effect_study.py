@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.plotting.table import files
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
 
@@ -88,9 +89,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of
     `watched_quantities`."""
     from flexclear.pipeline.core.artifacts.effect_size import watched
-    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.answers import effect_sizes
-    from flexclear.pipeline.post.plotting.table import files
 
     there = [Effect(*three) for three in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
@@ -107,9 +106,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``matters.nc``, its table and its chart.  params: see `ranking`.  inputs: ``<effect>:<members>``."""
     from flexclear.pipeline.core.artifacts.effect_size import watched
-    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.answers import effect_sizes, matters
-    from flexclear.pipeline.post.plotting.table import files
 
     chosen = [Quantity.read(data) for data in params["quantities"]]
 

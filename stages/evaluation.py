@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    import xarray as xr
+import xarray as xr
 
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.post.answers import stability as checked
+from flexclear.pipeline.post.overview import comparison as compared_runs
+from flexclear.pipeline.post.overview import figures
+from flexclear.pipeline.post.plotting.table import files
+
+if TYPE_CHECKING:
     from flexclear.pipeline.core.system.progress import Progress
 
 
@@ -23,9 +29,6 @@ def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
 def overview(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """PNG and SVG by file name; inputs are ``run`` and ``post``, and `params` says what is `watched`."""
-    from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.overview import figures
-
     progress(None, "figures")
     return dict(figures.make(inputs["run"], [Quantity.read(data) for data in params["watched"]], inputs["post"]))
 
@@ -36,10 +39,6 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
     params: `labels` of the runs, the reference first; `quantities` (owner, kind).  inputs: ``run<k>``, and ``tight<k>``
     where there is one.
     """
-    from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.overview import comparison as compared_runs
-    from flexclear.pipeline.post.plotting.table import files
-
     runs = {label: inputs[f"run{k}"] for k, label in enumerate(params["labels"])}
     tighter = {label: inputs[f"tight{k}"] for k, label in enumerate(params["labels"]) if f"tight{k}" in inputs}
     chosen = [Quantity.read(data) for data in params["quantities"]]
@@ -57,10 +56,6 @@ def stability(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progr
     params: `by_need`, whether the program chose the integrator.
     inputs: ``run``, ``study`` where there is one, and ``post`` where the scene has an ensemble.
     """
-    import xarray as xr
-
-    from flexclear.pipeline.post.answers import stability as checked
-
     members = float(inputs["post"]["ensemble_horizon"]) if "post" in inputs else None
     result = checked.checks(inputs["run"], inputs.get("study"), members, by_need=params["by_need"])
     columns = {name: ("check", [str(getattr(c, name)) for c in result]) for name in ("value", "limit", "verdict")}

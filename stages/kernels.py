@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import simulation
 
@@ -36,7 +38,6 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
 def shared(scene: Scene) -> tuple[str, ...]:
     """Equal for scenes that run on the same kernels: numbers are not compiled, and code for one wiring is left to
     the runs, a second of the processor each."""
-    from flexclear.pipeline.core.scene.registry import module_of
     from flexclear.pipeline.dynamics.effects import RUNS
     from flexclear.pipeline.dynamics.run import NAMES
 
@@ -58,8 +59,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def processor_time() -> float:
     """Return the processor time of this process and of the ended ones that it started [s], which may compile, too."""
-    import os
-
     return sum(os.times()[:4])
 
 

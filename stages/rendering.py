@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene.load import is_file
 from flexclear.pipeline.core.scene.parts import UNSEEN
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.external_files import companions
+from flexclear.pipeline.post.render import gl
 from flexclear.stages.simulation import bundles
 
 if TYPE_CHECKING:
@@ -37,8 +39,6 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     """
     values: dict[str, Any] = {"what": what, "format": kind}
     if what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4"):
-        from flexclear.pipeline.post.render import gl
-
         values["gl"] = gl.state()  # which GL libraries this machine has
     if kind == "html":
         values["title"] = scene.title
@@ -81,7 +81,6 @@ def files(scene: Scene, what: str) -> dict[str, Path]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Files by name; inputs are ``run`` or ``linear``, and ``bundle/<body>``."""
-    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.render.mechanism import Looks
     from flexclear.pipeline.post.render.pictures import Shown, make
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.parts import UNSEEN
@@ -15,6 +16,8 @@ from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.task import given_arrays
+from flexclear.pipeline.dynamics.compile.reach import met as met
+from flexclear.pipeline.dynamics.compile.reach import modules as modules
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -62,30 +65,10 @@ def params(
     return {"scene": provenance.without(table)}
 
 
-def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
-    """Modules that a run reaches by its parts' names, so that editing a law leaves scenes without it alone.
-
-    alone: whether it is a single run, of which nothing but its motion is asked.
-    Raises InputError when a name is not listed in its family.
-    """
-    from flexclear.pipeline.dynamics.compile import reach
-
-    return reach.modules(scene, alone=alone)
-
-
-def met(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Modules that a single run reaches only if it meets what they are for, by its name."""
-    from flexclear.pipeline.dynamics.compile import reach
-
-    return reach.met(scene)
-
-
 @given_arrays
 def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Progress) -> dict[str, Any]:
     """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is reported, and
     kept."""
-    from flexclear.pipeline import dynamics
-
     scene, reduced = rebuild(params, inputs), bundles(inputs)
     check_run(scene, results_root())
     lacks = missing_compliance(scene, reduced)

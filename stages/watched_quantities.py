@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import kernels, simulation
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
 
@@ -61,7 +61,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """
     from flexclear.pipeline.core.artifacts.effect_size import recorded
     from flexclear.pipeline.core.artifacts.points import batch
-    from flexclear.pipeline.core.scene.quantity import Quantity
 
     scene = simulation.rebuild(params["simulate"], inputs)
     chosen = [Quantity.read(data) for data in params["quantities"]]

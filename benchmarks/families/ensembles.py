@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.schema import Ensemble
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.run.evaluation import members
+from flexclear.pipeline.dynamics.record import ensemble
 
 #: scenes, with as many members as the paper's ensembles have
 SCENES, MEMBERS = ("csj", "far_csj_cb"), 16
@@ -91,11 +91,11 @@ def _workers(number: int) -> Iterator[None]:
 
 @contextmanager
 def _alone() -> Iterator[None]:
-    proper, members.FEW = members.FEW, MEMBERS + 1
+    proper, ensemble.FEW = ensemble.FEW, MEMBERS + 1
     try:
         yield
     finally:
-        members.FEW = proper
+        ensemble.FEW = proper
 
 
 def _in_turn(tasks: Mapping[str, Callable[[], tuple[float, float]]]) -> dict[str, tuple[Times, Times]]:

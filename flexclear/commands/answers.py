@@ -18,6 +18,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.pages import prose
 from flexclear.stages import effect_study, kernels, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
@@ -58,7 +59,6 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
     """What is shown of the answer called accuracy, stability or matters."""
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
-    from flexclear.pipeline.post.pages import prose
 
     data = answer.dataset()
     if name == "accuracy":

@@ -11,6 +11,8 @@ from stat import S_ISREG
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.system.errors import InputError, ResourceError, shown
+from flexclear.pipeline.dynamics.compile import files
+from flexclear.pipeline.dynamics.compile.folder import prune
 from flexclear.stages.workplace import open_workplace
 
 ACTIONS = {
@@ -66,8 +68,6 @@ def _sizes(paths: Iterable[Path]) -> list[int]:
 
 
 def _check(options: argparse.Namespace) -> None:
-    from flexclear.pipeline.dynamics.compile import files
-
     store = open_workplace().store
     inventory = upkeep.inventory(store, whole=True)
     # one without a sum has not been compiled yet, or is about to be
@@ -105,8 +105,6 @@ def _explain(options: argparse.Namespace) -> None:
 
 
 def _prune(options: argparse.Namespace) -> None:
-    from flexclear.pipeline.dynamics.compile.folder import prune
-
     store = open_workplace().store
     inventory = upkeep.inventory(store, whole=True)
     chosen = upkeep.prunable(store, inventory, DAYS * upkeep.DAY)

@@ -14,11 +14,12 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import scenes
+from flexclear.commands import scenes, show
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.variants import ideal, loose
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
 from flexclear.stages import meshing, simulation
 from flexclear.stages.graph import Graph
@@ -87,8 +88,6 @@ def command(options: argparse.Namespace) -> int:
 
 def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | None:
     """Write the start pose of a scene where one can be drawn; returns why it is refused."""
-    from flexclear.commands import show
-
     try:
         if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
             scene = scenes.loaded(name, settings)
@@ -341,7 +340,6 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) ->
 
     Loads, gears and stops are read for it: what is wrong with them is an error of the scene itself.
     """
-    from flexclear.pipeline.core.scene.variants import ideal, loose
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
 

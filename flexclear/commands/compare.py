@@ -13,12 +13,12 @@ from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene.variants import EFFECTS, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.pages import Part, page
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.pages import Part
 
 #: what `--ideal` takes away: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
@@ -63,8 +63,6 @@ def bring(
     without: one of IDEAL, or None for the scenes alone.  alongside: tasks made while the runs leave a processor idle,
     which may fail.  Raises InputError for what cannot be compared.
     """
-    from flexclear.pipeline.post.pages import page
-
     sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
     if len(sides) < 2:
         raise InputError(
@@ -108,8 +106,6 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
 
 def parts(made: Made) -> list[Part]:
     """What a page shows of a comparison."""
-    from flexclear.pipeline.post.pages import Part
-
     return [
         Part("differences", "Differences and errors", tables(made, *TABLES)),
         Part("runs", "Side by side", pictures(made, PICTURES)),

@@ -20,7 +20,10 @@ from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
+from flexclear.pipeline.dynamics.compile.folder import writable
+from flexclear.pipeline.post.render import gl
 from flexclear.stages import simulation
+from flexclear.stages.kernels import warm
 from flexclear.stages.workplace import Workplace, add_options, open_workplace
 
 if TYPE_CHECKING:
@@ -162,8 +165,6 @@ def _results(root: Path) -> tuple[str, bool]:
 
 
 def _kernels() -> tuple[str, bool]:
-    from flexclear.pipeline.dynamics.compile.folder import writable
-
     said: list[str] = []
     try:
         folder = writable(kernel_root(), said.append)
@@ -179,8 +180,6 @@ def _kernels() -> tuple[str, bool]:
 
 def _graphics() -> tuple[str, bool | None]:
     """Draw something: libraries that load may still fail. Without them only pictures of shapes are lacking."""
-    from flexclear.pipeline.post.render import gl
-
     if gl.works():
         return f"{gl.state()}; a picture was drawn", True
     return f"{gl.state()}; nothing can be drawn: {gl.remedy()}", None
@@ -249,7 +248,6 @@ def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress
     """What a scene's methods call, and those that may take over."""
     from flexclear.pipeline.dynamics.compile import functions
     from flexclear.pipeline.dynamics.effects import schemes
-    from flexclear.stages.kernels import warm
 
     model = warm(scene, reduced, progress).model
     for scheme in schemes(scene):

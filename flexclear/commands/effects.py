@@ -10,6 +10,7 @@ from flexclear.commands.scenes import graphs, pictures, print_files, scene_argum
 from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.post.pages import Part, page
 from flexclear.stages import effect_study, watched_quantities
 from flexclear.stages.workplace import Made, Workplace, open_workplace
 
@@ -54,7 +55,6 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
     Raises InputError for a scene without effects, or that watches nothing.
     """
     from flexclear.pipeline.post.answers.effect_sizes import variants as requested
-    from flexclear.pipeline.post.pages import Part, page
 
     if members < 2:
         raise InputError(

@@ -14,8 +14,10 @@ from flexclear.commands import export, scenes
 from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.variants import lessened
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.post.plotting.table import as_html, as_markdown
 from flexclear.stages import effect_plan, watched_quantities
 from flexclear.stages.workplace import FailedTasksError, Made, Workplace, open_workplace, seconds
 
@@ -76,7 +78,6 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     Raises InputError for a scene without effects, or that watches nothing.
     """
     from flexclear.pipeline.post.answers.plan import levels as shown
-    from flexclear.pipeline.post.plotting.table import as_markdown
 
     plans: dict[str, xr.Dataset | str] = {}
     for level in LEVELS:
@@ -107,7 +108,6 @@ def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene
     """
     from flexclear.pipeline.post.answers.answered import answered
     from flexclear.pipeline.post.answers.plan import verified, words
-    from flexclear.pipeline.post.plotting.table import as_html
 
     workplace = open_workplace()
     planned = bring(scene if scene.accuracy is not None else asking(scene, level), workplace)
@@ -229,7 +229,6 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
     budget: time for members that decide the verdicts [s].
     """
     from flexclear.pipeline.post.answers.plan import agreement_of, verified
-    from flexclear.pipeline.post.plotting.table import as_markdown
 
     compared = errors_of(planned, workplace, budget)
     print(as_markdown(verified(compared)))
@@ -250,8 +249,6 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
     As many members as decide every verdict, as far as they fit into the budget [s].
     """
     from flexclear.pipeline.core.artifacts import effect_size
-    from flexclear.pipeline.core.scene.quantity import parse
-    from flexclear.pipeline.core.system.errors import SolverError
     from flexclear.pipeline.post.answers.plan import until_decided
 
     assert planned.scene.accuracy is not None

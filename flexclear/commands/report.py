@@ -12,14 +12,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import compare
+from flexclear.commands.answers import Answers, said
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import graphs, in_file, pictures
+from flexclear.papers.wang_wang_2019 import tasks
 from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.scene.output import rows
 from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.scene.variants import loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.pages import Part, downloads, figures_of, in_folder, page, prose
 from flexclear.pipeline.post.render import gl
 from flexclear.stages import derived_series
 from flexclear.stages.workplace import (
@@ -36,9 +39,7 @@ from flexclear.stages.workplace import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.commands.answers import Answers
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.pages import Part
     from flexclear.stages.graph import Graph
 
 #: what a report shows of the motion, by the names of `Graph.render`
@@ -99,10 +100,10 @@ def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
     workplace = open_workplace(options)
     pages: dict[str, str] = {}
-    for name, page in _pages(options, workplace):
-        pages[name] = str(page)
+    for name, path in _pages(options, workplace):
+        pages[name] = str(path)
         if not options.json:
-            print(relative(page))
+            print(relative(path))
     if options.json:
         print(as_json(pages))
 
@@ -123,8 +124,6 @@ def of_paper(workplace: Workplace, *, folder: bool = False) -> Path:
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
-    from flexclear.papers.wang_wang_2019 import tasks
-
     outcome = tasks.bring(workplace)
     if gl.state().endswith("none"):
         workplace.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
@@ -142,8 +141,6 @@ def of_scene(
     it has no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: whether they are there.
     Raises FailedTasksError when the run itself cannot be made.
     """
-    from flexclear.commands.answers import Answers
-
     scene = graph.scene
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
     if loose(scene) or scene.flexible():
@@ -168,8 +165,6 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
     if not folder:
         publish(where / f"{name}.html", page)
         return where / f"{name}.html"
-    from flexclear.pipeline.post.pages import in_folder
-
     (where / name).mkdir(parents=True, exist_ok=True)
     for file, content in in_folder(page).items():
         publish(where / name / file, content)
@@ -192,9 +187,6 @@ def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
 
 def _answered(scene: Scene, result: Mapping[str, Made]) -> list[Part]:
     """The three sections: each with a sentence that answers, a picture and a table."""
-    from flexclear.commands.answers import said
-    from flexclear.pipeline.post.pages import Part
-
     parts = []
     for name, answer in result.items():
         words = said(name, answer, scene)
@@ -212,7 +204,6 @@ def _page(
 ) -> bytes:
     from flexclear.pipeline.post.answers.matters import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
-    from flexclear.pipeline.post.pages import Part, downloads, page, prose
     from flexclear.pipeline.post.single_run.series import parameters
 
     scene = graph.scene
@@ -292,8 +283,6 @@ def _files(graph: Graph, compared: Made | None) -> dict[str, bytes]:
 
 def _moving(graph: Graph, made: Mapping[Task, Made]) -> str:
     """The film, and the views that can be turned."""
-    from flexclear.pipeline.post.pages import figures_of
-
     text = ""
     for what, one in ((what, made[task]) for what, task in graph.render.items() if task in made):
         if what.endswith("html"):

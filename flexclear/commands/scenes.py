@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import export
+from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
+from flexclear.pipeline.core.scene.plausibility import implausible
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.units import quantity
@@ -26,6 +28,8 @@ from flexclear.pipeline.core.system.external_files import reading, require_file
 from flexclear.pipeline.core.system.version import DISTRIBUTION
 from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
+from flexclear.pipeline.post.pages import media
+from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
@@ -55,16 +59,12 @@ def print_files(folder: Path, files: Mapping[str, str]) -> None:
 
 def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
     """Those pictures and films of an artifact that are there, as HTML; by name their captions, and what they show."""
-    from flexclear.pipeline.post.pages import media
-
     files = made.record.files if made is not None else {}
     return "".join(media(name, made.read(name), *text) for name, text in captions.items() if made and name in files)
 
 
 def tables(made: Made, *names: str) -> str:
     """Tables of an artifact, which it has as Markdown, as HTML."""
-    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
-
     return "".join(as_html(from_markdown(made.text(name))) for name in names)
 
 
@@ -116,7 +116,6 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts import modal as modal
-    from flexclear.pipeline.core.artifacts import upkeep
 
     if str(scene).endswith(".nc"):
         path = Path(str(scene))
@@ -297,8 +296,6 @@ def placed(error: InputError, path: Path | None) -> InputError:
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
     """Plausibility warnings about a scene; those about values that `settings` changed are located there."""
-    from flexclear.pipeline.core.scene.plausibility import implausible
-
     changed = overrides(settings)
     doubts = []
     for doubt in implausible(scene):

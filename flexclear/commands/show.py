@@ -13,6 +13,8 @@ from flexclear.commands import scenes
 from flexclear.commands.export import as_json
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
+from flexclear.pipeline.post.pages import viewer, viewer_page
+from flexclear.pipeline.post.render import gl
 from flexclear.stages import meshing, rendering, simulation
 from flexclear.stages.workplace import relative
 
@@ -109,8 +111,6 @@ def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
 
 def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False) -> list[Path]:
     """Write the page, and the picture where this machine can draw.  Raises ResourceError."""
-    from flexclear.pipeline.post.render import gl
-
     stem = Path(scene.name).name
     content = {f"{stem}_start.html": _page(scene, seen)}
     if gl.works():
@@ -129,7 +129,6 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
 
 
 def _page(scene: Scene, seen: StartView) -> bytes:
-    from flexclear.pipeline.post.pages import viewer, viewer_page
     from flexclear.pipeline.post.render.start_view import page_view
 
     title = scene.title or Path(scene.name).name

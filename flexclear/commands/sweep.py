@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import export, scenes
 from flexclear.commands.export import as_json
-from flexclear.pipeline.core.artifacts.store import disk_limits, write_dataset
+from flexclear.pipeline.core.artifacts.store import disk_limits, publish, write_dataset
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
-from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
+from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep, read_sweep
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages.sweeps import sweep_large, sweep_plan
@@ -97,8 +97,6 @@ def of_scene(
     scene: Scene, table: Mapping[str, Any], workers: int | None = None, scheduler: str | None = None
 ) -> xr.Dataset:
     """The dataset of a sweep that a table describes as a file does, but for its scene; see `fc.sweep`."""
-    from flexclear.pipeline.core.scene.sweep import read_sweep
-
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
     with engine(width(workers), scheduler) as runner:
         return bring(plan, runner, open_workplace())
@@ -212,7 +210,6 @@ def _publish(result: xr.Dataset, folder: Path) -> None:
 
 def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None, *, quiet: bool = False) -> None:
     """Figures next to the dataset, and a summary on the screen unless `quiet`."""
-    from flexclear.pipeline.core.artifacts.store import publish
     from flexclear.pipeline.post.overview.sweep_figures import figures
 
     file = next(

@@ -6,8 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.simulation import bundles, rebuild
 
 if TYPE_CHECKING:
@@ -95,10 +98,6 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
 
 def _measured(scene: Scene, bundles: Mapping[str, Labelled], *, checked: bool) -> tuple[Cost | None, str]:
     """The cost of a run, and why there is none."""
-    from flexclear.pipeline import dynamics
-    from flexclear.pipeline.core.system.errors import SolverError
-    from flexclear.pipeline.dynamics import analyses
-
     try:
         # an unmeasured start fetches the code; reports would be part of what is measured
         dynamics.simulate(_edited(scene, {"time.end": _share(scene, WARM)}), bundles, silent)
@@ -109,8 +108,6 @@ def _measured(scene: Scene, bundles: Mapping[str, Labelled], *, checked: bool) -
 
 def _at_equal_error(scene: Scene, bundles: Mapping[str, Labelled]) -> tuple[float, Cost]:
     """Tolerance and cost at equal error; decade by decade tighter where the whole run is refused."""
-    from flexclear.pipeline.core.system.errors import SolverError
-
     rtol = equal_tolerance(scene, bundles)
     while True:
         cost, why = _measured(_edited(scene, {"solver.rtol": rtol}), bundles, checked=True)
@@ -123,8 +120,6 @@ def _at_equal_error(scene: Scene, bundles: Mapping[str, Labelled]) -> tuple[floa
 
 def equal_tolerance(scene: Scene, bundles: Mapping[str, Labelled]) -> float:
     """The tolerance at which a scene has the common error over the first fraction of its run."""
-    from flexclear.pipeline import dynamics
-
     velocity = next(q.name for q in scene.requested() if q.kind == "velocity")
     requested = {"time.end": _share(scene, FRACTION), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
     return float(dynamics.simulate(_edited(scene, requested), bundles, silent).attrs["accuracy_rtol"])

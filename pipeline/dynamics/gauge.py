@@ -42,19 +42,13 @@ def internal_rate(d, k):
 
 
 @kernel
-def unwound(d, g, angle, rate):
-    """The angle of gauge g with the full turns that it has made; its state follows the rate."""
-    turn = d.gauges[g].turns
-    d.ledger_rate[internal_rate(d, turn)] = rate
-    return angle + 2.0 * np.pi * np.round((d.internal[turn] - angle) / (2.0 * np.pi))
-
-
-@kernel
 def counted(d, g):
-    """As `measure`, an angle with the full turns that it has made if the gauge counts them."""
+    """As `measure`, an angle with its full turns if the gauge counts them; its state then follows the rate."""
     value, rate, moment, force = measure(d, g)
-    if d.gauges[g].turns >= 0:
-        value = unwound(d, g, value, rate)
+    turn = d.gauges[g].turns
+    if turn >= 0:
+        d.ledger_rate[internal_rate(d, turn)] = rate
+        value += 2.0 * np.pi * np.round((d.internal[turn] - value) / (2.0 * np.pi))
     return value, rate, moment, force
 
 

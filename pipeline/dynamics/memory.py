@@ -293,11 +293,10 @@ JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _stretches(
     "multiplier:n_closure_rows"
 )
 #: per selected row its distance from those before it, at the end of the step, at its start, and the most that it has
-#: been, each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
+#: been; rows of the state's length: the Chebyshev series that leads over a singular pose
+INDEPENDENCE = work("now past most", "n_closure_rows")
 COLLOCATION_ROWS = 13
-INDEPENDENCE, COLLOCATION = _stretches(
-    f"independence:3*n_closure_rows collocation:{COLLOCATION_ROWS}*ny*?n_closure_rows"
-)
+(COLLOCATION,) = _stretches(f"collocation:{COLLOCATION_ROWS}*ny*?n_closure_rows")
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, LEAST_PIVOT = _floats(PIVOT, "last_pivot least_pivot")
@@ -323,9 +322,10 @@ MEMORY, VECTORS, MATRICES = _stretches("memory:floats vectors:vectors*ny matrice
 #: of `integrate.modal_basis`, one oscillator per speed at most: omega^2 [1/s^2], damping [1/s], root of the stiffness
 #: of a mode's spring; the rows of Q^T, K^1/2 P K^1/2 and C, the columns of B, what the springs accelerate
 OSCILLATORS = work("square damping root", "?oscillations*nv")
-SQUARES, OBLONG = "?oscillations*nv*nv", "?oscillations*nv*ny"
-AXES, COUPLING, READING = _stretches(f"axes:{SQUARES} coupling:{SQUARES} reading:{SQUARES}")
-LIFTING, RESPONSE = _stretches(f"lifting:{OBLONG} response:{OBLONG}")
+AXES, COUPLING, READING, LIFTING, RESPONSE = _stretches(
+    "axes:?oscillations*nv*nv coupling:?oscillations*nv*nv reading:?oscillations*nv*nv "
+    "lifting:?oscillations*nv*ny response:?oscillations*nv*ny"
+)
 #: (z, z') of each oscillator; its phi functions in each quadrature, and what four sources add to (z, z') by them,
 #: weights of 1 and Lambda each (`integrate.exponential`)
 OSCILLATIONS, QUADRATURES = work("z rate", "oscillations*nv"), work("phi:10 share:8", "quadratures*nv")

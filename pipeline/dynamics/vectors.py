@@ -203,12 +203,14 @@ def to_quaternion(R):
     xy, yz, zx = R[1] + R[3], R[5] + R[7], R[2] + R[6]
     # four times the products of two components, of one with all of them
     if w >= x and w >= y and w >= z:
-        return w, wx, wy, wz
-    if x >= y and x >= z:
-        return wx, x, xy, zx
-    if y >= z:
-        return wy, xy, y, yz
-    return wz, zx, yz, z
+        x, y, z = wx, wy, wz
+    elif x >= y and x >= z:
+        w, y, z = wx, xy, zx
+    elif y >= z:
+        w, x, z = wy, xy, yz
+    else:
+        w, x, y = wz, zx, yz
+    return w, x, y, z
 
 
 @kernel

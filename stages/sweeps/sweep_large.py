@@ -12,7 +12,8 @@ from functools import lru_cache
 from importlib.util import find_spec
 from math import ceil, prod
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits
 from flexclear.pipeline.core.artifacts.points import Point, dimensions, unpacked
@@ -20,9 +21,6 @@ from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.stages.sweeps.sweep_plan import Plan
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SUFFIX = ".zarr"
 #: a dataset in one file is in memory so many times: points, arrays, the bytes of the file, and what is read back
@@ -87,8 +85,6 @@ def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> 
 
     done: the finished points, their values left out.
     """
-    import xarray as xr
-
     write(path, _slabs(plan, store, done), plan.design.dims[0])
     return xr.open_zarr(path, chunks=None, consolidated=False)
 

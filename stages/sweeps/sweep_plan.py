@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.artifacts import points as results
+from flexclear.pipeline.core.artifacts.quantities import regular_times
 from flexclear.pipeline.core.artifacts.store import FAMILY
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.limits import check_members, require_scatter
@@ -64,20 +66,15 @@ class Family:
 
     def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded], here: bool = True) -> None:
         """Store finished points as one artifact. here: whether this machine computed them."""
-        from flexclear.pipeline.core.artifacts.points import batch
-
         name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
-        store.put(
-            self.folder[0], name, {"nc": batch(points, recorded)}, self.facts, instruction_set() if here else None
-        )
+        batch, computed_by = results.batch(points, recorded), instruction_set() if here else None
+        store.put(self.folder[0], name, {"nc": batch}, self.facts, computed_by)
 
     def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
         """All points of the family that are stored and sound, with their values of the `recorded` quantities."""
-        from flexclear.pipeline.core.artifacts.points import unpacked
-
         points: dict[str, Point] = {}
         for _, batch in self.batches(store):
-            points |= unpacked(batch, recorded)
+            points |= results.unpacked(batch, recorded)
         return points
 
     def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
@@ -105,8 +102,6 @@ class Plan:
 
     def dataset(self, points: Mapping[str, Point]) -> xr.Dataset:
         """The sweep's dataset of the points that are finished."""
-        from flexclear.pipeline.core.artifacts import points as results
-
         attributes: dict[str, str | int] = {"sweep": self.sweep.name, "scene": self.scene.name}
         attributes |= {"title": self.sweep.title} if self.sweep.title else {}
         attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
@@ -133,8 +128,6 @@ class Plan:
     @property
     def time(self) -> np.ndarray:
         """Of the recorded series [s]."""
-        from flexclear.pipeline.core.artifacts.quantities import regular_times
-
         return regular_times(self.scene.time, self.scene.output)
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -9,8 +11,17 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
+from threadpoolctl import threadpool_limits
+
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.load import with_numbers
+from flexclear.pipeline.core.scene.quantity import parse_recorded
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.core.workflow import cores
+from flexclear.pipeline.core.workflow.cores import side_by_side
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+from flexclear.stages.simulation import bundles, rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,11 +53,7 @@ class Family:
 @lru_cache(maxsize=RUNNERS)
 def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
     """The scene of a family and what runs its points; stored by a worker, since it holds the compiled functions."""
-    import pickle
-
-    from flexclear.pipeline.core.scene.quantity import parse_recorded
     from flexclear.pipeline.dynamics.record.point import Runner
-    from flexclear.stages.simulation import bundles, rebuild
 
     family: Family = pickle.loads(packed)
     scene = rebuild(family.simulate, family.inputs)
@@ -69,11 +76,6 @@ def work(
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
     of a worker that has joined since.
     """
-    from threadpoolctl import threadpool_limits
-
-    from flexclear.pipeline.core.system.errors import InputError
-    from flexclear.pipeline.core.workflow import cores
-
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
     cores.set_idle(alone)
@@ -86,8 +88,6 @@ def work(
 
 def _together(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]]) -> list[Point]:
     """Points concurrently, each in a thread, where that can be."""
-    from flexclear.pipeline.core.workflow.cores import side_by_side
-
     places = runner.abreast(scene, len(points))
 
     def one(k: int, alive: Progress) -> Point:
@@ -100,9 +100,6 @@ def _together(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]])
 def _point(
     runner: Runner, scene: Scene, point: Mapping[str, Any], where: Place | None = None, alive: Progress = silent
 ) -> Point:
-    from flexclear.pipeline.core.scene.load import with_numbers
-    from flexclear.pipeline.core.system.errors import InputError
-
     try:
         edited = with_numbers(scene, point)
     except InputError as error:
@@ -113,10 +110,6 @@ def _point(
 @cache
 def source_digest() -> str:
     """Digest of the sources that a worker runs, to be compared with those of who asks it."""
-    import hashlib
-
-    from flexclear.pipeline.core.workflow.fingerprint import TREE
-
     digest = hashlib.sha256()
     for folder in ("commands", "papers", "pipeline", "stages"):
         # by the one import name, under which a checkout and an installed flexclear have the same files

@@ -19,9 +19,9 @@ from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.adaptive import LEAST_NORM
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.record import ensemble
 from flexclear.pipeline.dynamics.run import trajectory
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
-from flexclear.pipeline.dynamics.run.evaluation import members as at_once
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engines
@@ -77,7 +77,7 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
 ) -> None:
     """Also with fewer lanes than members, and with fewer members than lanes; that lanes are used is looked at."""
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    monkeypatch.setattr(at_once, "LANES", (lanes,))
+    monkeypatch.setattr(ensemble, "LANES", (lanes,))
     known, made = six(), listened(monkeypatch)
     assert analyses.ensemble(scene(members=6), {}, silent).identical(known)
     assert [len(group._words) for group in made] == ([] if INTERPRETED else [lanes])
@@ -99,7 +99,7 @@ def listened(monkeypatch: pytest.MonkeyPatch) -> list[batched_evaluation.LaneGro
 def six() -> xr.Dataset:
     """Six members, each of which takes its own steps."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(at_once, "FEW", 7)
+        patch.setattr(ensemble, "FEW", 7)
         patch.setattr(cores, "cores", lambda: 1)
         return analyses.ensemble(scene(members=6), {}, silent)
 
@@ -116,7 +116,7 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
     assert [bool(group._places.any()) for group in made] == ([] if INTERPRETED else [True])  # several at once
     assert (together.impact_count.values > 5).all()
     assert not np.array_equal(together.position[0], together.position[1])
-    monkeypatch.setattr(at_once, "FEW", 5)
+    monkeypatch.setattr(ensemble, "FEW", 5)
     assert analyses.ensemble(paper, {}, silent).identical(together)
 
 

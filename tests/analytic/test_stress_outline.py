@@ -9,8 +9,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.record.body_loads import Motion
-from flexclear.pipeline.dynamics.record.stress import peak_stresses, section_forces
+from flexclear.pipeline.dynamics.record.stress import Motion, peak_stresses, section_forces
 from flexclear.pipeline.structure.fe import section as sections
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve

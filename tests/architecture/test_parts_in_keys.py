@@ -153,7 +153,7 @@ DYNAMICS = "flexclear.pipeline.dynamics"
 OTHERS = (
     *("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice"),
     *("run.inverse", "run.horizon.periods", "run.horizon.tangents", "compile.lanes", "specialise.dual"),
-    *("specialise.batched", "run.evaluation.batched_evaluation", "run.evaluation.members", "model.refill"),
+    *("specialise.batched", "run.evaluation.batched_evaluation", "model.refill"),
 )
 
 

@@ -21,7 +21,6 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.encounters import meet, noted
 from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import (
-    ABOVE,
     TREE,
     Sources,
     code_digest,
@@ -147,7 +146,7 @@ def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: S
     named = {name for module in closure.values() for name in module.own} | {
         n for name in closure for n in parents(name)
     }
-    assert {name for name in named if source_file(root, name) is not None} <= closure.keys() | ABOVE
+    assert {name for name in named if source_file(root, name) is not None} <= closure.keys()
 
 
 def test_a_root_that_does_not_exist_is_an_error(root: Path):

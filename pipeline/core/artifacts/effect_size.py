@@ -108,7 +108,7 @@ def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) 
 
     owners: of the scene, by what they are.
     """
-    return [Recorded(q, r) for q in chosen if q.is_there(owners) for r in _reductions(q)]
+    return [one for q in chosen if q.is_there(owners) for one in _compared(q)]
 
 
 def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
@@ -116,8 +116,14 @@ def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: S
     return unpacked(stored, recorded(owners, chosen))["point"]
 
 
-def _reductions(quantity: Quantity) -> tuple[str, ...]:
-    return ("series",) if quantity.of_place else tuple(CONTACT_REDUCTIONS.get(quantity.kind, OTHERS))
+def _compared(quantity: Quantity) -> list[Recorded]:
+    reductions = ("series",) if quantity.of_place else CONTACT_REDUCTIONS.get(quantity.kind, OTHERS)
+    return [Recorded(quantity, reduction) for reduction in reductions]
+
+
+def _turns(what: Recorded) -> bool:
+    """Whether it is a quaternion, which changes by half the angle."""
+    return what.quantity.kind == "orientation"
 
 
 def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
@@ -125,35 +131,30 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
 
     members: starts of each that were run; a point without deviations counts as one that is known.
     """
-    name = quantity.name
     if quantity.kind == "impact_times":
-        return _impact_times(a, b, name)
-    parts = [
-        _reduced(a, b, f"{name}.{reduction}", members, turning=quantity.kind == "orientation")
-        for reduction in _reductions(quantity)
-    ]
-    return Influence(max(p.difference for p in parts), max(p.uncertainty for p in parts))
+        return _impact_times(a, b, quantity.name)
+    differences, doubts = [], []
+    for what in _compared(quantity):
+        distance, error = _along(a, b, what, members)
+        doubt = chance(members) * error
+        differences.append(float(_beyond(distance, doubt).max(initial=0.0)))
+        doubts.append(float(doubt.max(initial=0.0)))
+    return Influence(max(differences), max(doubts))
 
 
-def _reduced(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Influence:
-    distance, error = _along(a, b, name, members, turning=turning)
-    doubt = chance(members) * error
-    return Influence(float(_beyond(distance, doubt).max(initial=0.0)), float(doubt.max(initial=0.0)))
-
-
-def _along(a: Point, b: Point, name: str, members: int, *, turning: bool) -> tuple[np.ndarray, np.ndarray]:
+def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray, np.ndarray]:
     """Distance of two means at each output and its standard error; infinite where a point lacks the quantity.
 
     Points of equal values and deviations are the same members: their distance is none, without error.
     """
-    if name not in a.values or name not in b.values:
+    if what.name not in a.values or what.name not in b.values:
         return np.array([np.inf]), np.zeros(1)
-    one, two = (_rows(p.values[name]) for p in (a, b))
-    deviations = [_deviations(p, name, turning=turning) for p in (a, b)]
+    one, two = (_rows(p.values[what.name]) for p in (a, b))
+    deviations = [_deviations(p, what) for p in (a, b)]
     if np.array_equal(one, two) and np.array_equal(deviations[0], deviations[1]):
         return np.zeros(len(one)), np.zeros(len(one))
     error = _pooled(np.hypot(*deviations) / np.sqrt(max(members, 1)))
-    if turning:
+    if _turns(what):
         return rotation_between(*(q / np.linalg.norm(q, axis=1, keepdims=True) for q in (one, two))), error
     return np.linalg.norm(one - two, axis=1), error
 
@@ -174,13 +175,12 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
     """
     if quantity.kind == "impact_times":
         return _impact_times(a, b, quantity.name)
-    turning, n, error, most = quantity.kind == "orientation", len(b.members), 0.0, 0.0
-    for name in (f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)):
-        distance, _ = _along(a, b, name, n, turning=turning)
+    n, error, most = len(b.members), 0.0, 0.0
+    for what in _compared(quantity):
+        distance, _ = _along(a, b, what, n)
         if np.isinf(distance).any():
             return Influence(np.inf)
-        of_pairs = _of_pairs(a, b, name, turning=turning)
-        allowed = _allowed(b, name, requested, turning=turning)
+        of_pairs, allowed = _of_pairs(a, b, what), _allowed(b, what, requested)
         alike = allowed <= requested
         doubt = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
         error = max(error, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
@@ -188,23 +188,23 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
     return Influence(error, most - error)
 
 
-def _of_pairs(a: Point, b: Point, name: str, *, turning: bool) -> np.ndarray:
+def _of_pairs(a: Point, b: Point, what: Recorded) -> np.ndarray:
     """Standard error at each output of the mean difference of two ways to run a scene, from the same starts."""
     pairs = zip(a.members, b.members, strict=True)
-    spread = np.std([_rows(one[name]) - _rows(two[name]) for one, two in pairs], axis=0, ddof=1)
-    return _pooled(np.linalg.norm(spread, axis=1) * (2.0 if turning else 1.0)) / np.sqrt(len(b.members))
+    spread = np.std([_rows(one[what.name]) - _rows(two[what.name]) for one, two in pairs], axis=0, ddof=1)
+    return _pooled(np.linalg.norm(spread, axis=1) * (2.0 if _turns(what) else 1.0)) / np.sqrt(len(b.members))
 
 
-def _allowed(full: Point, name: str, requested: float, *, turning: bool) -> np.ndarray:
+def _allowed(full: Point, what: Recorded, requested: float) -> np.ndarray:
     """What may be off at each output: what is requested, or the difference of two runs of the scene itself."""
-    scattered: np.ndarray = np.sqrt(2.0) * _pooled(_deviations(full, name, turning=turning))
+    scattered: np.ndarray = np.sqrt(2.0) * _pooled(_deviations(full, what))
     return np.maximum(requested, scattered)
 
 
-def _deviations(point: Point, name: str, *, turning: bool) -> np.ndarray:
-    """Standard deviation of one member at each output; a quaternion changes by half the angle."""
-    rows = np.linalg.norm(_rows(point.deviation.get(name, np.zeros(len(_rows(point.values[name]))))), axis=1)
-    return 2.0 * rows if turning else rows
+def _deviations(point: Point, what: Recorded) -> np.ndarray:
+    """Standard deviation of one member at each output."""
+    rows = _rows(point.deviation.get(what.name, np.zeros(len(_rows(point.values[what.name])))))
+    return np.linalg.norm(rows, axis=1) * (2.0 if _turns(what) else 1.0)
 
 
 def agreement(planned: Point, full: Point, quantity: Quantity, members: int, requested: float) -> Agreement:
@@ -215,18 +215,15 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
     """
     if quantity.kind == "impact_times":
         return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
-    turning, results = quantity.kind == "orientation", list[Agreement]()
-    for reduction in _reductions(quantity):
-        name = f"{quantity.name}.{reduction}"
-        distance, doubt = _along(planned, full, name, members, turning=turning)
+    results = []
+    for what in _compared(quantity):
+        distance, doubt = _along(planned, full, what, members)
         if np.isinf(distance).any():
             return Agreement(np.inf, 0.0, requested)
         doubt = chance(members) * doubt
         if min(len(planned.members), len(full.members)) > 1:
-            of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, name, turning=turning)
-            doubt = np.minimum(doubt, of_pairs)
-        error = _beyond(distance, doubt)
-        allowed = _allowed(full, name, requested, turning=turning)
+            doubt = np.minimum(doubt, stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, what))
+        error, allowed = _beyond(distance, doubt), _allowed(full, what, requested)
         floor = np.maximum(allowed, np.finfo(float).tiny)  # nothing is allowed of what never changes
         worst = int(np.argmax((error - doubt) / floor))
         if error[worst] - doubt[worst] <= allowed[worst]:
@@ -247,9 +244,7 @@ def scatter(point: Point, quantity: Quantity) -> float:
     """
     if quantity.kind == "impact_times":
         return 0.0
-    names = [f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)]
-    turning = quantity.kind == "orientation"
-    spreads = [_pooled(_deviations(point, n, turning=turning)) for n in names if n in point.deviation]
+    spreads = [_pooled(_deviations(point, what)) for what in _compared(quantity) if what.name in point.deviation]
     return max((float(spread.max(initial=0.0)) for spread in spreads), default=0.0)
 
 
@@ -280,7 +275,7 @@ def size(point: Point, quantity: Quantity) -> float:
     if quantity.kind == "impact_times":
         return float(np.nan_to_num(point.values[f"{name}.last"]))
     if quantity.kind in ("peak_force", "impulse"):
-        return float(np.abs(point.values[f"{name}.{_reductions(quantity)[0]}"]))
+        return float(np.abs(point.values[_compared(quantity)[0].name]))
     values = _rows(point.values[f"{name}.series"])
     if quantity.kind == "orientation":
         return float(rotation_between(values[:1], values).max())

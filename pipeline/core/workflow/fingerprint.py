@@ -28,8 +28,6 @@ OWN = ("flexclear", "benchmarks")
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
 WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
-#: the functions that `import flexclear` offers are above the stages: no result reaches them
-ABOVE = {"flexclear.public"}
 #: what the code of a package reads next to its modules
 ASSETS = (".css", ".js")
 #: how often a source is parsed at most, where threads of libraries come between
@@ -135,7 +133,7 @@ class Sources:
     def _next(self, name: str, module: Module) -> tuple[str, ...]:
         """The modules that one reaches at once: what it imports may be an attribute of a module, and no module."""
         if name not in self.next:
-            reached = sorted({*module.own, *parents(name)} - ABOVE)  # a module before the names that it holds
+            reached = sorted({*module.own, *parents(name)})  # a module before the names that it holds
             self.next[name] = tuple(other for other in reached if self.module(other) is not None)
         return self.next[name]
 

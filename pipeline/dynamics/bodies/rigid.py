@@ -79,29 +79,22 @@ def spatial(own, mass, c, J):
     own.inertia[5] = J[5] - mass * y * z
 
 
-@kernel
-def demand(d, i):
-    """Return mass of link i, its centre from its origin, inertia about the centre, and the moment there and force.
-
-    World axes.  Moment and force are what the accelerations now in its frame need, gravity being an acceleration of the
-    ground.
-    """
-    frame, link = d.link_frames[i], d.link_numbers[i]
-    R, omega, alpha, mass = frame.axes, frame.omega, frame.alpha, link.mass
-    arm = turn(R, link.com)
-    J = congruence(R, at6(link.inertia, 0))
-    a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, cross(omega, arm))))
-    return mass, arm, J, add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega))), scale(mass, a)
-
-
 def make_inertia(tree: Any) -> Callable:
-    """The kernel inertia(d, i): spatial inertia of link i (OWN) and the wrench that it needs, about what `tree` refers
-    them to: the kernels' origin, or the link's own, far from which both lose digits."""
+    """The kernel inertia(d, i): spatial inertia of link i (OWN), and the wrench that its frame's accelerations need.
+
+    Both are about what `tree` refers them to: the kernels' origin, or the link's own, far from which they lose digits.
+    Gravity is an acceleration of the ground.
+    """
     origin, demand_of = tree.origin, tree.demand_of
 
     @kernel
     def inertia(d, i):
-        mass, arm, J, moment, force = demand(d, i)
+        frame, link = d.link_frames[i], d.link_numbers[i]
+        R, omega, alpha, mass = frame.axes, frame.omega, frame.alpha, link.mass
+        arm = turn(R, link.com)
+        J = congruence(R, at6(link.inertia, 0))
+        a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, cross(omega, arm))))
+        moment, force = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega))), scale(mass, a)
         c = add(origin(d, i), arm)
         spatial(d.own[i], mass, c, J)
         demand_of(d, i, add(moment, cross(c, force)), force)

@@ -36,34 +36,22 @@ from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, 
 from flexclear.pipeline.dynamics.effects import DEEP, METHOD, Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
-#: what the functions are to who waits for them
-WORDS = {
-    "evaluate": "equations of motion",
-    "project": "closing of the loops",
-    "retract": "retractions",
-    "observe": "recorded quantities",
-    "advance": "integrator",
-    "resolve": "integrator's events",
-    "prescribe": "laws of time",
-    "describe": "recorded quantities",
-    SPECIALISED: "equations of motion of this mechanism alone",
-    WHOLE: "equations of motion of this mechanism alone",
-    DESCRIBED: "recorded quantities of this mechanism alone",
+#: of each function in words, and where the header keeps its address, if others call it; of straight code that depends
+#: on the rows solved for. In this order this process compiles, in the opposite one the second, so that they meet in the
+#: middle; what replaces straight code has most kernels in common, which each process compiles once
+FUNCTIONS: dict[str, tuple[str, int | None]] = {
+    "advance": ("integrator", None),
+    "prescribe": ("laws of time", m.PRESCRIBE),
+    "project": ("closing of the loops", m.PROJECT),
+    "retract": ("retractions", m.RETRACT),
+    "observe": ("recorded quantities", None),
+    "evaluate": ("equations of motion", m.EVALUATE),
+    "describe": ("recorded quantities", m.DESCRIBE),
+    DESCRIBED: ("recorded quantities of this mechanism alone", None),
+    WHOLE: ("equations of motion of this mechanism alone", None),
+    SPECIALISED: ("equations of motion of this mechanism alone", None),
+    "resolve": ("integrator's events", m.RESOLVE),
 }
-#: what is compiled where there is no straight code
-KERNELS = ("evaluate", "describe")
-#: what others call, and where the header keeps its address; of straight code that depends on the rows solved for
-ADDRESSES = {
-    "evaluate": m.EVALUATE,
-    "describe": m.DESCRIBE,
-    "project": m.PROJECT,
-    "retract": m.RETRACT,
-    "resolve": m.RESOLVE,
-    "prescribe": m.PRESCRIBE,
-}
-#: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the
-#: kernels have most kernels in common, which each process compiles once
-ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESCRIBED, WHOLE, SPECIALISED, "resolve")
 #: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
@@ -97,8 +85,9 @@ class Entry:
 
     def connect(self, h: np.ndarray) -> None:
         """Write into the header where this process has put the functions that others call."""
-        for name, where in ADDRESSES.items():
-            h[where] = self.addresses.get(name, 0)
+        for name, (_, where) in FUNCTIONS.items():
+            if where is not None:
+                h[where] = self.addresses.get(name, 0)
 
     def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
         """Slope of the state in Y at time t, into the first row of SLOPES."""
@@ -186,7 +175,7 @@ def entry(
 ) -> Entry:
     """The compiled functions for these parts; `tell` receives what has to be compiled.
 
-    equations: sources by name of KERNELS, or of straight code. Where there is none, kernels are compiled instead.
+    equations: sources by name of straight code, or of kernels; these are compiled instead where there is none.
     """
     meet(METHOD.format(scheme.integrator))
     if parts.articulated:
@@ -233,11 +222,11 @@ def _bring(
     helpers: gets the second process, where there is one.  late: files of which that may still be at work.
     """
     names = {path: name for name, path in files.items() if path.stem not in loaded}
-    requested = sorted(names, key=lambda path: ORDER.index(names[path]))
+    requested = sorted(names, key=lambda path: [*FUNCTIONS].index(names[path]))
     with disk_limits(folder):
         missing = [path for path in requested if not compiled(path)]
         helpers.enter_context(second_process(missing[::-1]))
-        bring(requested, lambda path: _announce(tell, WORDS[names[path]], began), late)
+        bring(requested, lambda path: _announce(tell, FUNCTIONS[names[path]][0], began), late)
         if missing:
             prune(folder)
 

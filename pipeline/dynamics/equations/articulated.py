@@ -384,7 +384,7 @@ def drive_power(d, b, motion):
 
 def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
     """The kernels unfactor(d), which leaves the modes' own mass so that they can get more, and refactor(d)."""
-    modal_mass, eliminate = flexible.mass_matrix, make_eliminate(flexible)
+    modal_mass = flexible.mass_matrix
 
     @kernel
     def unfactor(d):
@@ -392,11 +392,7 @@ def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
             d.mass[k] = 0.0
         modal_mass(d)
 
-    @kernel
-    def refactor(d):
-        eliminate(d)
-
-    return unfactor, refactor
+    return unfactor, make_eliminate(flexible)
 
 
 def make_eliminate(flexible: FlexibleBodies) -> Callable:

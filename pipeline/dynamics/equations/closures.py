@@ -255,7 +255,7 @@ class Closing(NamedTuple):
     close(d): rows, Jacobians and multipliers, see `finish`.  complete(d): the factor of J M^-1 J^T, of Jacobians that
     are there; needs the factor of M.  correction(d, residual, step): step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both
     indices in w, with the factors of `complete`: the least correction of the coordinates, in the metric of M, that
-    undoes a residual.  known_forces(d): takes the closures' fraction out of the forces that the drives must supply.
+    undoes a residual.  known_forces(d): takes what closures do out of the forces that the drives must supply.
     """
 
     close: Callable

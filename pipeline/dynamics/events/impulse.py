@@ -21,9 +21,8 @@ from flexclear.pipeline.dynamics.linear.tangent import free_motions
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
-from flexclear.pipeline.dynamics.run.states import rows_of
 
 #: singular values below this fraction of the largest are rounding
 IMPULSE_RANK = 1e-9

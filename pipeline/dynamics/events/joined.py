@@ -84,10 +84,7 @@ def _raised(model: Model) -> float:
 
 
 def joined(scene: Scene, phases: Sequence[Phase], doubts: Sequence[str]) -> LabelledArrays:
-    """All that is recorded of a run with events (schema RUN).
-
-    doubts: sentences for the warnings.
-    """
+    """All that is recorded of a run with events (schema RUN); doubts: sentences for its warnings."""
     runs = [phase.run for phase in phases if phase.run is not None]
     parts = [recorded(run) for run in runs]
     names = {dim: _names(parts, dim) for dim in dict.fromkeys(d for data in parts for d in data.sizes)}

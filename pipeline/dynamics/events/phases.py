@@ -10,7 +10,7 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.pipeline.core.scene.events import Event
-from flexclear.pipeline.core.scene.quantity import Quantity, condition
+from flexclear.pipeline.core.scene.quantity import condition
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
@@ -113,13 +113,14 @@ class _Plan:
             update={"time": start.scene.time.model_copy(update={"end": max(until, t + END * (end - t))})}
         )
         made = maker(scene, self.bundles, self.progress)
-        engine = made("", self.progress)
+        engine = made()
         y = consistent_start(engine)
         mended = tuple(mends(engine, y)) if start.before is None else ()
         known = before[-1].coordinates if before else {}
         if start.before is not None:
             y = carry(start.before[0].model, start.before[1], engine.model, y, known)
-        conditions = {n: self._condition(e) for n, e in due.items() if not isinstance(e.at, float)}
+        owners = self.scene.owners()
+        conditions = {n: condition(str(e.at), owners) for n, e in due.items() if not isinstance(e.at, float)}
         watch = Watch(engine, y, conditions, known)
         begins = _energies(engine, y, t)
         phase = Phase(None, t, begins, begins, watch.coordinates)
@@ -155,11 +156,8 @@ class _Plan:
         )
         return phase, event, (scene, last, state) if event is not None else None
 
-    def _condition(self, event: Event) -> Quantity:
-        return condition(str(event.at), self.scene.owners())
-
     def _followed(
-        self, engine: Engine, made: Callable[[str, Progress], Engine], y: np.ndarray, watch: Watch, watched: bool
+        self, engine: Engine, made: Callable[..., Engine], y: np.ndarray, watch: Watch, watched: bool
     ) -> tuple[Engine, Trajectory, str, str | None]:
         """The trajectory to the end of a phase, and the event whose condition ends it."""
         times = engine.output_times(self.scene.output.interval, self.scene.time.start)
@@ -187,7 +185,7 @@ class _Plan:
     def _steps(
         self,
         engine: Engine,
-        made: Callable[[str, Progress], Engine],
+        made: Callable[..., Engine],
         y: np.ndarray,
         stop: Stop,
         times: np.ndarray,
@@ -225,7 +223,7 @@ class _Plan:
             )
         free = freed(still, held)
         after = prescribed(free, event, held, phase.coordinates, t)
-        other = maker(free, self.bundles, self.progress)("", self.progress)
+        other = maker(free, self.bundles, self.progress)()
         struck = blow(other, consistent_start(other), t, rates(after, held, t))
         moved = moving(free, other, struck.y, t)
         after = after.model_copy(update={"body": moved.body, "start": moved.start})

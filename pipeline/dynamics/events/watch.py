@@ -72,7 +72,7 @@ class Watch:
             self._rows, self._seen = rows.copy(), self._joined(self._seen, self._observed(new))
         if self.hit is not None or self._seen is None or len(rows) <= self._looked:
             return
-        values = self._values(self._seen, self._time(rows))
+        values = self._values(self._seen, rows[:, 0])
         first = max(self._looked - 1, 0)
         found = [
             (time, name) for name, series in values.items() if (time := self._first(name, series, first)) is not None
@@ -88,22 +88,22 @@ class Watch:
         for k in range(max(first, 1), (up[0] if up else len(values) - 1)):
             a, b, c = values[k - 1 : k + 2]
             if a < b >= c and b <= 0.0 and 2.0 * b - min(a, c) > 0.0:
-                time = self._located(name, k - 1, self._time(self._rows)[k + 1])
+                time = self._located(name, k - 1, self._rows[k + 1, 0])
                 if time is not None:
                     return time
-        return self._located(name, up[0], self._time(self._rows)[up[0] + 1]) if up else None
+        return self._located(name, up[0], self._rows[up[0] + 1, 0]) if up else None
 
     def _located(self, name: str, k: int, end: float) -> float | None:
         """Time at which a condition becomes true between row k and a time; None where it does not."""
         row, known = self._rows[k : k + 1], self._head(k + 1)
-        begin, found = float(self._time(row)[0]), False
-        if begin in self._engine.breaks and self._values(self._observed(row, after=True), self._time(row))[name][0] > 0:
+        begin, found = float(row[0, 0]), False
+        if begin in self._engine.breaks and self._values(self._observed(row, after=True), row[:, 0])[name][0] > 0:
             return begin
         for _ in range(CLOSER_LOOKS):
             times = np.linspace(begin, end, PARTS + 1)
             inner = self._between(row, times)
             every = self._joined(known, self._observed(inner))
-            values = self._values(every, np.append(self._time(self._rows[: k + 1]), times))[name][-len(times) :]
+            values = self._values(every, np.append(self._rows[: k + 1, 0], times))[name][-len(times) :]
             after = np.flatnonzero((values[1:] > 0.0) & ~(values[:-1] > 0.0))
             if not len(after):
                 break
@@ -117,12 +117,10 @@ class Watch:
     def _between(self, row: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Rows at times from that of a row on, integrated from there."""
         engine = another(self._engine)
-        contacts = len(engine.model.contacts)
-        first = recording.record(row, contacts)
-        modes, latched = engine.modes.copy(), engine.latched.copy()
-        modes[:contacts], latched[:contacts] = first.modes[0], first.latched[0]
+        first = recording.record(row, len(engine.model.contacts))
+        modes, latched = first.modes[0], first.latched[0]
         watched, begun = np.zeros_like(engine.view(m.WATCH.place)), list[tuple[float, ...]]()
-        for c in np.flatnonzero(first.modes[0] > 0.0):
+        for c in np.flatnonzero(modes > 0.0):
             m.named(m.WATCH, watched)["event_row"][c] = len(begun)
             begun.append((float(c), float(m.CLOSING), float(times[0]), float(latched[c]), 0.0, 0.0, np.nan))
         open_events = np.array(begun).reshape(len(begun), m.EVENT.size)
@@ -167,6 +165,3 @@ class Watch:
     @staticmethod
     def _joined(one: Blocks | None, other: Blocks) -> Blocks:
         return other if one is None else {name: np.concatenate([one[name], other[name]]) for name in other}
-
-    def _time(self, rows: np.ndarray) -> np.ndarray:
-        return recording.record(rows, len(self._engine.model.contacts)).time

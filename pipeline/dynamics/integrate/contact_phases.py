@@ -62,12 +62,6 @@ def regimes(d, c):
 
 
 @kernel
-def passes_level(watch, level):
-    """Whether the sliding speed passes a level between the ends of a step."""
-    return (watch.slip0 - level) * (watch.slip1 - level) < 0.0
-
-
-@kernel
 def may_touch_level(watch, level, step):
     """Whether a sliding speed that ends a step on the same side of a level may have been on the other meanwhile.
 
@@ -145,7 +139,8 @@ def make_follow_contacts(
         if not has_regimes(d, c):
             return False
         watch, level = d.watch[c], d.contact_numbers[c].stick_speed
-        return passes_level(watch, level) or may_touch_level(watch, level, step)
+        passes = (watch.slip0 - level) * (watch.slip1 - level) < 0.0
+        return passes or may_touch_level(watch, level, step)
 
     @kernel
     def record_peak(d, step, c, rows, events):

@@ -230,8 +230,7 @@ def error(d, step):
 
 
 def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, Any]) -> tuple:
-    """The method's kernels; whole: what evaluates and leaves what the oscillators are made of, and the module that
-    factors the mass matrix."""
+    """The method's kernels; whole: what leaves all of an evaluation, and the module that factors the mass matrix."""
     complete, tree = whole
     find_oscillators = modal_basis.make_find_oscillators(retract, tree)
 

@@ -53,12 +53,6 @@ share_of_records = kernel(record_share)
 
 
 @kernel
-def holds_outputs(d, outputs, t):
-    """Whether there are several output times up to t that have not been recorded."""
-    return d.next_output + 1 < outputs.shape[0] and outputs[d.next_output + 1] <= t
-
-
-@kernel
 def hold_modes(d):
     """Keep the modes and impact rates that hold within the step, which its end may change."""
     for c in range(d.n_contacts):

@@ -45,28 +45,10 @@ def pivot(d, r):
 
 
 @kernel
-def now(d, r):
-    """Where w holds the independence of row r at the end of the step."""
-    return d.at_independence + r
-
-
-@kernel
-def past(d, r):
-    """The same at its start."""
-    return d.at_independence + d.n_closure_rows + r
-
-
-@kernel
-def most(d, r):
-    """The most that it has been at the ends of steps."""
-    return d.at_independence + 2 * d.n_closure_rows + r
-
-
-@kernel
 def note(d):
     """Remember how independent the closure rows are in the state just evaluated."""
     for r in range(d.n_kept_rows):
-        d.w[now(d, r)] = pivot(d, r)
+        d.independence[r].now = pivot(d, r)
     d.sigma = np.sqrt(max(d.last_pivot, 0.0))
 
 
@@ -75,8 +57,9 @@ def left(d):
     """Least fraction that a row has of the most that it had, in what has been noted."""
     least = 1.0
     for r in range(d.n_kept_rows):
-        if d.w[now(d, r)] < least * d.w[most(d, r)]:
-            least = d.w[now(d, r)] / d.w[most(d, r)]
+        row = d.independence[r]
+        if row.now < least * row.most:
+            least = row.now / row.most
     return least
 
 
@@ -84,8 +67,8 @@ def left(d):
 def stand(d, t):
     """Take what has been noted at time t for the start of the next step."""
     for r in range(d.n_kept_rows):
-        d.w[past(d, r)] = d.w[now(d, r)]
-        d.w[most(d, r)] = max(d.w[most(d, r)], d.w[now(d, r)])
+        row = d.independence[r]
+        row.past, row.most = row.now, max(row.most, row.now)
     d.past_time, d.left = t, left(d)
 
 
@@ -102,7 +85,7 @@ def zero_ahead(sigma, fall, before, span):
 def full(d, r):
     """How independent row r is away from singular poses."""
     o = d.at_row_scale + r
-    return max(d.w[most(d, r)], HALF * np.sqrt(max(d.w[o], d.w[o + d.n_closure_rows])))
+    return max(d.independence[r].most, HALF * np.sqrt(max(d.w[o], d.w[o + d.n_closure_rows])))
 
 
 def make_foresee(evaluate: Callable) -> Callable:
@@ -113,10 +96,10 @@ def make_foresee(evaluate: Callable) -> Callable:
         """Row that is first to depend on those before it, and when, by straight lines; -1 when that is far."""
         horizon, first, which = STEPS_AHEAD * max(span, d.step), NEVER, -1
         for r in range(d.n_kept_rows):
-            value, before = d.w[now(d, r)], d.w[past(d, r)]
-            if value < before:
-                rough = value * span / (before - value)
-                if rough < first and (rough <= horizon or value <= LOW * d.w[most(d, r)]):
+            row = d.independence[r]
+            if row.now < row.past:
+                rough = row.now * span / (row.past - row.now)
+                if rough < first and (rough <= horizon or row.now <= LOW * row.most):
                     first, which = rough, r
         return which, first
 
@@ -128,7 +111,7 @@ def make_foresee(evaluate: Callable) -> Callable:
         """
         span = t - d.past_time
         which, rough = soonest(d, span)
-        value, before = d.w[now(d, max(which, 0))], d.w[past(d, max(which, 0))]
+        value, before = d.independence[max(which, 0)].now, d.independence[max(which, 0)].past  # `stand` moves them
         stand(d, t)
         blind = 0.0 < d.sigma < np.sqrt(BLIND)
         d.blind_steps = d.blind_steps + 1.0 if blind else 0.0

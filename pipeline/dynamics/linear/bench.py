@@ -26,7 +26,6 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.pipeline.dynamics.run.run import begun, driven
-from flexclear.pipeline.dynamics.run.states import rows_of
 
 Pose = TypeVar("Pose")
 
@@ -190,7 +189,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
 
 def rows(bench: Bench, states: np.ndarray) -> np.ndarray:
     """Rows of the record for states; contacts act as they are."""
-    return rows_of(bench.engine, states, bench.time, 1.0, NO_IMPACT)
+    return observation.rows_of(bench.engine, states, bench.time, 1.0, NO_IMPACT)
 
 
 def observe(bench: Bench, states: np.ndarray) -> Observed:

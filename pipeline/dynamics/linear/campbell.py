@@ -58,9 +58,10 @@ class Point:
 
 @dataclass
 class Branch:
-    """Vibrations of one kind. places: (speed, vibration); whirls: their frequencies in fixed axes, NaN where none."""
+    """Vibrations of one kind. places: number of the speed, what is there, which vibration; whirls: their frequencies in
+    fixed axes, NaN where none."""
 
-    places: list[tuple[int, int]]
+    places: list[tuple[int, Point, int]]
     whirls: list[float]
 
     @property
@@ -68,6 +69,12 @@ class Branch:
         """Whirl frequency at the next speed, on a straight line."""
         last = self.whirls[-2:]
         return float(last[-1] if len(last) < 2 or np.isnan(last[0]) else 2.0 * last[1] - last[0])
+
+    @property
+    def lowest(self) -> float:
+        """Whirl frequency at the lowest speed, or that of the vibration there."""
+        _, point, k = self.places[-1]
+        return self.whirls[-1] if np.isfinite(self.whirls[-1]) else abs(point.small.value[k].imag)
 
 
 def campbell(
@@ -177,31 +184,27 @@ def _sense(moved: np.ndarray, axis: np.ndarray) -> np.ndarray:
 def _followed(points: Sequence[Point | None]) -> list[Branch]:
     """The branches of all vibrations, from the last speed down: there whirls have separated most."""
     branches: list[Branch] = []
-    for s in reversed(range(len(points))):
-        point = points[s]
+    for s, point in reversed(list(enumerate(points))):
         if point is None:
             continue
         n = len(point.small.value)
-        cost = np.array([[_misfit(points, branch, point, k)[0] for k in range(n)] for branch in branches])
+        cost = np.array([[_misfit(branch, point, k)[0] for k in range(n)] for branch in branches])
         taken = set[int]()
         for row, chosen in zip(*linear_sum_assignment(cost.reshape(len(branches), n)), strict=True):
-            whirl = _misfit(points, branches[row], point, int(chosen))[1]
-            branches[row].places.append((s, int(chosen)))
-            branches[row].whirls.append(whirl)
+            branches[row].whirls.append(_misfit(branches[row], point, int(chosen))[1])
+            branches[row].places.append((s, point, int(chosen)))
             taken.add(int(chosen))
         for k in range(n):
             if k in taken:
                 continue
             whirls = point.whirls(k)
-            branches.append(Branch([(s, k)], [float(whirls[0]) if len(whirls) == 1 else np.nan]))
-    return sorted(branches, key=lambda b: (abs(_lowest(points, b)), b.whirls[-1]))
+            branches.append(Branch([(s, point, k)], [float(whirls[0]) if len(whirls) == 1 else np.nan]))
+    return sorted(branches, key=lambda b: (abs(b.lowest), b.whirls[-1]))
 
 
-def _misfit(points: Sequence[Point | None], branch: Branch, point: Point, k: int) -> tuple[float, float]:
+def _misfit(branch: Branch, point: Point, k: int) -> tuple[float, float]:
     """How little vibration k continues a branch, by shape and frequency, and its whirl frequency there."""
-    s, other = branch.places[-1]
-    before = points[s]
-    assert before is not None
+    _, before, other = branch.places[-1]
     w, heavy = before.small.shape[:, other], point.heavy[:, k]
     unlike = 1.0 - min(1.0, max(abs(np.vdot(w, heavy)), abs(np.dot(w, heavy))))
     whirls = point.whirls(k)
@@ -214,13 +217,6 @@ def _misfit(points: Sequence[Point | None], branch: Branch, point: Point, k: int
     return unlike + float(off.min()), float(whirls[np.argmin(off)])
 
 
-def _lowest(points: Sequence[Point | None], branch: Branch) -> float:
-    s, k = branch.places[-1]
-    point = points[s]
-    assert point is not None
-    return branch.whirls[-1] if np.isfinite(branch.whirls[-1]) else abs(point.small.value[k].imag)
-
-
 def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Point | None]) -> xr.Dataset:
     branches = _followed(points)
     shape = len(speeds), len(branches)
@@ -228,9 +224,7 @@ def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Poin
     dominant, kind, critical = [], [], np.full(len(branches), np.nan)
     for b, branch in enumerate(branches):
         names = []
-        for (s, k), omega in zip(branch.places, branch.whirls, strict=True):
-            point = points[s]
-            assert point is not None
+        for (s, point, k), omega in zip(branch.places, branch.whirls, strict=True):
             value = point.small.value[k]
             frequency[s, b], decay[s, b] = abs(value.imag) / (2.0 * np.pi), 0.0 - value.real
             whirl[s, b], over[s, b] = omega / (2.0 * np.pi), omega - point.omega[k]

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -36,7 +37,7 @@ from flexclear.pipeline.dynamics.model.constraints import Constraint, constraint
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches, reached
 from flexclear.pipeline.dynamics.run.run import Run
 
 #: the motion is examined so often
@@ -68,13 +69,13 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Ma
         poses = [Placement(frame["origin"], frame["axes"]) for frame in seen.links[row]]
         lever = lever_of(model, joints, poses)
         for q in asked:
-            adjoint = lever.adjoint(shown(model, poses, q.owner, turning=q.kind == "orientation"))
-            if not whole or adjoint.free > FREE:
+            adjoint, free = lever.adjoint(shown(model, poses, q.owner, turning=q.kind == "orientation"))
+            if not whole or free > FREE:
                 for bound in clearance.values():
                     bound[q.name] = np.inf
                 continue
             for name in loose:
-                reach = lever.clearance(name, adjoint.rows) * _play(full.contacts()[name], load[name])
+                reach = lever.clearance(name, adjoint) * _play(full.contacts()[name], load[name])
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
     return clearance
 
@@ -107,11 +108,14 @@ class Lever:
     joints: Mapping[str, tuple[Constraint, slice, np.ndarray]]
     length: float
 
-    def adjoint(self, shown: np.ndarray) -> Adjoint:
-        """The adjoint solution of what is shown, (3, 6 (links - 1)): what unit loads on it do in the joints."""
+    def adjoint(self, shown: np.ndarray) -> tuple[np.ndarray, float]:
+        """The adjoint solution of what is shown, (3, 6 (links - 1)): what unit loads on it do in the joints.
+
+        As motion of what is shown per opening, (3, rows); and by how much joints and drives leave it free.
+        """
         dual = self.normal.solve(np.ascontiguousarray(shown.T))
         rows = self.gradient @ dual
-        return Adjoint(-rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0)))
+        return -rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0))
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
         """Largest motion of what an adjoint solution describes, per metre of separation of a joint's points."""
@@ -119,14 +123,6 @@ class Lever:
         count = 2 if constraint.edge.kind == "revolute" else 3
         first = rows[:, mine][:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
-
-
-@dataclass(frozen=True)
-class Adjoint:
-    """rows: motion of what is shown per opening, (3, rows).  free: by how much joints and drives leave it free."""
-
-    rows: np.ndarray
-    free: float
 
 
 def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
@@ -197,34 +193,25 @@ def modal_forces(
     return np.asarray(forces)
 
 
-@dataclass(frozen=True)
-class Carried:
-    """What a deforming body moves with itself. at: a point of it, world axes.  turn, shift: of its axes and of that
-    point per elastic coordinate, shape (3, mode)."""
-
-    at: np.ndarray
-    turn: np.ndarray
-    shift: np.ndarray
-
-    def shift_of(self, point: np.ndarray) -> np.ndarray:
-        """Of another point that is fixed to it, world axes."""
-        return np.asarray(self.shift + np.cross(self.turn, point - self.at, axisa=0, axisb=0).T)
-
-
 def openings(
     model: Model, poses: Sequence[Placement], lever: Lever, name: str, bundle: Labelled
-) -> tuple[np.ndarray, dict[str, Carried]]:
-    """How the elastic coordinates of a body open the joints, shape (rows, mode), and move what is fixed to it."""
+) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
+    """How the elastic coordinates of a body open the joints, shape (rows, mode), and move the bodies fixed to it.
+
+    These by the turn of their axes and the shift of their centres of mass, world axes, shape (3, mode).
+    """
     i = model.mechanism.link_of[name]
     placement = poses[i].of(model.mechanism.links[i].places[name])
     frames = [str(frame) for frame in bundle["frame"].values]
-    matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, Carried]()
+    matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, tuple[Any, Any]]()
     for body, frame in _carried(model.scene, name).items():
         k = frames.index(frame)
         u = placement.R @ bundle["frame_translation_shape"].values[k]
         theta = placement.R @ bundle["frame_rotation_shape"].values[k]
         at = placement.of(Placement(bundle["frame_position"].values[k])).p
-        carried[body] = Carried(at, theta, u)
+        if body in model.scene.body:
+            arm = centre(model, poses, body) - at
+            carried[body] = theta, u + np.cross(theta, arm, axisa=0, axisb=0).T
         twist = np.vstack([theta, u - np.cross(theta, at, axisa=0, axisb=0).T])
         for constraint, rows, wrenches in lever.joints.values():
             for end, sign in ((constraint.edge.frame_a, -1.0), (constraint.edge.frame_b, 1.0)):
@@ -248,20 +235,11 @@ def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:
 def _carried(scene: Scene, name: str) -> dict[str, str]:
     """Bodies fixed to a body, by its frame that carries them; the body itself by each frame with another joint."""
     fixed = [part.between for part in scene.joint.values() if part.type == "fixed"]
-    carriers: dict[str, str] = {}
-    open_ends = []
-    for a, b in fixed:
-        for here, there in ((a, b), (b, a)):
-            if here.partition(".")[0] == name:
-                carriers[there.partition(".")[0]] = here.partition(".")[2]
-                open_ends.append(there.partition(".")[0])
-    while open_ends:
-        body = open_ends.pop()
-        for a, b in fixed:
-            for here, there in ((a, b), (b, a)):
-                other = there.partition(".")[0]
-                if here.partition(".")[0] == body and other not in carriers and other != name:
-                    carriers[other] = carriers[body]
-                    open_ends.append(other)
+    pairs = [(a.partition(".")[0], b.partition(".")[0]) for a, b in fixed]
+    beyond, carriers = [pair for pair in pairs if name not in pair], dict[str, str]()
+    for ends, pair in zip(fixed, pairs, strict=True):
+        for here, there in ((0, 1), (1, 0)):
+            if pair[here] == name:
+                carriers |= dict.fromkeys(reached(pair[there], beyond), ends[here].partition(".")[2])
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
     return carriers | {f"{name}.{frame}": frame for frame in own}

@@ -33,7 +33,7 @@ from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, 
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, magnitude, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, vibrations
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.run.evaluation.closure_rows import built_rows
+from flexclear.pipeline.dynamics.run.evaluation.closure_rows import row_units
 
 #: iterations before giving up
 MOST_MOVES = 200
@@ -266,8 +266,8 @@ def _require_steady(bench: Bench, at: Tangent) -> None:
         return
     model, before = bench.model, balance(bench, at.q)
     forces = balancing(bench)
-    along = built_rows(model, bench.engine.h) == 0
-    loops = float(np.max(np.abs(before.slip) / np.where(along, model.length, 1.0), initial=0.0))
+    units = row_units(model, bench.engine.h, model.length)
+    loops = float(np.max(np.abs(before.slip) / units, initial=0.0))
     if loops <= STEADY * fastest:
         set_drives(
             bench, bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, 0.0 * bench.drives[:, 1]], axis=1)

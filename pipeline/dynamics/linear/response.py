@@ -68,10 +68,7 @@ def response(
     bundles: Mapping[str, Labelled],
     chosen: Sequence[Quantity],
 ) -> Response:
-    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid version.
-
-    bundles: the reduced bodies.
-    """
+    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid version."""
     model, time = run.model, run.trajectory.time
     motions = Motions(model, run.observed)
     unknown = Response(np.nan, np.nan, np.nan, {q.name: np.inf for q in chosen})
@@ -134,8 +131,7 @@ def _assembled(
         mine = slice(first[k], first[k + 1])
         opened[:, mine], carried = clearance_response.openings(model, poses, lever, name, bundle)
         for body in own.keys() & carried.keys() - {name}:
-            own[body][0][:, mine] = carried[body].turn
-            own[body][1][:, mine] = carried[body].shift_of(clearance_response.centre(model, poses, body))
+            own[body][0][:, mine], own[body][1][:, mine] = carried[body]
     Z = scipy.linalg.null_space(np.hstack([lever.gradient.toarray(), opened]), rcond=FOLLOWED)
     M, momenta = _mass(model, poses, bundles, first, own)
     K = scipy.linalg.block_diag(*(b["modal_stiffness"].values for b in bundles.values()))

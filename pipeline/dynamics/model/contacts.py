@@ -1,4 +1,4 @@
-"""The tables of the contacts: wiring, numbers of their laws, and their fraction of the state."""
+"""The tables of the contacts: wiring, numbers of their laws, and their variables in the state."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ class Gauges:
     """Gauges and internal states given out so far.
 
     rows: of the table GAUGES.  owners: sites, or -1, between which the part of each internal state acts; these states
-    stand at the end of the state.
+    are at the end of the state.
     """
 
     rows: list[tuple[int, ...]] = field(default_factory=list)

@@ -58,14 +58,14 @@ def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
 def fill(laws: Sequence[Pieces]) -> dict[Any, Any]:
     """The tables LAWS, PIECES, PIECE_HARMONICS and HARMONICS."""
     rows: list[tuple[int, int]] = []
-    fractions: list[tuple[int, int]] = []
+    parts: list[tuple[int, int]] = []
     pieces = [np.zeros((0, m.PIECES.size))]
     harmonics: list[tuple[float, float, float]] = []
     for law in laws:
         table, terms = law.table()
-        rows.append((len(fractions), len(table)))
+        rows.append((len(parts), len(table)))
         pieces.append(table)
         for piece in terms:
-            fractions.append((len(harmonics), len(piece)))
+            parts.append((len(harmonics), len(piece)))
             harmonics += piece
-    return {m.LAWS: rows, m.PIECES: np.concatenate(pieces), m.PIECE_HARMONICS: fractions, m.HARMONICS: harmonics}
+    return {m.LAWS: rows, m.PIECES: np.concatenate(pieces), m.PIECE_HARMONICS: parts, m.HARMONICS: harmonics}

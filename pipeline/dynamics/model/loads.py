@@ -72,12 +72,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
         loads.append(Load(name, frames))
         a, b = _sites(mechanism, numbering, loads[-1])
         gauge = -1 if coordinate is None else gauges.add(a, b, coordinate, counts=row.counts_turns)
-        look = -1
-        if measured is not None:
-            first_end, second_end = (
-                numbering.site(mechanism.site(frame)) for frame in scene.joint[measured[0]].between
-            )
-            look = gauges.add(first_end, second_end, measured[1], counts=True)
+        look = -1 if measured is None else gauges.add(*numbering.sites_of(measured[0]), measured[1], counts=True)
         internal = gauges.states(row.states, a, b) if row.states else -1
         first = numbering.known + len(laws)
         if f"load.{name}" in given:
@@ -104,8 +99,7 @@ def _look(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str,
     scene = mechanism.scene
     if sort == "coordinate":
         joint, coordinate = named_coordinate(scene, name, "[load]")
-        a, b = (numbering.site(mechanism.site(frame)) for frame in scene.joint[joint].between)
-        return gauges.add(a, b, coordinate, counts=True)
+        return gauges.add(*numbering.sites_of(joint), coordinate, counts=True)
     if sort == "frame":
         return numbering.site(mechanism.site(name))
     i = mechanism.link_of[name]

@@ -162,7 +162,7 @@ class Mechanism:
 
     origin: point of the world that the kernels use as theirs, close to the mechanism.  length: size of the mechanism
     [m].
-    components: its parts that fraction no force.
+    components: its parts that share no force.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     choice: which of several ways it was assembled in, and frames moved for that, in words; empty without these.
@@ -312,7 +312,8 @@ def _joined(
     assert edge is not None
     assert far is not None
     path = edge.kind == PATH
-    inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, str(branch.parent_frame))
+    near = edge.frame_b if branch.reverse else edge.frame_a
+    inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, near)
     joints = chain(edge, branch.reverse, inboard.frame is not None, body.group.flexible)
     here = links[inboard.link].start.of(inboard.place)
     axes, between = np.eye(3), list[Link]()

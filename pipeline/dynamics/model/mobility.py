@@ -112,8 +112,8 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
     random = np.random.default_rng(0)
     left, stayed, evidence = [(here.rank, start)], [(here.rank, start)], 0
     for k in range(POSE_TRIES):
-        fraction = random.normal(size=here.free.shape[1])
-        motion = here.free @ (fraction / np.linalg.norm(fraction))
+        direction = random.normal(size=here.free.shape[1])
+        motion = here.free @ (direction / np.linalg.norm(direction))
         motion *= NEARBY[k % 2] / max(1.0, float(np.linalg.norm(motion)))
         closed = close(model.mechanism, joints, _displaced(model, start, motion))
         if closed is None:
@@ -165,12 +165,12 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
     carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
     joints, row = set[str](), 0
     for closure in model.closures:
-        fraction = stresses[:, row : row + len(closure.rows)]
+        stress = stresses[:, row : row + len(closure.rows)]
         for acts in acting(closure, poses, L):
-            wrench = acts.wrenches(L).T @ fraction.T
+            wrench = acts.wrenches(L).T @ stress.T
             carried[acts.a.link] -= wrench
             carried[acts.b.link] += wrench
-        if not isinstance(closure, Coupling) and np.max(np.abs(fraction), initial=0.0) > CARRIES:
+        if not isinstance(closure, Coupling) and np.max(np.abs(stress), initial=0.0) > CARRIES:
             joints.add(closure.name)
         row += len(closure.rows)
     for i in range(len(mechanism.links) - 1, 0, -1):

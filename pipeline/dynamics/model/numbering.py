@@ -61,6 +61,11 @@ class Numbering:
                 return k
         return self.add_site(site)
 
+    def sites_of(self, joint: str) -> tuple[int, int]:
+        """Numbers of the sites at both frames of a joint."""
+        first, second = (self.site(self.mechanism.site(frame)) for frame in self.mechanism.scene.joint[joint].between)
+        return first, second
+
     def add_site(self, site: Site) -> int:
         """Number of a new site, with a port of its own where the link is flexible."""
         self.sites.append(site)

@@ -108,7 +108,8 @@ def unused_frames(mechanism: Mechanism) -> list[str]:
 
 def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
     """Unused frames at one point of two bodies that nothing connects, as without a joint: body, text and remedy."""
-    connected = {frozenset(_links(mechanism, pair)) for pair in _pairs(mechanism.scene)}
+    parts = (*mechanism.scene.joint.values(), *mechanism.scene.load.values())
+    connected = {frozenset(_links(mechanism, part.between)) for part in parts if hasattr(part, "between")}
     result = []
     for a, b in combinations(unused_frames(mechanism), 2):
         links = _links(mechanism, (a, b))
@@ -119,12 +120,6 @@ def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
             remedy = f'add a joint with between = ["{a}", "{b}"], or remove the frames'
             result.append((mechanism.frames[a].body, text, remedy))
     return result
-
-
-def _pairs(scene: Scene) -> Iterator[tuple[str, str]]:
-    for part in (*scene.joint.values(), *scene.load.values()):
-        if hasattr(part, "between"):
-            yield part.between
 
 
 def _links(mechanism: Mechanism, frames: tuple[str, str]) -> list[int]:

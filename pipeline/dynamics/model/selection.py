@@ -82,8 +82,8 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
             turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
             angle = np.linalg.norm(turn, axis=1)
             way = np.linalg.norm(shift + np.cross(turn, points[site]), axis=1) + model.length * angle
-            fraction = mobility[support[c["support0"] + mine["slot"]]]
-            along, about = (np.sum((ratio * size) ** 2 * fraction) for size in (way, angle))
+            mobilities = mobility[support[c["support0"] + mine["slot"]]]
+            along, about = (np.sum((ratio * size) ** 2 * mobilities) for size in (way, angle))
             total = total + np.where(turning, about, along)
         lengths[c["row0"] : c["row0"] + c["n_rows"]] = np.sqrt(total)
     return lengths

@@ -51,11 +51,6 @@ class Branch:
         """The joint's frame on the link itself; None for a body that nothing holds."""
         return None if self.edge is None else self.edge.frame_a if self.reverse else self.edge.frame_b
 
-    @property
-    def parent_frame(self) -> str | None:
-        """The joint's frame on the parent."""
-        return None if self.edge is None else self.edge.frame_b if self.reverse else self.edge.frame_a
-
 
 def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
     """Joints between different groups, and paths. Of a clearance joint, what it holds next to its contact."""

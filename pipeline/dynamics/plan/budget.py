@@ -73,39 +73,31 @@ class Search:
     def decide(
         self,
         effect: Effect,
-        recorded: bool,
+        kept: bool,
         evidence: str,
         reason: str,
         estimate: Mapping[str, float] | None = None,
         uncertainty: Mapping[str, float] | None = None,
     ) -> None:
         """Write down what becomes of an effect."""
-        self.decisions[effect.name] = Decision(effect, recorded, evidence, reason, estimate or {}, uncertainty or {})
+        self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
 
     def judge(
-        self,
-        effect: Effect,
-        small: bool,
-        why: str,
-        most: Mapping[str, float],
-        effect_sizes: Mapping[str, Influence],
-        besides: str = "",
+        self, effect: Effect, why: str, most: Mapping[str, float], seen: Mapping[str, Influence], besides: str = ""
     ) -> None:
-        """Record the results of short runs. why: reason to drop it, if it is small.  most, effect_sizes: its effect
-        there.
+        """Record what short runs show of an effect, at most and as it was seen.
 
-        besides: text before the reason why it stays.
+        why: reason to drop it; empty where it stays, with `besides` before the reason of that.
         """
-        difference = {name: influence.difference for name, influence in effect_sizes.items()}
-        uncertainty = {name: influence.uncertainty for name, influence in effect_sizes.items()}
-        self.decide(
-            effect,
-            not small,
-            PILOT,
-            why if small else besides + too_much(most, self.requested),
-            difference,
-            uncertainty,
-        )
+        difference = {name: influence.difference for name, influence in seen.items()}
+        uncertainty = {name: influence.uncertainty for name, influence in seen.items()}
+        reason = why or besides + too_much(most, self.requested)
+        self.decide(effect, not why, PILOT, reason, difference, uncertainty)
+
+
+def most_of(seen: Mapping[str, Influence]) -> dict[str, float]:
+    """What influences may come to."""
+    return {name: influence.most for name, influence in seen.items()}
 
 
 def with_doubt(

@@ -14,9 +14,9 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.integrators import DEFAULT
-from flexclear.pipeline.core.scene.variants import Effect, effects
-from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, BUDGET, WHOLE, Chosen, Search, with_doubt
-from flexclear.pipeline.dynamics.plan.screening_runs import LEAST_PART, MEMBERS, OF_TIGHT, TAKES_LONG, shorter
+from flexclear.pipeline.core.scene.variants import Effect
+from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, BUDGET, WHOLE, Chosen, Search, most_of, with_doubt
+from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS, OF_TIGHT, longest
 from flexclear.pipeline.dynamics.plan.tolerance import TIGHTEST
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
@@ -39,22 +39,19 @@ MOST_WORK = 3e8
 
 def bent(search: Search, soft: Sequence[Effect]) -> None:
     """Decide between flexible and rigid bodies in a mechanism that stays loose."""
-    pilots = search.pilots
-    every = effects(pilots.scene)
-    gone = [*search.gone, *(e for e in every if e.within in {g.name for g in search.gone})]
-    rigid = [*gone, *soft, *(e for e in every if e.within in {s.name for s in soft})]
+    pilots, gone = search.pilots, search.gone
     for fraction in sorted({pilots.part(gone), pilots.whole(gone)}):
         there = pilots.must_run(gone, fraction)
-        effect_sizes = pilots.between(pilots.point(rigid, fraction=fraction), there)
-        effect_sizes = with_doubt(search, effect_sizes, False, _more(fraction))
-        most = {name: i.most for name, i in effect_sizes.items()}
+        seen = pilots.between(pilots.point([*gone, *soft], fraction=fraction), there)
+        seen = with_doubt(search, seen, False, _more(fraction))
+        most = most_of(seen)
         if not search.fits(most):
             break
     small = search.fits(most)
     if small:
         search.spend(most)
     for effect in soft:
-        search.judge(effect, small, "with or without bending the loose joints do the same", most, effect_sizes)
+        search.judge(effect, "with or without bending the loose joints do the same" if small else "", most, seen)
 
 
 def quickest(search: Search) -> Chosen:
@@ -66,13 +63,12 @@ def quickest(search: Search) -> Chosen:
     ones lose a few per cent of the energy where stability bounds the steps.
     """
     pilots, gone = search.pilots, search.gone
-    loose, fraction = pilots.loose(pilots.variant(gone)), pilots.whole(gone)
+    loose = pilots.loose(pilots.variant(gone))
     tight, most = max(TIGHTER * loose, TIGHTEST), OF_TIGHT * pilots.extent.most
     unknown = Chosen(DEFAULT, tight, dict.fromkeys(search.requested, np.nan))
-    there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
-    while TAKES_LONG in there.refused and fraction > LEAST_PART:
-        fraction = shorter(fraction)
-        there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
+    fraction, there = longest(
+        pilots.whole(gone), lambda part: pilots.point(gone, fraction=part, rtol=tight, evaluations=most)
+    )
     if there.refused:
         return unknown
     levels = _levels(search)

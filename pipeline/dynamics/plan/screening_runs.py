@@ -15,7 +15,7 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import Effect, with_modes, without
+from flexclear.pipeline.core.scene.variants import Effect, effects, with_modes, without
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.model.mechanism import build
@@ -50,9 +50,11 @@ TAKES_LONG = "[solver.evaluations]"
 Key = tuple[frozenset[str], str]
 
 
-def shorter(fraction: float) -> float:
-    """The part of the time that is run where a part takes too long."""
-    return max(LEAST_PART, SHORTER * fraction)
+def longest(fraction: float, run: Callable[[float], Point]) -> tuple[float, Point]:
+    """The part of the time, from a fraction down, that does not take too long, and the run over it."""
+    while TAKES_LONG in (there := run(fraction)).refused and fraction > LEAST_PART:
+        fraction = max(LEAST_PART, SHORTER * fraction)
+    return fraction, there
 
 
 @dataclass(frozen=True)
@@ -90,11 +92,22 @@ class Pilots:
     _variants: dict[tuple[frozenset[str], bool], Scene] = field(default_factory=dict)
     _engines: dict[tuple[frozenset[str], int | None, str], Engine | None] = field(default_factory=dict)
 
+    @cached_property
+    def every(self) -> tuple[Effect, ...]:
+        """All effects of the scene."""
+        return effects(self.scene)
+
+    def _names(self, gone: Collection[Effect]) -> frozenset[str]:
+        """Of effects, and of those within them, which go with them."""
+        names = {effect.name for effect in gone}
+        return frozenset(names | {effect.name for effect in self.every if effect.within in names})
+
     def variant(self, gone: Collection[Effect]) -> Scene:
-        """The scene without some effects, integrated as pilots are."""
-        names = frozenset(effect.name for effect in gone)
+        """The scene without some effects and what lies within them, integrated as pilots are."""
+        names = self._names(gone)
         if (names, self.refused_loose) not in self._variants:
-            self._variants[names, self.refused_loose] = self._made(without(self.scene, gone))
+            bare = without(self.scene, [effect for effect in self.every if effect.name in names])
+            self._variants[names, self.refused_loose] = self._made(bare)
         return self._variants[names, self.refused_loose]
 
     def _made(self, bare: Scene) -> Scene:
@@ -128,9 +141,7 @@ class Pilots:
         begun = self.must_run(gone, BEGINNING, 0)
         fraction = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
         fraction = LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
-        while TAKES_LONG in self.must_run(gone, fraction).refused and fraction > LEAST_PART:
-            fraction = shorter(fraction)
-        return fraction
+        return longest(fraction, lambda part: self.must_run(gone, part))[0]
 
     def whole(self, gone: Collection[Effect]) -> float:
         """The part of the time over which a variant that stays loose is examined: all of it where that can be had."""
@@ -150,7 +161,7 @@ class Pilots:
         level: with so few modes of those bodies that have a choice; None: with all.  members: starts, where there are
             contacts.
         """
-        scene, names = self.variant(gone), frozenset(effect.name for effect in gone)
+        scene, names = self.variant(gone), self._names(gone)
         key = (names, json.dumps([scene.solver.model_dump(mode="json") | solver, level, fraction, members]))
         if key not in self.points:
             mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}

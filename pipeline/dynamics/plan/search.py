@@ -27,7 +27,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.pipeline.dynamics.linear.response import Response, response
-from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, BUDGET, WHOLE, Chosen, Search, with_doubt
+from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, BUDGET, WHOLE, Chosen, Search, most_of, with_doubt
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
 from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
@@ -66,29 +66,22 @@ def plan(
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
     uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
-    bare = lessened(_plain(scene), uncoupled_parts)
+    plain = edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
+    bare = lessened(plain, uncoupled_parts)
     mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
     pilots = Pilots(bare, mine, less, filled, quantities, progress)
     _ = pilots.extent  # a scene that cannot be built is refused before anything is run
     pilots.must_run((), BEGINNING, 0)
-    every = effects(bare)
-    loose = [effect for effect in every if effect.kind == CLEARANCE]
-    soft = [effect for effect in every if effect.kind == FLEXIBILITY]
-    inner = [effect for effect in every if effect.within]
-    within_bodies = [e for e in inner if e.within.startswith("body.")]
-    ideal = pilots.point([*loose, *soft, *inner], rtol=RTOL)
-    search = Search(pilots, _requested(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
-    rigid = _rigid(search, [*loose, *soft, *inner]) if loose or soft else None
-    _clearances(search, loose, [*soft, *inner], rigid)
-    _interactions(search, soft, inner)
-    _flexibilities(search, soft, loose, inner, rigid)
-    _confirm(search, soft, inner)
-    _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
+    loose, soft = ([effect for effect in pilots.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
+    ideal = pilots.point([*loose, *soft], rtol=RTOL)
+    search = Search(pilots, _requested(scene, quantities, ideal, lambda: pilots.point(soft)))
+    rigid = _rigid(search, [*loose, *soft]) if loose or soft else None
+    _clearances(search, loose, soft, rigid)
+    _interactions(search, soft)
+    _flexibilities(search, soft, loose, rigid)
+    _confirm(search, soft)
+    _others(search)
     return _finished(search, effects(scene), uncoupled_parts, meshes)
-
-
-def _plain(scene: Scene) -> Scene:
-    return edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
 
 
 def _requested(
@@ -161,25 +154,39 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
                 effect, False, BOUND, "its clearance cannot move the requested quantities by more", reach[effect.name]
             )
         return
-    there = search.pilots.point([e for e in soft if e.kind == FLEXIBILITY or e.within.startswith("body.")])
-    dropped: list[Effect] = []
-    for effect in sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf)):
+    shaken = any(effect.kind == FLEXIBILITY or effect.within for effect in pilots.every)
+    ordered = sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf))
+    _in_turn(search, ordered, soft, reach, "its impacts change the requested quantities by less", shaken)
+
+
+def _in_turn(
+    search: Search,
+    ordered: Sequence[Effect],
+    others: Sequence[Effect],
+    reach: Mapping[str, Mapping[str, float]],
+    why: str,
+    shaken: bool,
+) -> None:
+    """Drop effects one after the other, as long as what they change together fits into the budget.
+
+    others: that no run has.  reach: bounds by effect, where there are some.  shaken: as `soft` of `with_doubt`.
+    """
+    pilots, dropped, left = search.pilots, list[Effect](), dict[str, float]()
+    there = pilots.point(others)
+    for effect in ordered:
         trial = [*dropped, effect]
-        variant = _rigid_without(search, trial, soft)
-        effect_sizes = with_doubt(search, search.pilots.between(variant, there), bool(soft))
-        most = {name: i.most for name, i in effect_sizes.items()}
-        for name, bound in summed([reach[e.name] for e in trial], search.requested).items():
-            most[name] = min(most[name], bound)
+        seen = with_doubt(search, pilots.between(pilots.point([*others, *trial]), there), shaken)
+        bound = summed([reach.get(e.name, {}) for e in trial], search.requested)
+        most = {name: min(value, bound[name]) for name, value in most_of(seen).items()}
         small = search.fits(most)
-        search.judge(effect, small, "its impacts change the requested quantities by less", most, effect_sizes)
+        search.judge(effect, why if small else "", most, seen)
         if small:
-            dropped = trial
-            left = most
+            dropped, left = trial, most
     if dropped:
         search.spend(left)
 
 
-def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
+def _interactions(search: Search, soft: Sequence[Effect]) -> None:
     """Clearances that rigid bodies may do without stay where flexible ones, shaken by impacts, may not.
 
     Rates and forces only: vibrations that impacts excite are small in positions and large in these.
@@ -189,23 +196,14 @@ def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect
     if not soft or not dropped or all(q.kind in OF_POSE for q in pilots.chosen):
         return
     fraction = pilots.part(())
-    names = {effect.name for effect in dropped}
-    lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], fraction=fraction)
-    effect_sizes = with_doubt(
-        search, pilots.between(lacking, pilots.point((), fraction=fraction)), False, 0.0 if fraction == 1.0 else WHOLE
-    )
-    most = {name: i.most for name, i in effect_sizes.items()}
+    seen = pilots.between(pilots.point(dropped, fraction=fraction), pilots.point((), fraction=fraction))
+    seen = with_doubt(search, seen, False, 0.0 if fraction == 1.0 else WHOLE)
+    most = most_of(seen)
     if all(most[name] <= BUDGET * requested for name, requested in search.requested.items()):
         return
     search.used = {}
     for effect in dropped:
-        search.judge(effect, False, "", most, effect_sizes)
-
-
-def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effect]) -> Point:
-    names = {effect.name for effect in trial}
-    inner = [e for e in soft if e.within in names or e.kind == FLEXIBILITY or e.within.startswith("body.")]
-    return search.pilots.point([*trial, *inner])
+        search.judge(effect, "", most, seen)
 
 
 def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
@@ -213,9 +211,7 @@ def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float
     return {name: sum(part.get(name, np.inf) for part in parts) for name in requested}
 
 
-def _flexibilities(
-    search: Search, soft: Sequence[Effect], loose: Sequence[Effect], inner: Sequence[Effect], rigid: Run | None
-) -> None:
+def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effect], rigid: Run | None) -> None:
     """Which bodies stay flexible."""
     if not soft:
         return
@@ -226,11 +222,8 @@ def _flexibilities(
     if rigid is not None:
         together = response(rigid, bundles, search.pilots.chosen)
         for effect in soft:
-            alone = (
-                together
-                if len(soft) == 1
-                else response(rigid, {effect.owner: bundles[effect.owner]}, search.pilots.chosen)
-            )
+            mine = {effect.owner: bundles[effect.owner]}
+            alone = together if len(soft) == 1 else response(rigid, mine, search.pilots.chosen)
             bending[effect.name] = _with_margin(alone.influence)
         total = _with_margin(together.influence)
         if search.fits(total):
@@ -239,21 +232,8 @@ def _flexibilities(
             for effect in soft:
                 search.decide(effect, False, RESPONSE, why, bending[effect.name])
             return
-    gone = [*search.gone, *(e for e in inner if e.within.startswith("joint."))]
-    there = search.pilots.point(gone)
-    dropped: list[Effect] = []
-    for effect in sorted(soft, key=lambda e: max(bending.get(e.name, {}).values(), default=np.inf)):
-        trial = [*dropped, effect]
-        names = {e.name for e in trial}
-        variant = search.pilots.point([*gone, *trial, *(e for e in inner if e.within in names)])
-        effect_sizes = with_doubt(search, search.pilots.between(variant, there), False)
-        most = {name: i.most for name, i in effect_sizes.items()}
-        small = search.fits(most)
-        search.judge(effect, small, "its deformation changes the requested quantities by less", most, effect_sizes)
-        if small:
-            dropped, left = trial, most
-    if dropped:
-        search.spend(left)
+    ordered = sorted(soft, key=lambda e: max(bending.get(e.name, {}).values(), default=np.inf))
+    _in_turn(search, ordered, search.gone, {}, "its deformation changes the requested quantities by less", False)
 
 
 def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
@@ -275,7 +255,7 @@ def _vibrating(estimated: Response) -> str:
     return f"{first}, and the loads of the ideal motion take {which} to {size}"
 
 
-def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
+def _confirm(search: Search, soft: Sequence[Effect]) -> None:
     """Clearances that go next to bodies that stay flexible: one run of all shows whether the estimate holds.
 
     Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
@@ -285,46 +265,42 @@ def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) ->
     if not dropped or all(effect in search.gone for effect in soft):
         return
     fraction = min(1.0, MEMBERS * pilots.part(()))
-    names = {effect.name for effect in search.gone}
-    lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], fraction=fraction)
-    effect_sizes = pilots.between(lacking, pilots.must_run((), fraction, 0))
-    most = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in effect_sizes.items()}
+    seen = pilots.between(pilots.point(search.gone, fraction=fraction), pilots.must_run((), fraction, 0))
+    most = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in seen.items()}
     if all(most[name] <= requested for name, requested in search.requested.items()):
         return
     for effect in dropped:
-        search.judge(effect, False, "", most, effect_sizes)
+        search.judge(effect, "", most, seen)
 
 
-def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
+def _others(search: Search) -> None:
     """Gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows that they do little."""
-    remaining = {d.effect.name for d in search.decisions.values() if d.kept}
-    gone = list(search.gone)
-    dear = any(d.kept and d.effect.kind == FLEXIBILITY for d in search.decisions.values()) and any(
-        d.kept and d.effect.kind == CLEARANCE for d in search.decisions.values()
-    )
+    every = {effect.name: effect for effect in search.pilots.every}
+    others = [effect for effect in every.values() if effect.kind not in (CLEARANCE, FLEXIBILITY)]
+    remaining = {d.effect.name: d.effect.kind for d in search.decisions.values() if d.kept}
+    dear = {CLEARANCE, FLEXIBILITY} <= set(remaining.values())
     for effect in others:
         if effect.within and effect.within not in remaining:
-            owner = next(e for e in every if e.name == effect.within)
+            owner = every[effect.within]
             search.decide(effect, False, search.decisions[owner.name].evidence, f"goes with the {owner.words}")
-            gone.append(effect)
     for effect in others:
         if effect.name in search.decisions:
             continue
         if dear:
             search.decide(effect, True, NONE, NOT_WORTH)
             continue
+        gone = search.gone
         there, lost = search.pilots.point(gone), search.pilots.point([*gone, effect])
-        effect_sizes = search.pilots.between(lost, there)
-        most = {name: i.most for name, i in effect_sizes.items()}
+        seen = search.pilots.between(lost, there)
+        most = most_of(seen)
         small = search.fits(most)
         free = effect.kind in FREE or bool(effect.within)  # friction of a contact goes along with it
         if small and free and not search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)):
-            search.judge(effect, False, "", most, effect_sizes, "it costs no time, and ")
+            search.judge(effect, "", most, seen, "it costs no time, and ")
             continue
         if small:
             search.spend(most)
-            gone.append(effect)
-        search.judge(effect, small, "what it does is small", most, effect_sizes)
+        search.judge(effect, "what it does is small" if small else "", most, seen)
 
 
 def _chosen(search: Search) -> Chosen:
@@ -336,8 +312,8 @@ def _chosen(search: Search) -> Chosen:
     for level in range(len(pilots.fewer)):
         if not pilots.modes(level, scene.flexible()):
             continue
-        effect_sizes = with_doubt(search, pilots.between(pilots.point(gone, level=level), pilots.point(gone)), False)
-        most = {name: i.most for name, i in effect_sizes.items()}
+        seen = with_doubt(search, pilots.between(pilots.point(gone, level=level), pilots.point(gone)), False)
+        most = most_of(seen)
         if search.fits(most):
             search.spend(most)
             return smooth(pilots, gone, search.requested, level)

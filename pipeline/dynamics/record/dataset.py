@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled
-from flexclear.pipeline.core.artifacts.quantities import PERTURBATION
 from flexclear.pipeline.core.artifacts.schema import RUN, conformed
 from flexclear.pipeline.core.scene.citations import cited, docstring
 from flexclear.pipeline.core.scene.event_kinds import EVENT_KINDS
@@ -48,7 +48,9 @@ def recorded(run: Run) -> LabelledArrays:
     """All that is recorded of a run (schema RUN)."""
     model, trajectory = run.model, run.trajectory
     motions = Motions(model, run.observed)
-    parts = [_motion(motions), *(made() for _, made in _makers(run.scene, motions))]
+    frames, joints = list(model.mechanism.frames), list(model.scene.joint)
+    parts = list(_motion(motions, motions.moving_bodies, joints, frames))
+    parts += [_names(model), *(made() for _, made in _makers(run.scene, motions))]
     if model.contacts:
         parts.append((_events(model, trajectory), {}))
     if run.perturbed is not None:
@@ -73,23 +75,18 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     for term in terms:
         mine = names.setdefault(KINDS[term.kind].owner, [])
         mine += [term.owner] if term.owner not in mine else []
-    requested, parts, model = {KINDS[term.kind].variable for term in terms}, list[Series](), motions.model
-    if bodies := names.get("body"):
-        those = motions.several(bodies)
-        moved = motion_series(those, model.mechanism.origin)
-        moved["angular_acceleration"] = (("time", "body", "axis"), those.alpha)
-        parts.append((moved, {"body": bodies}))
-    if joints := names.get("joint"):
-        moment, force = every_joint_wrench(motions, joints)
-        dims = ("time", "joint", "axis")
-        parts.append(({"joint_moment": (dims, moment), "joint_force": (dims, force)}, {"joint": joints}))
-    if frames := names.get("frame"):
-        places = shifted(motions.positions(frames), model.mechanism.origin)
-        parts.append(({"frame_position": (("time", "frame", "axis"), places)}, {"frame": frames}))
+    requested = {KINDS[term.kind].variable for term in terms}
+    parts = list(_motion(motions, *(names.get(owner) for owner in ("body", "joint", "frame"))))
     parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in requested)]
     parts.append(({"time": (("time",), time)}, {}))
     variables = {name: values for part in parts for name, values in part[0].items() if name in requested}
     return labelled(variables, {name: values for part in parts for name, values in part[1].items()})
+
+
+def series(scene: Scene, motions: Motions, wanted: Collection[Quantity], time: np.ndarray) -> dict[str, np.ndarray]:
+    """Quantities over time, (rows, components), by name; time: of the rows [s]."""
+    arrays = chosen(scene, motions, {term for one in wanted for term in one.terms()}, time)
+    return {one.name: quantities.series(arrays, one) for one in wanted}
 
 
 #: beginnings of the variables that the ledger makes
@@ -216,7 +213,7 @@ def _report(run: Run) -> dict[str, float | int | str]:
         "closure_residual_of_given_start": run.model.mechanism.start_residual,
     }
     if run.perturbed is not None:
-        facts["separation_perturbation"] = PERTURBATION
+        facts["separation_perturbation"] = quantities.PERTURBATION
     facts |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
     if run.mended:
         facts["start_mended"] = "\n".join(run.mended)
@@ -232,33 +229,36 @@ def _report(run: Run) -> dict[str, float | int | str]:
     return facts
 
 
-def _motion(motions: Motions) -> Series:
-    origin, body = motions.model.mechanism.origin, motions.every_body
-    frames, joints = list(motions.model.mechanism.frames), list(motions.model.scene.joint)
-    moment, force = every_joint_wrench(motions, joints)
-    more = {
-        ("angular_acceleration", "body"): body.alpha,
-        ("frame_position", "frame"): shifted(motions.every_frame, origin),
-        ("joint_moment", "joint"): moment,
-        ("joint_force", "joint"): force,
-    }
-    variables: Variables = motion_series(body, origin)
-    variables |= {name: (("time", dim, "axis"), values) for (name, dim), values in more.items()}
-    owners = [name.partition(".")[0] for name in frames]
-    coordinates = {"body": motions.moving_bodies, "frame": frames, "frame_body": ("frame", owners)}
-    return variables, coordinates | _joints(motions.model)
+def _motion(
+    motions: Motions, bodies: list[str] | None, joints: list[str] | None, frames: list[str] | None
+) -> Iterator[Series]:
+    """Motion of some bodies, wrenches of joints, places of frames; nothing of what is None."""
+    origin = motions.model.mechanism.origin
+    if bodies is not None:
+        moved = motions.several(bodies)
+        alpha: Variables = {"angular_acceleration": (("time", "body", "axis"), moved.alpha)}
+        yield motion_series(moved, origin) | alpha, {"body": bodies}
+    if joints is not None:
+        moment, force = every_joint_wrench(motions, joints)
+        dims = ("time", "joint", "axis")
+        yield {"joint_moment": (dims, moment), "joint_force": (dims, force)}, {"joint": joints}
+    if frames is not None:
+        places = shifted(motions.positions(frames), origin)
+        yield {"frame_position": (("time", "frame", "axis"), places)}, {"frame": frames}
 
 
-def _joints(model: Model) -> dict[str, object]:
-    """Names of the joints, their types, and what they join."""
+def _names(model: Model) -> Series:
+    """Bodies of the frames; types of the joints, and what they join."""
     joints, frames = model.scene.joint, model.mechanism.frames
-    between = [joint.between for joint in joints.values()]
-    coordinates: dict[str, object] = {"joint": list(joints)}
+    coordinates: dict[str, object] = {"frame_body": ("frame", [name.partition(".")[0] for name in frames])}
+    if not joints:
+        return {}, coordinates
     coordinates["joint_type"] = ("joint", [joint.type for joint in joints.values()])
     for k, side in enumerate(("first", "second")):
-        coordinates[f"joint_{side}_frame"] = ("joint", [pair[k] for pair in between])
-        coordinates[f"joint_{side}_body"] = ("joint", [frames[pair[k]].body for pair in between])
-    return coordinates if joints else {"joint": []}
+        ends = [joint.between[k] for joint in joints.values()]
+        coordinates[f"joint_{side}_frame"] = ("joint", ends)
+        coordinates[f"joint_{side}_body"] = ("joint", [frames[end].body for end in ends])
+    return {}, coordinates
 
 
 def _modes(motions: Motions) -> Series:

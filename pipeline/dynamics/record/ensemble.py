@@ -27,10 +27,10 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
-from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place
+from flexclear.pipeline.dynamics.run.evaluation import specialised, straight_code
+from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
-from flexclear.pipeline.dynamics.run.evaluation.members import abreast
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -45,6 +45,9 @@ if TYPE_CHECKING:
 #: by how much starts of members differ where the scene does not say: a fraction of a contact's clearance or depth;
 #: depths count as at least the second fraction, of the mechanism's size
 FRACTION_OF_CLEARANCE, LEAST_OF_SIZE = 1e-3, 2.5e-8
+#: members that are evaluated at once: few, or many; the code gives the same bits for any number, which depends on the
+#: machine. Of fewer than `FEW` each is evaluated alone
+FEW, LANES = 2, (4, 8)
 #: variables of one member by name, with the dimensions of the schema but `member`, and why its method was `switched`
 Member = dict[str, np.ndarray]
 
@@ -107,6 +110,20 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     facts = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}
     facts |= attributes(scene) | {"title": f"{requested.members} motions of {subject(scene)}"}
     return conform(made, ENSEMBLE, **facts, seed=requested.seed, perturbation=requested.perturbation)
+
+
+def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Places | None:
+    """Places for so many engines like this one, in so many threads; None where each is to take its own steps.
+
+    Either way they, as `another` makes them of it, evaluate with the same bits.
+    """
+    engine.straight.exact, rows = True, engine.selected.tobytes()
+    lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
+    together = members >= FEW * threads and specialised.side_by_side(engine)
+    if together and straight_code.made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
+        return Places(lanes, threads)
+    specialised.settle(engine, progress)
+    return None
 
 
 def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:

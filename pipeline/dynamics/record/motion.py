@@ -121,7 +121,10 @@ class Motions:
 
     def several(self, names: Sequence[str]) -> Bodies:
         """The same of some bodies."""
-        places, every = [self.moving_bodies.index(name) for name in names], self.every_body
+        every = self.every_body
+        if names == self.moving_bodies:  # megabytes are copied only where it must be
+            return every
+        places = [self.moving_bodies.index(name) for name in names]
         return Bodies(**{field.name: np.take(getattr(every, field.name), places, axis=1) for field in fields(Bodies)})
 
     def body(self, name: str) -> Motion:
@@ -142,22 +145,11 @@ class Motions:
 
     def positions(self, names: Sequence[str]) -> np.ndarray:
         """Origins of named frames, kernels' origin, shape (time, frame, 3)."""
-        origins = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
-        self._bend(origins, names)
-        return origins
-
-    @cached_property
-    def every_frame(self) -> np.ndarray:
-        """Origin of every named frame of the mechanism, as `positions` has them."""
-        if self.model.mechanism.all_rigid:
+        rigid = self.model.mechanism.all_rigid
+        if rigid and names == list(self._frames):
             return self.seen.frame_position
-        return self.positions(list(self._frames))
-
-    def _bend(self, positions: np.ndarray, names: Sequence[str]) -> None:
-        """Move those frames, of which some are named, that are on bent bodies."""
-        if self.model.mechanism.all_rigid:
-            return
-        for k, name in enumerate(names):
+        positions = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
+        for k, name in enumerate(() if rigid else names):
             i, placement = self._place(name)
             link, bundle = self.link(i), self.model.links[i].bundle
             if bundle is not None:
@@ -165,11 +157,7 @@ class Motions:
                 S = bundle["frame_translation_shape"].values[frame_index(bundle, label)]
                 bent = placement.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
                 positions[:, k] = link.p + turned(link.R, bent)
-
-    @cached_property
-    def frame_positions(self) -> dict[str, np.ndarray]:
-        """The same by name, shape (time, 3) each."""
-        return {name: self.every_frame[:, k] for k, name in enumerate(self.model.mechanism.frames)}
+        return positions
 
     @cached_property
     def frame_velocities(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -22,7 +22,7 @@ from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.record.dataset import chosen
+from flexclear.pipeline.dynamics.record.dataset import series
 from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
@@ -133,8 +133,8 @@ class Runner:
         values: Values = {}
         for one in self.recorded:
             if one.quantity.over_time:
-                series = quantities.series(run, one.quantity)
-                values[one.name] = _recorded(one, time, series, np.minimum(after, len(time) - 1))
+                over_time = quantities.series(run, one.quantity)
+                values[one.name] = _recorded(one, time, over_time, np.minimum(after, len(time) - 1))
             elif one.quantity.kind == "impact_times":
                 values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
             else:
@@ -193,23 +193,21 @@ def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[R
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    terms = {t for k in kept if k.quantity.over_time for t in k.quantity.terms()}
-    arrays, series = chosen(scene, Motions(engine.model, seen), terms, trajectory.time), dict[str, np.ndarray]()
+    wanted = {one.quantity for one in kept if one.quantity.over_time}
+    known = series(scene, Motions(engine.model, seen), wanted, trajectory.time)
     values: Values = {}
     for one in kept:
-        if not one.quantity.over_time:
+        if one.quantity.over_time:
+            regular = _regular(engine, trajectory.time)
+            values[one.name] = _recorded(one, trajectory.time, known[one.quantity.name], regular)
+        else:
             values[one.name] = np.asarray(_of_contact(engine, trajectory, seen, one))
-            continue
-        if one.quantity.name not in series:
-            series[one.quantity.name] = quantities.series(arrays, one.quantity)
-        regular = _regular(engine, trajectory.time)
-        values[one.name] = _recorded(one, trajectory.time, series[one.quantity.name], regular)
     return values
 
 
-def _recorded(one: Recorded, time: np.ndarray, series: np.ndarray, regular: np.ndarray) -> np.ndarray:
+def _recorded(one: Recorded, time: np.ndarray, over_time: np.ndarray, regular: np.ndarray) -> np.ndarray:
     """What is recorded of a series, shape (time, ...); regular: rows of the regular output times."""
-    value = series[regular] if one.reduction == "series" else reduced(time, series, one.reduction)
+    value = over_time[regular] if one.reduction == "series" else reduced(time, over_time, one.reduction)
     return np.asarray(value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0])
 
 
@@ -226,10 +224,9 @@ def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive:
         if done.number >= requested.transient:
             here = done.parts[sampled_at]
             motions = Motions(engine.model, observed(parts[sampled_at], replace(here, rows=here.rows[:1])))
-            terms = {term for one in recorded for term in one.quantity.terms()}
-            arrays = chosen(scene, motions, terms, here.time[:1])
+            known = series(scene, motions, {one.quantity for one in recorded}, here.time[:1])
             for one in recorded:
-                row = quantities.series(arrays, one.quantity)[0]
+                row = known[one.quantity.name][0]
                 values.setdefault(one.name, []).append(row if one.quantity.dim else row[0])
         if done.number + 1 == requested.transient + requested.periods:
             break

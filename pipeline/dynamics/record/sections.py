@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -40,8 +41,8 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: of impacts, known when they end
-LATER = ("peak_force", "duration")
+#: numbers of impacts
+OF_IMPACTS = ("section", "contact", "phase", "approach_speed", "peak_force", "duration")
 
 
 def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
@@ -78,14 +79,14 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if done.number >= requested.transient:
             tape.add(parts, done, number=done.number - requested.transient)
         if done.number + 1 == count:
-            tape.orbit = tape.motion_at_waypoints(parts, done)
+            orbit = tape.orbit(parts, done)
             break
         if stored is not None:  # packed now: the tape has changed in part where the next period fails or is stopped
             state = {**memory(engine), **done.after.packed(), **tape.packed()}
             stored.store(name, lambda state=state: state)  # type: ignore[misc]
-    growth = np.array(tape.growth[: len(followed)])
-    facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
-    variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
+    growth, lost = np.array(tape.columns["growth"][: len(followed)]), int(sum(tape.columns["lost"]))
+    facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": lost}
+    variables = tape.variables(engine.model) | orbit | {"growth": (("followed",), growth)}
     coordinates = {"section": np.arange(requested.periods), "body": names, "followed": np.arange(len(followed))}
     coordinates["waypoint"] = np.array([part.start - engine.start for part in parts])
     if engine.model.contacts:
@@ -118,119 +119,99 @@ def section_period(scene: Scene) -> float:
 
 @dataclass
 class _Tape:
-    """Recorded values, one entry per period, and per impact."""
+    """Recorded values of bodies. at: when sections are [s].
+
+    columns: `growth`, `lost` and `motion.*` have an entry per period, `impact.*` one per impact; what is known when an
+    impact ends is NaN until then.  open: number of the last impact of each contact.
+    """
 
     names: list[str]
     at: float
-    motions: list[Variables] = field(default_factory=list)
-    orbit: Variables = field(default_factory=dict)
-    growth: list[float] = field(default_factory=list)
-    lost: int = 0
-    impacts: list[dict[str, np.ndarray]] = field(default_factory=list)
-    open: dict[int, dict[str, np.ndarray]] = field(default_factory=dict)
+    columns: defaultdict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
+    open: dict[int, int] = field(default_factory=dict)
 
     def add(self, parts: list[Engine], done: Period, number: int) -> None:
         """Keep of one period what is asked for."""
-        self.growth.append(done.growth)
-        self.lost += done.lost
+        self._append(growth=done.growth, lost=done.lost)
         for part, trajectory in zip(parts, done.parts, strict=True):
             if part.start == self.at:
-                self.motions.append(self._motion(part, trajectory, np.array([0])))
+                motion = self._motion(part, trajectory, np.array([0]))
+                self._append(**{f"motion.{name}": values[0] for name, values in motion.items()})
             if part.model.contacts:
                 self._note(part, trajectory, number, parts[0].start)
 
-    def motion_at_waypoints(self, parts: list[Engine], done: Period) -> Variables:
-        """Motion of the recorded bodies where the stretches of a period begin."""
-        first = np.array([0])
-        motions = [self._motion(part, trajectory, first) for part, trajectory in zip(parts, done.parts, strict=True)]
+    def _append(self, **values: Any) -> None:
+        for name, value in values.items():
+            self.columns[name].append(value)
+
+    def orbit(self, parts: list[Engine], done: Period) -> Variables:
+        """Motion of the recorded bodies where the stretches of a period begin, as far as the schema has it."""
+        motions = [self._motion(*one, np.array([0])) for one in zip(parts, done.parts, strict=True)]
         return {
-            f"orbit_{name}": (("waypoint", *dims[1:]), _joined(motions, name)) for name, (dims, _) in motions[0].items()
+            f"orbit_{name}": (("waypoint", *_inner(name)), np.concatenate([motion[name] for motion in motions]))
+            for name in motions[0]
+            if f"orbit_{name}" in SECTIONS
         }
 
-    def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> Variables:
+    def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Motion of the recorded bodies, and the contacts' offsets, at some rows."""
-        at_rows = replace(trajectory, rows=trajectory.rows[rows])
-        seen, model = observed(part, at_rows), part.model
+        seen, model = observed(part, replace(trajectory, rows=trajectory.rows[rows])), part.model
         series = motion_series(Motions(model, seen).several(self.names), model.mechanism.origin)
-        if model.contacts:
-            series["contact_offset"] = (("time", "contact", "axis"), seen.touch["offset"].copy())
-        return series
+        offsets = {"contact_offset": seen.touch["offset"].copy()} if model.contacts else {}
+        return {name: values for name, (_, values) in series.items()} | offsets
 
     def _note(self, part: Engine, trajectory: Trajectory, number: int, begin: float) -> None:
         """Impacts of a stretch: those that begin in it, and of those that end in it force and duration."""
         closings = trajectory.events[trajectory.events["kind"] == m.CLOSING]
         new = closings[(closings["time"] >= part.start) & (closings["speed"] > IMPACT)]
         rows = np.clip(np.searchsorted(trajectory.time, new["time"]), 0, len(trajectory.time) - 1)
-        series = self._motion(part, trajectory, rows) if len(new) else {}
+        motion = self._motion(part, trajectory, rows) if len(new) else {}
+        durations, forces = self.columns["impact.duration"], self.columns["impact.peak_force"]
         for k, event in enumerate(new):
-            impact = {name: values[k] for name, (_, values) in series.items()}
-            impact |= {"section": np.array(number), "phase": event["time"] - begin, "contact": event["contact"]}
-            impact["approach_speed"] = event["speed"]
-            self.impacts.append(impact)
-            self.open[int(event["contact"])] = impact
+            self.open[int(event["contact"])] = len(durations)
+            impact = {"section": number, "phase": event["time"] - begin, "contact": event["contact"]}
+            impact |= {"approach_speed": event["speed"], "peak_force": np.nan, "duration": np.nan}
+            impact |= {name: values[k] for name, values in motion.items()}
+            self._append(**{f"impact.{name}": value for name, value in impact.items()})
         for event in closings[np.isfinite(closings["duration"])]:
             begun = self.open.get(int(event["contact"]))
-            if begun is not None and "duration" not in begun:
-                begun |= {"peak_force": event["peak_force"], "duration": event["duration"]}
+            if begun is not None and np.isnan(durations[begun]):
+                durations[begun], forces[begun] = event["duration"], event["peak_force"]
 
     def packed(self) -> dict[str, np.ndarray]:
         """All of it so far as arrays."""
-        arrays = {"growth": np.array(self.growth), "lost": np.array(self.lost)}
-        for name in self.motions[0] if self.motions else ():
-            arrays[f"motion.{name}"] = _joined(self.motions, name)
-        for name in self.impacts[0] if self.impacts else ():
-            if name not in LATER:
-                arrays[f"impact.{name}"] = np.array([impact[name] for impact in self.impacts])
-        arrays["ended"] = np.array(["duration" in impact for impact in self.impacts])
-        arrays |= {f"later.{name}": self._column(name, np.nan) for name in LATER}
-        last = {id(impact): k for k, impact in enumerate(self.impacts)}
-        arrays["open"] = np.array([[c, last[id(impact)]] for c, impact in self.open.items()], int).reshape(-1, 2)
-        return arrays
+        return {name: np.array(values) for name, values in self.columns.items()} | {
+            "open": np.array(list(self.open.items()), int).reshape(-1, 2)
+        }
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Take up what `packed` gave."""
-        self.growth, self.lost = arrays["growth"].tolist(), int(arrays["lost"])
-        motion = _named(arrays, "motion.")
-        self.motions = [{name: (_dimensions(name), values) for name, values in motion.items()}] if motion else []
-        for k, ended in enumerate(arrays["ended"]):
-            impact = {name: values[k] for name, values in _named(arrays, "impact.").items()}
-            self.impacts.append(impact | ({name: arrays[f"later.{name}"][k] for name in LATER} if ended else {}))
-        self.open = {int(c): self.impacts[k] for c, k in arrays["open"]}
+        """Take up what `packed` gave, among other arrays."""
+        mine = ("growth", "lost", "motion.", "impact.")
+        self.columns |= {name: list(values) for name, values in arrays.items() if name.startswith(mine)}
+        self.open = {int(c): int(k) for c, k in arrays["open"]}
 
     def variables(self, model: Model) -> Variables:
         """All of it, by the names of the schema SECTIONS."""
-        kept = {
-            name: (("section", *dims[1:]), _joined(self.motions, name)) for name, (dims, _) in self.motions[0].items()
+        motion = [name.removeprefix("motion.") for name in self.columns if name.startswith("motion.")]
+        kept: Variables = {
+            name: (("section", *_inner(name)), np.array(self.columns[f"motion.{name}"])) for name in motion
         }
-        kept |= {name: series for name, series in self.orbit.items() if name in SECTIONS}
         if not model.contacts:
             return kept
-        kept["impact_section"] = (("impact",), self._column("section", -1).astype(np.int32))
+        numbers = {name: np.array(self.columns[f"impact.{name}"], dtype=float) for name in OF_IMPACTS}
         names = np.array([contact.name for contact in model.contacts], dtype=str)
-        kept["impact_contact"] = (("impact",), names[self._column("contact", -1).astype(np.int64)])
-        for name in ("phase", "approach_speed", "peak_force", "duration"):
-            kept[f"impact_{name}"] = (("impact",), self._column(name, np.nan))
+        numbers["section"] = numbers["section"].astype(np.int32)
+        numbers["contact"] = names[numbers["contact"].astype(np.int64)]
+        kept |= {f"impact_{name}": (("impact",), values) for name, values in numbers.items()}
         for name in ("position", "quaternion", "velocity"):
-            dims, first = self.motions[0][name]
-            values = [impact[name] for impact in self.impacts]
-            made = np.array(values).reshape(len(values), *first.shape[1:])
-            kept[f"impact_{name}"] = (("impact", *dims[1:]), made)
+            values = self.columns[f"impact.{name}"]
+            made = np.array(values).reshape(len(values), *kept[name][1].shape[1:])
+            kept[f"impact_{name}"] = (("impact", *_inner(name)), made)
         return kept
 
-    def _column(self, name: str, absent: float) -> np.ndarray:
-        return np.array([float(impact.get(name, absent)) for impact in self.impacts])
 
-
-def _dimensions(name: str) -> tuple[str, ...]:
-    """Of a series of the motion, see `motion_series`."""
+def _inner(name: str) -> tuple[str, ...]:
+    """Dimensions of a series of the motion (`motion_series`) but the first."""
     if name == "contact_offset":
-        return ("time", "contact", "axis")
-    return ("time", "body", "quat" if name == "quaternion" else "axis")
-
-
-def _named(arrays: Mapping[str, np.ndarray], begin: str) -> dict[str, np.ndarray]:
-    return {name.removeprefix(begin): values for name, values in arrays.items() if name.startswith(begin)}
-
-
-def _joined(motions: Iterable[Variables], name: str) -> np.ndarray:
-    return np.concatenate([motion[name][1] for motion in motions])
+        return ("contact", "axis")
+    return ("body", "quat" if name == "quaternion" else "axis")

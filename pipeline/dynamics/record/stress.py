@@ -22,15 +22,29 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import components, first_largest, matrices, principal, skew, von_mises
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.equations.observation import Series, Variables
-from flexclear.pipeline.dynamics.record.body_loads import Motion, motion_and_loads
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import Wrench
+from flexclear.pipeline.dynamics.record.wrenches import Acting, Wrench, joint_wrenches, on_frames, path_wrenches
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: components of stress of solids that are held at once; bounds the memory
 COMPONENTS_AT_ONCE = 10_000_000
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion of the body frame, its own axes, and of the modal coordinates; each (time, 3) or (time, mode).
+
+    a: acceleration of the origin less gravity.
+    """
+
+    a: np.ndarray
+    omega: np.ndarray
+    alpha: np.ndarray
+    q: np.ndarray
+    u: np.ndarray
+    du: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -130,6 +144,37 @@ def _of_rods(motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, G
     }
 
 
+def motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
+    """Motion of a flexible body, and moments about its origin [N m] and forces [N] on its frames, body axes.
+
+    Both of shape (time, frame, 3), frames in the order of the mechanism, as the bundle has them.
+    """
+    model = motions.model
+    link = model.mechanism.link_of[name]
+    frame, state = motions.link(link), motions.modal(link)
+    R_BW = np.swapaxes(frame.R, 1, 2)
+    a, omega, alpha = (np.einsum("tij,tj->ti", R_BW, x) for x in (frame.a - model.gravity, frame.omega, frame.alpha))
+    names = [frame for frame in model.mechanism.frames if frame.startswith(f"{name}.")]
+    moment, force = np.zeros((len(a), len(names), 3)), np.zeros((len(a), len(names), 3))
+    for at, n, f in _loads(motions, name):
+        k = names.index(at)
+        moment[:, k] += np.einsum("tij,tj->ti", R_BW, n - np.cross(frame.p, f))
+        force[:, k] += np.einsum("tij,tj->ti", R_BW, f)
+    return Motion(a, omega, alpha, state.q, state.u, state.du), moment, force
+
+
+def _loads(motions: Motions, name: str) -> list[Acting]:
+    """What joints, paths and loads do to a body: its frame, moment about the kernels' origin, force, world axes."""
+    model, seen, acting = motions.model, motions.seen, list[Acting]()
+    for joint, (n, f) in joint_wrenches(motions).items():
+        between = model.scene.joint[joint].between
+        about_origin = n + np.cross(motions.positions([between[1]])[:, 0], f)
+        acting += [(at, sign * about_origin, sign * f) for at, sign in zip(between, (-1.0, 1.0), strict=True)]
+    acting += path_wrenches(model, seen)
+    acting += on_frames(model, seen, name)
+    return [load for load in acting if model.mechanism.frames[load[0]].body == name]
+
+
 def section_forces(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
     """N, Qy, Qz [N], T, My, Mz [N m] of every section, in axes of the deformed section, shape (time, section, 6).
 
@@ -226,7 +271,7 @@ def _turn(v: np.ndarray) -> np.ndarray:
 def factors(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
     """What each field of a solid's bundle is multiplied by, in SI, shape (time, field).
 
-    moment, force: as `body_loads.motion_and_loads` returns them.
+    moment, force: as `motion_and_loads` returns them.
     """
     origins = bundle["frame_position"].values + np.einsum(
         "fim,tm->tfi", bundle["frame_translation_shape"].values, motion.q, optimize=True

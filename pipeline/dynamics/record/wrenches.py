@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -83,40 +82,39 @@ def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
     return {closure.name: (moment[:, c], force[:, c]) for c, closure in joints}
 
 
-class _Beyond(NamedTuple):
-    """Bodies on the far side of a fixed joint within a link; sign: +1 where they are its second body's."""
-
-    joint: str
-    bodies: list[str]
-    sign: float
-
-
 def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, Wrench]:
     """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
-    model, rows, beyond, inside = motions.model, len(motions.seen.state), list[_Beyond](), dict[str, Wrench]()
+    model, rows, inside = motions.model, len(motions.seen.state), dict[str, Wrench]()
+    beyond = list[tuple[str, list[str], float]]()  # bodies on the far side; +1 where they are the second body's
     for link in model.links:
         others = {name: _joined(model, name) for name in model.scene.joint if name not in known}
         inner = [name for name, bodies in others.items() if link.places.keys() >= set(bodies)]
         # a second path between bodies that are joined already carries nothing here
         inside |= {name: (np.zeros((rows, 3)), np.zeros((rows, 3))) for name in inner}
-        tree = _forest(model, inner, list(link.places))
-        for name in tree:
-            side, sign = _far_side(model, name, tree)
-            bodies = [body for body in link.places if body in side and body in model.mechanism.moving_bodies]
-            beyond += [_Beyond(name, bodies, sign)] if bodies else []
+        tree = dict[str, tuple[str, str]]()
+        for name in inner:
+            a, b = others[name]
+            tree |= {} if b in reached(a, tree.values()) else {name: (a, b)}
+        for name, (a, b) in tree.items():
+            rest = [pair for other, pair in tree.items() if other != name]
+            far, sign = reached(b, rest), 1.0
+            if any(model.scene.body[body].type == "ground" for body in far):
+                far, sign = reached(a, rest), -1.0
+            bodies = [body for body in link.places if body in far and body in model.mechanism.moving_bodies]
+            beyond += [(name, bodies, sign)] if bodies else []
     acting = [(_joined(model, joint), wrench) for joint, wrench in known.items()]
     places = {name: k for k, name in enumerate(motions.moving_bodies)}
-    for part in beyond:
-        demand = np.sum([motions.seen.body_demand[:, places[body]] for body in part.bodies], axis=0)
+    for name, bodies, sign in beyond:
+        demand = np.sum([motions.seen.body_demand[:, places[body]] for body in bodies], axis=0)
         moment, force = demand[:, :3], demand[:, 3:]
         for (first, second), (n, f) in acting:
-            out, into = first in part.bodies, second in part.bodies
+            out, into = first in bodies, second in bodies
             if out != into:
                 moment, force = (moment + n, force + f) if out else (moment - n, force - f)
-        for body in part.bodies:
+        for body in bodies:
             for _, n, f in on_frames(model, motions.seen, body):
                 moment, force = moment - n, force - f
-        inside[part.joint] = part.sign * moment, part.sign * force
+        inside[name] = sign * moment, sign * force
     return inside
 
 
@@ -131,42 +129,12 @@ def _joined(model: Model, name: str) -> tuple[str, str]:
     return "", frames[path.frame].body
 
 
-def _forest(model: Model, names: list[str], bodies: list[str]) -> list[str]:
-    """Fixed joints that span the bodies, in scene order."""
-    root = {b: b for b in bodies}
-
-    def top(b: str) -> str:
-        while root[b] != b:
-            b = root[b]
-        return b
-
-    tree = []
-    for name in names:
-        a, b = (top(model.mechanism.frames[f].body) for f in model.scene.joint[name].between)
-        if a != b:
-            root[a] = b
-            tree.append(name)
-    return tree
-
-
-def _far_side(model: Model, name: str, tree: list[str]) -> tuple[set[str], float]:
-    """Bodies on one side of a fixed joint, without the ground; +1 for the second body's side."""
-    frames, scene = model.mechanism.frames, model.scene
-    a, b = (frames[f].body for f in scene.joint[name].between)
-    others = [tuple(frames[f].body for f in scene.joint[n].between) for n in tree if n != name]
-
-    def reach(start: str) -> set[str]:
-        reached, stack = {start}, [start]
-        while stack:
-            body = stack.pop()
-            for x, y in others:
-                for inner, far in ((x, y), (y, x)):
-                    if inner == body and far not in reached:
-                        reached.add(far)
-                        stack.append(far)
-        return reached
-
-    side = reach(b)
-    if any(scene.body[body].type == "ground" for body in side):
-        return reach(a), -1.0
-    return side, 1.0
+def reached(start: str, pairs: Collection[tuple[str, str]]) -> set[str]:
+    """Bodies that joined pairs connect to one, itself among them."""
+    there, ends = {start}, [start]
+    while ends:
+        here = ends.pop()
+        new = {body for pair in pairs if here in pair for body in pair} - there
+        there |= new
+        ends += new
+    return there

@@ -49,12 +49,6 @@ class Tape:
     doubted: set[str] = field(default_factory=set)
     looks: list[Look] = field(default_factory=list)
 
-    def full(self, engine: Engine) -> bool:
-        """Return whether another step might find no room for its rows or events."""
-        n, room = engine.n, m.ROOM + m.EVENTS_OF_A_CONTACT * len(engine.model.contacts)
-        waiting = len(self.outputs) - n[m.NEXT_OUTPUT]
-        return bool(n[m.N_RECORDED] + waiting + room > len(self.rows) or n[m.N_EVENTS] + room > len(self.events))
-
 
 class Jumps(Protocol):
     """What changes the state where the equations change: given the engine, which is there, and the tape."""

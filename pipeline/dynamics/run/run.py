@@ -68,8 +68,7 @@ def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene whose joints and drives position the bodies where the run begins: itself, unless it begins
-    elsewhere."""
+    """The scene whose joints and drives position the bodies where the run begins, if it begins elsewhere."""
     if scene.start is None or scene.start.at is None:
         return scene
     scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
@@ -99,16 +98,16 @@ def engines(
 ) -> tuple[Engine, Callable[[str], Engine]]:
     """The engine of a run, and the maker of one that continues with another integrator, given by its name."""
     made = maker(scene, bundles, progress)
-    return made("", progress), cache(lambda name: made(name, progress))
+    return made(), cache(made)
 
 
-def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[[str, Progress], Engine]:
-    """What makes the engine of a run by an integrator's name, that of the scene's own by none; it reports progress."""
+def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[..., Engine]:
+    """What makes the engine of a run, by its scene's integrator or one of another name; it reports progress."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
     making = Lock()  # a run and its perturbed run may both continue with another integrator
 
-    def made(name: str, tell: Progress) -> Engine:
+    def made(name: str = "", tell: Progress = progress) -> Engine:
         requested = edited(moved, {"solver.integrator": name}) if name else moved
         with making:
             model = tabulate(build(requested, bundles), given)
@@ -133,7 +132,7 @@ def integrate(
     run cannot continue, StoppedError with the run so far as `partial` when it is asked to stop.
     """
     made = maker(scene, bundles, progress)
-    engine = made("", progress)
+    engine = made()
     start = consistent_start(engine)
     mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
     for sentence in [*mended, *([choice] if choice else [])]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -127,51 +128,28 @@ def integrate(
     Raises StoppedError, with the engine and the trajectory so far as `partial` if there is any, when the work is asked
     to stop.
     """
-    judge = judge or Judge(SLICE, crawls)
+    judge, begun = judge or Judge(SLICE, crawls), engine.start if left is None else left.time
     if outputs is None:
         outputs = engine.output_times(engine.model.scene.output.interval)
     stopping.check()  # many short integrations never pause
     with stopping.heeded():
-        tape = _begun(engine, y, left, outputs)
-        _advance(engine, tape, progress, stop, left, judge, jumps)
+        engine.straight.rows.clear()
+        tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
+        settle(engine, progress)
+        tape.looks.append(look(engine))
+        sample, control = _sampler(engine), engine.control
+        for a, b in pairwise(engine.breaks):
+            if b <= control[m.TIME]:
+                continue
+            if a > begun:
+                engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
+                if jumps is not None:
+                    jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
+            engine.select_pieces_after(0.5 * (a + b))
+            control[m.END], engine.n[m.FRESH] = b, 1
+            if _segment(engine, tape, progress, stop, judge, jumps):
+                break
     return _collect(engine, tape)
-
-
-def _begun(engine: Engine, y: np.ndarray, left: Handover | None, outputs: np.ndarray) -> Tape:
-    """The tape of an integration that begins, at the start or where another method left it."""
-    engine.straight.rows.clear()
-    if left is not None:
-        return _resume(engine, left, outputs)
-    tape = _begin(engine, _sampler(engine)(y, engine.start), outputs)
-    if engine.mobility.singular_start:
-        _leave_singular_start(engine, tape)
-    return tape
-
-
-def _advance(
-    engine: Engine,
-    tape: Tape,
-    progress: Progress,
-    stop: Stop,
-    left: Handover | None,
-    judge: Judge,
-    jumps: Jumps | None,
-) -> None:
-    """From segment to segment to the end."""
-    sample, control = _sampler(engine), engine.control
-    settle(engine, progress)
-    tape.looks.append(look(engine))
-    for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
-        if b <= control[m.TIME]:
-            continue
-        if a > (engine.start if left is None else left.time):
-            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-            if jumps is not None:
-                jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
-        engine.select_pieces_after(0.5 * (a + b))
-        control[m.END], engine.n[m.FRESH] = b, 1
-        if _segment(engine, tape, progress, stop, judge, jumps):
-            break
 
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
@@ -181,7 +159,8 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 
 
 def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
-    """A tape with its first row, and contacts that are closed at the start."""
+    """A tape with its first row, contacts that are closed at the start, and a way out of a singular pose there."""
+    y = _sampler(engine)(y, engine.start)
     tape = _prepare(engine, y, engine.start, outputs)
     first = recording.record(tape.rows[:1], len(engine.model.contacts))
     first.time[:], first.state[:] = engine.start, y
@@ -189,6 +168,8 @@ def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
     if engine.model.contacts:
         _begin_closed(engine, y, tape.events)
         first.modes[:], first.latched[:] = engine.modes, engine.latched
+    if engine.mobility.singular_start:
+        _leave_singular_start(engine, tape)
     return tape
 
 
@@ -217,7 +198,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.length
     control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
-    engine.view(m.INDEPENDENCE)[:] = 0.0
+    engine.view(m.INDEPENDENCE.place)[:] = 0.0
     for known in range(m.MEMORY, m.QUADRATURES.place + 1):  # of another run it would change this one's last bits
         engine.view(known)[:] = 0.0
     control[m.FIXED], control[m.PARAMETER] = solver.step or 0.0, engine.method.parameter(solver)
@@ -264,14 +245,7 @@ def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
         n[m.N_EVENTS] += 1
 
 
-def _segment(
-    engine: Engine,
-    tape: Tape,
-    progress: Progress,
-    stop: Stop,
-    judge: Judge,
-    jumps: Jumps | None = None,
-) -> bool:
+def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: Judge, jumps: Jumps | None) -> bool:
     """To the end of the segment; True when it was stopped before."""
     n, control = engine.n, engine.control
     few = m.ROOM + m.EVENTS_OF_A_CONTACT * len(engine.model.contacts)
@@ -289,11 +263,11 @@ def _segment(
         status = n[m.STATUS]
         if status == m.SEGMENT_END:
             return False
-        if status == m.FULL and (jumps is None or tape.full(engine)):
-            tape.rows = np.concatenate([tape.rows, np.zeros_like(tape.rows)])
-            tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
-        elif status == m.FULL:
-            continue
+        if status == m.FULL:
+            waiting = len(tape.outputs) - n[m.NEXT_OUTPUT]
+            if n[m.N_RECORDED] + waiting + few > len(tape.rows) or n[m.N_EVENTS] + few > len(tape.events):
+                tape.rows = np.concatenate([tape.rows, np.zeros_like(tape.rows)])
+                tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
         elif status == m.SINGULAR_AHEAD:
             _pass_over(engine, tape)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):

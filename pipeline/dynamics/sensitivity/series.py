@@ -12,11 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.record.dataset import chosen
+from flexclear.pipeline.dynamics.record.dataset import series
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated
@@ -37,9 +35,7 @@ Series = dict[str, np.ndarray]
 def read(family: Family, engine: Engine, run: Differentiated, wanted: Collection[Quantity]) -> Series:
     """Return quantities over time, (rows, components), by name; and NORMAL_FORCE, (rows, contacts)."""
     seen = observed(engine, run.trajectory)
-    terms = {term for quantity in wanted for term in quantity.terms()}
-    arrays = chosen(family.scene, Motions(engine.model, seen), terms, run.trajectory.time)
-    made = {quantity.name: quantities.series(arrays, quantity) for quantity in wanted}
+    made = series(family.scene, Motions(engine.model, seen), wanted, run.trajectory.time)
     return made | {NORMAL_FORCE: seen.touch["normal_force"]}
 
 
@@ -75,8 +71,7 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) ->
     """Return the step for each row."""
     model, changes = family.engine.model, np.abs(run.changes[:, k])
     positions = slice(0, model.speeds.stop)
-    floors = model.arrays.table(m.FLOORS)["magnitude"][model.arrays.table(m.GROUPS)["group"]]
-    size = np.maximum(np.abs(run.trajectory.state), floors)[:, positions]
+    size = np.maximum(np.abs(run.trajectory.state), family.engine.magnitudes)[:, positions]
     steps = WIDEST_STEP / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
     if model.contacts:
         everything, probe = np.arange(len(steps)), float(steps.min()) * 1e-3

@@ -173,9 +173,8 @@ class Tape:
             return -a
         if _negative(a):
             return a.arguments[0]
-        return self.write(FLOAT, "sub", a.arguments[1], a.arguments[0]) if a.operation == "sub" else self._minus(a)
-
-    def _minus(self, a: Symbol) -> Symbol:
+        if a.operation == "sub":
+            return self.write(FLOAT, "sub", a.arguments[1], a.arguments[0])
         return self.write(FLOAT, "neg", a)
 
     def multiply(self, a: Any, b: Any) -> Any:

@@ -20,17 +20,14 @@ from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
-from flexclear.pipeline.dynamics.run.evaluation.observation import observe
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, project
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
-from flexclear.pipeline.dynamics.run.run import driven
-from flexclear.pipeline.dynamics.run.states import per_speed, rows_of
+from flexclear.pipeline.dynamics.run.run import maker
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
 #: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
@@ -84,8 +81,7 @@ def placed(scene: Scene) -> Scene:
 
 
 def _started(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Engine, np.ndarray]:
-    moved, given = driven(scene, bundles, progress)
-    engine = prepare(tabulate(build(moved, bundles), given), progress)
+    engine = maker(scene, bundles, progress)()
     return engine, consistent_start(engine)
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import html
+
 import xarray as xr
+
+from flexclear.pipeline.post.pages import media
 
 
 class Answered(xr.Dataset):
@@ -16,10 +20,6 @@ class Answered(xr.Dataset):
 
 def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: str = "") -> Answered:
     """The dataset with an answer: text in words, a picture as PNG, a table as HTML."""
-    import html
-
-    from flexclear.pipeline.post.pages import media
-
     result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
     image = "" if picture is None else media("answer.png", picture, "")
     result._answer = f"<p>{html.escape(text)}</p>{image}{table}"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.quantities import SEPARATED
 from flexclear.pipeline.post.cost.study import methods
 from flexclear.pipeline.post.overview.curves import size_of
 from flexclear.pipeline.post.plotting import style
@@ -178,8 +179,6 @@ def figure(run: xr.Dataset) -> dict[str, bytes]:
     if drift is not None and drift.max(initial=0.0) > ROUNDING:
         panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, drift, LOOPS))
     if "separation" in run:
-        from flexclear.pipeline.core.artifacts.quantities import SEPARATED
-
         times, values = run["separation_time"].values, run["separation"].values
         panels.append(("separation of a perturbed run", "fraction of each motion", times, values, SEPARATED))
     with style.style():

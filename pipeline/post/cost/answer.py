@@ -10,7 +10,9 @@ import xarray as xr
 
 from flexclear.pipeline.post.cost.causes import CAUSES, dominant
 from flexclear.pipeline.post.cost.study import methods, recording, resolved
+from flexclear.pipeline.post.cost.work_precision import LOOKS
 from flexclear.pipeline.post.overview.curves import size_of
+from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
 
 #: a setting that is as accurate as the scene's own is named where it costs less than this fraction
@@ -93,9 +95,6 @@ def undone(study: xr.Dataset) -> list[str]:
 
 def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
     """``<name>.png`` and ``.svg``: the largest error of any quantity against processor time, this scene as a star."""
-    from flexclear.pipeline.post.cost.work_precision import LOOKS
-    from flexclear.pipeline.post.plotting import style
-
     by_method: dict[str, list[Choice]] = {}
     for choice in choices(study):
         by_method.setdefault(choice.name.partition(",")[0], []).append(choice)

@@ -10,12 +10,14 @@ from typing import Any, cast
 
 import numpy as np
 import xarray as xr
+from matplotlib.image import imsave
 
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.post.overview import figures
 from flexclear.pipeline.post.pages import media, viewer, viewer_page
-from flexclear.pipeline.post.plotting import mode_sheet
+from flexclear.pipeline.post.plotting import mode_sheet, style
 from flexclear.pipeline.post.render import film_speed, gl, gltf, joint_view, panel, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
 from flexclear.pipeline.post.single_run.series import derive
@@ -66,8 +68,6 @@ def make(what: str, kind: str, shown: Shown) -> dict[str, bytes]:
 
 def png(pixels: np.ndarray) -> bytes:
     """PNG file of pixels of shape (height, width, 3)."""
-    from matplotlib.image import imsave
-
     buffer = io.BytesIO()
     imsave(buffer, np.ascontiguousarray(pixels), format="png", metadata=cast(Any, {"Software": None}))
     return buffer.getvalue()
@@ -179,9 +179,6 @@ def _joints(shown: Shown) -> dict[int, str]:
 
 
 def _joint_figures(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.overview import figures
-    from flexclear.pipeline.post.plotting import style
-
     _joints(shown)
     with style.style():
         return figures.contacts(shown.of_run, derive(shown.of_run), shown.watched)

@@ -42,16 +42,13 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
     engine.keep(everything)
     engine.attempt(y, t)
     spread = engine.rows(m.SPREAD)
-    scales = selection.row_scales(engine.model, spread, _natural_lengths(engine))
+    columns, points = engine.table(m.COLUMNS), engine.table(m.SITE_FRAMES)["origin"]
+    lengths = selection.natural_lengths(engine.model, columns, points, mass_factor(engine))
+    scales = selection.row_scales(engine.model, spread, lengths)
     selected, ratio = selection.choose(spread, scales, engine.mobility.rank)
     engine.keep(selected)
     engine.view(m.ROW_SCALE)[: selected.sum()] = scales[selected] ** 2
     return ratio
-
-
-def _natural_lengths(engine: Engine) -> np.ndarray:
-    columns, points = engine.table(m.COLUMNS), engine.table(m.SITE_FRAMES)["origin"]
-    return selection.natural_lengths(engine.model, columns, points, mass_factor(engine))
 
 
 def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
@@ -72,31 +69,25 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
     pivots[m.LAST_PIVOT] = ratio if better else present
     pivots[m.LEAST_PIVOT] = WORN * ratio if better else WORN * present
     if better:
-        engine.view(m.INDEPENDENCE)[:] = 0.0  # that of other rows
+        engine.view(m.INDEPENDENCE.place)[:] = 0.0  # that of other rows
         engine.control[[m.PASS_TIME, m.MOST_REACH, m.LEFT]] = NEVER, NEVER, 1.0
     return better
 
 
 def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Closure Jacobians (..., selected rows, nv) with lengths in units of `SCALE`: what condition numbers are reported
-    of."""
-    along = built_rows(model, h) == 0
-    return J * np.outer(np.where(along, 1.0 / SCALE, 1.0), coordinate_scales(model.numbering))
+    """Closure Jacobians (..., selected rows, nv), lengths in units of `SCALE`: their condition numbers are reported."""
+    return J * np.outer(1.0 / row_units(model, h, SCALE), coordinate_scales(model.numbering))
 
 
 def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
     """The same with lengths in units of the mechanism's size, and modes with the root of their body's mass besides."""
-    along = built_rows(model, h) == 0
-    return J * np.outer(np.where(along, 1.0 / model.length, 1.0), model.speed_scales)
+    return J * np.outer(1.0 / row_units(model, h, model.length), model.speed_scales)
 
 
-def built_rows(model: Model, h: np.ndarray) -> np.ndarray:
-    """Kind of each selected row: 0 along an axis [m], 1 of two axes [-]."""
-    kinds = []
-    rows = model.arrays.table(m.CLOSURE_ROWS, h)
-    for c in model.arrays.table(m.CLOSURES, h):
-        kinds.append(rows["kind"][c["row0"] : c["row0"] + c["n_kept"]])
-    return np.concatenate([*kinds, np.zeros(0, dtype=np.int64)])
+def row_units(model: Model, h: np.ndarray, length: float) -> np.ndarray:
+    """Unit of each selected row: a length along an axis [m], 1 of two axes [-]."""
+    kinds = model.arrays.table(m.CLOSURE_ROWS, h)["kind"][selection.kept_places(model, h)]
+    return np.where(kinds == 0, length, 1.0)
 
 
 def coordinate_scales(numbering: Numbering) -> np.ndarray:

@@ -60,8 +60,7 @@ class Engine:
 
     @cached_property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives and loads and samples in between, end [s]; times that differ by rounding only are
-        one."""
+        """Start, breaks of drives, loads and samples, end [s]; times that differ by rounding only are one."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
         for first, count in self.model.arrays.table(m.LAWS):
             inner |= {float(t) for t in starts[first + 1 : first + count]}
@@ -115,8 +114,7 @@ class Engine:
         self.connect()
 
     def connect(self) -> None:
-        """Let evaluations be those for the rows solved for, and steps evaluate by code of their own where there is
-        some."""
+        """Let evaluations be those for the rows solved for, steps by code of their own where there is some."""
         rows, known = self.selected.tobytes(), self.straight
         alone = rows in known.rows
         if self.has_straight_code:
@@ -128,6 +126,8 @@ class Engine:
         """Evaluate what is recorded of every row, in this thread."""
         if self.has_straight_code:
             self.h[m.DESCRIBE] = address(self.model, self.h, self.straight, self.selected.tobytes(), DESCRIBED)
+        rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
+        pieces = pieces.reshape(len(rows), self.model.arrays.size(m.N_LAWS))
         self.entry.observe(self.h, self.model.arrays.f, self.w, self.n, rows, pieces, tolerance, out)
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
@@ -154,6 +154,12 @@ class Engine:
     def slope(self) -> np.ndarray:
         """Where an evaluation leaves the rates of the state, not copied."""
         return self.view(m.SLOPES)[: self.model.ny]
+
+    @property
+    def magnitudes(self) -> np.ndarray:
+        """What counts as far of each variable of the state, shape (NY,)."""
+        arrays = self.model.arrays
+        return np.asarray(arrays.table(m.FLOORS)["magnitude"][arrays.table(m.GROUPS)["group"]])
 
     @property
     def modes(self) -> np.ndarray:
@@ -193,8 +199,7 @@ class Engine:
 
 
 def prepare(model: Model, progress: Progress) -> Engine:
-    """The engine of a model, its kernels compiled or fetched from disk; SolverError for a start that cannot
-    continue."""
+    """The engine of a model, its kernels compiled or fetched; SolverError for a start that cannot continue."""
     refuse_missed(model.mechanism)
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())

@@ -1,17 +1,34 @@
-"""What is observed of rows of the record, their loops closed."""
+"""States as rows of the record, and what is observed of these, their loops closed."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Blocks, Frames, Observed
-from flexclear.pipeline.dynamics.integrate.recording import record_share
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: no row is projected to less than this fraction of the mechanism's size
 ROUNDING = 1e-14
+
+
+def rows_of(
+    engine: Engine,
+    states: np.ndarray,
+    time: float | np.ndarray,
+    modes: float | np.ndarray = 0.0,
+    latched: float | np.ndarray = 0.0,
+) -> np.ndarray:
+    """Rows of the record for states, shape (rows, NY), at a time or times [s].
+
+    modes, latched: of the contacts, shape (contacts,), or one for all: open, without an impact rate.
+    """
+    contacts = len(engine.model.contacts)
+    rows = recording.empty_record(len(states), contacts, states.shape[1])
+    made = recording.record(rows, contacts)
+    made.time[:], made.modes[:], made.latched[:], made.state[:] = time, modes, latched, states
+    return rows
 
 
 def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observed:
@@ -25,7 +42,7 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observe
 def observe_blocks(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Blocks:
     """The same as the kernel writes it; see `equations.observation.by_name`."""
     pieces = engine.pieces[engine.segments(rows[:, 0], after=after)]
-    return observe_with(engine, rows, pieces, max(record_share(engine.rtol) * engine.rtol, ROUNDING))
+    return observe_with(engine, rows, pieces, max(recording.record_share(engine.rtol) * engine.rtol, ROUNDING))
 
 
 def frames(engine: Engine, rows: np.ndarray) -> Frames:
@@ -33,18 +50,12 @@ def frames(engine: Engine, rows: np.ndarray) -> Frames:
     size = engine.model.arrays.size
     pieces = engine.pieces[engine.segments(rows[:, 0], after=False)]
     whole, blocks = observation.room(len(rows), size, frames=True)
-    _observe(engine, rows, pieces, observation.AS_RECORDED, whole)
+    engine.observe(rows, pieces, observation.AS_RECORDED, whole)
     return observation.frames_by_name(blocks, size)
 
 
 def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, fraction: float) -> Blocks:
     """The same with given pieces of the laws, (rows, laws), projected to a fraction of the mechanism's size."""
     whole, blocks = observation.room(len(rows), engine.model.arrays.size)
-    _observe(engine, rows, pieces, fraction * engine.model.length, whole)
+    engine.observe(rows, pieces, fraction * engine.model.length, whole)
     return blocks
-
-
-def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
-    laws = engine.model.arrays.size(m.N_LAWS)
-    pieces = np.ascontiguousarray(pieces).reshape(len(rows), laws)
-    engine.observe(np.ascontiguousarray(rows), pieces, tolerance, out)

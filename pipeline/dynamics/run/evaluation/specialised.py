@@ -1,6 +1,6 @@
 """What the steps of an integration evaluate with: code for the closure rows that it has met, alone or with others.
 
-Members of an ensemble are evaluated several at once (`run.evaluation.members`).
+Members of an ensemble are evaluated several at once (`record.ensemble`).
 """
 
 from __future__ import annotations

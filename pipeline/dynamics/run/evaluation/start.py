@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.plausibility import refuse_depth
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 
 #: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
 NO_IMPACT = 1e300
@@ -42,7 +43,8 @@ def consistent_start(engine: Engine) -> np.ndarray:
         _look(engine, y)
         y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
         initial.check_loads(model, engine.table(m.LOAD))
-    _refuse_penetration(engine, y)
+    for c, depth in overlapping(engine, y).items():
+        refuse_depth(model.scene, model.contacts[c], depth)
     return y
 
 
@@ -88,10 +90,7 @@ def _look(engine: Engine, y: np.ndarray) -> None:
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Y at the start with the loops closed and their rates zero; SolverError when that fails."""
-    rows = recording.empty_record(1, len(engine.model.contacts), len(y))
-    start = recording.record(rows, len(engine.model.contacts))
-    start.time[:], start.state[:] = engine.start, y
-    seen = observe(engine, rows)
+    seen = observe(engine, rows_of(engine, y[None], engine.start))
     if seen.status[0] != m.OK:
         why = engine.explained() or "the loops cannot be closed from the start that the scene gives"
         raise SolverError(f"at t = {engine.start:.6g} s: {why}")
@@ -105,6 +104,17 @@ def rates_at_speeds(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.nda
     return closure_rows.evaluate(engine, project(engine, moved), engine.start)
 
 
+def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Change of what is read of the rates, or of the work space, per unit of each free speed; shape (..., nv).
+
+    From the rates at speeds, less those at the speeds of the drives alone: no step width enters.
+    """
+    nv = engine.model.nv
+    driven = read(rates_at_speeds(engine, y, np.zeros(nv)))
+    changes = [read(rates_at_speeds(engine, y, unit)) - driven for unit in np.eye(nv)]
+    return np.moveaxis(np.reshape(changes, (nv, *np.shape(driven))), 0, -1)
+
+
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     """Contacts whose surfaces overlap at the start, by number, and how deep [m]."""
     contacts = engine.model.contacts
@@ -113,8 +123,3 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     closure_rows.evaluate(engine, y, engine.start)
     gaps = engine.table(m.TOUCH)["gap"]
     return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -TOUCHING * joint.clearance}
-
-
-def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
-    for c, depth in overlapping(engine, y).items():
-        refuse_depth(engine.model.scene, engine.model.contacts[c], depth)

@@ -14,13 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, separated_from
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, moved_start
+from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, askew, moved_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
-from flexclear.pipeline.dynamics.run.states import askew
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
 EXPONENT_BATCHES, STUDENT = 10, 2.262
@@ -51,7 +49,7 @@ def start_direction(engine: Engine, y: np.ndarray) -> Direction:
         return Direction(nothing, moved_start(engine, y) - y)
     end = model.speeds.stop
     change = np.zeros(len(y))
-    change[:end] = STATE_CHANGE * _far(engine)[:end] * askew(end)
+    change[:end] = STATE_CHANGE * engine.magnitudes[:end] * askew(end)
     return Direction(
         nothing, PERTURBATION / STATE_CHANGE * 0.5 * (project(engine, y + change) - project(engine, y - change))
     )
@@ -61,7 +59,7 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     """Return how the change along direction k of a run grows."""
     metric, trajectory = Metric(engine), run.trajectory
     changes, end = run.changes[:, k], engine.model.speeds.stop
-    steps = STATE_CHANGE / np.maximum((np.abs(changes) / _far(engine))[:, :end].max(axis=1, initial=0.0), 1e-300)
+    steps = STATE_CHANGE / np.maximum((np.abs(changes) / engine.magnitudes)[:, :end].max(axis=1, initial=0.0), 1e-300)
     sides = []
     for sign in (-1.0, 1.0):
         rows = trajectory.rows.copy()
@@ -74,12 +72,6 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     first = separated_from(time, separation, engine.end - engine.start)
     mean, error = _slope(time, np.log(np.maximum(np.linalg.norm(change, axis=1), 1e-300)))
     return Growth(mean, error, engine.end if first is None else float(time[first]))
-
-
-def _far(engine: Engine) -> np.ndarray:
-    """Return what counts as far of each variable, (NY,)."""
-    arrays = engine.model.arrays
-    return np.asarray(arrays.table(m.FLOORS)["magnitude"][arrays.table(m.GROUPS)["group"]])
 
 
 def _slope(time: np.ndarray, logarithm: np.ndarray) -> tuple[float, float]:

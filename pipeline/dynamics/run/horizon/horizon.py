@@ -36,7 +36,7 @@ from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import frames
-from flexclear.pipeline.dynamics.run.states import displaced, per_speed
+from flexclear.pipeline.dynamics.run.evaluation.start import per_speed, project, rates_at_speeds
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
 #: the two are compared at about this many times, which bounds the cost; where outputs are rarer, between them as well
@@ -144,7 +144,7 @@ class Pair:
         self._look(self._run)
         self._look(other)
         first = self._diverged(self._separation(other))
-        return first is not None and bool(self._time(other.rows)[-1] >= self._judged(first))
+        return first is not None and bool(other.rows[-1, 0] >= self._judged(first))
 
     def _await_run(self, alive: Progress) -> None:
         """Wait for the end of the run; one that fails before it begins has none."""
@@ -190,16 +190,13 @@ class Pair:
         """Add the motion at the times of comparison that a run has come to since the last look."""
         rows = seen.rows
         if len(rows):
-            reached = int(np.searchsorted(self.times, self._time(rows)[-1], side="right"))
+            reached = int(np.searchsorted(self.times, rows[-1, 0], side="right"))
             new = self._motion(rows, self.times[len(seen.motion) : reached])
             seen.motion = np.concatenate([seen.motion, new])
 
-    def _time(self, rows: np.ndarray) -> np.ndarray:
-        return recording.record(rows, len(self._looking.model.contacts)).time
-
     def _motion(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Motion at times of which there are rows, shape (time, entries)."""
-        return self._metric.motion(self._looking, rows[np.searchsorted(self._time(rows), times)])
+        return self._metric.motion(self._looking, rows[np.searchsorted(rows[:, 0], times)])
 
     def _separation(self, other: _Seen) -> np.ndarray:
         """Separation at the times of comparison that both have come to."""
@@ -292,7 +289,9 @@ def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.n
     """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
-    return displaced(engine, y, speeds)
+    there, nq = y.copy(), engine.model.nq
+    there[:nq] += rates_at_speeds(engine, y, speeds)[:nq] - rates_at_speeds(engine, y, 0.0 * speeds)[:nq]
+    return project(engine, there)
 
 
 def moved_start(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -300,3 +299,8 @@ def moved_start(engine: Engine, y: np.ndarray) -> np.ndarray:
     along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
     offsets = [PERTURBATION * contact.joint.clearance * along for contact in engine.model.contacts]
     return perturbed(engine, y, offset_jacobian(engine, y), np.concatenate(offsets))
+
+
+def askew(count: int) -> np.ndarray:
+    """Numbers from -1 to 1 that make a direction which no symmetry of a mechanism has, shape (count,)."""
+    return np.asarray(np.sin(1.0 + np.arange(count) * 2.399963))

@@ -24,9 +24,10 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.observation import rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import project
+from flexclear.pipeline.dynamics.run.horizon.horizon import askew
 from flexclear.pipeline.dynamics.run.pieces import Handover, Moment, Tape
-from flexclear.pipeline.dynamics.run.states import askew, rows_of
 from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, integrate
 
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
@@ -152,10 +153,8 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
 
 
 def state_scales(engine: Engine, period: float) -> np.ndarray:
-    """Size of each state variable: the mechanism's size or a radian, for speeds in a period; infinite where nothing
-    feeds back (energies of the ledger)."""
-    groups = engine.model.arrays.table(m.GROUPS)["group"]
-    floors = np.asarray(engine.model.arrays.table(m.FLOORS)["magnitude"])[groups].astype(float)
+    """Size of each state variable, of speeds in a period; infinite of the ledger, of which nothing feeds back."""
+    floors = engine.magnitudes
     floors[engine.model.speeds] /= period
     floors[engine.model.speeds.stop :] = np.inf
     return floors
@@ -183,8 +182,7 @@ def handed(part: Engine, here: Moment) -> Handover:
         counters[index - m.STATUS] = value
     lasting = np.zeros(len(LASTING))
     lasting[0] = part.start
-    contacts = slice(len(part.model.contacts))
-    rows = rows_of(part, here.y[None], part.start, here.modes[contacts], here.latched[contacts])
+    rows = rows_of(part, here.y[None], part.start, here.modes, here.latched)
     recorded = Tape(np.zeros(0), rows, here.events, [(part.start, part.selected.copy())])
     return Handover(here, counters, lasting, recorded)
 

@@ -119,8 +119,7 @@ class Suit:
         return max(expected, min(self.least, seen[at])) if name == DEFAULT else expected
 
     def cost(self, name: str, rtol: float) -> float:
-        """What a run is foreseen to take, in evaluations of the default method; nothing where only a run can show
-        it."""
+        """What a run is foreseen to take, in evaluations of the default method; 0 where only a run can show it."""
         if name in self.seen:
             return DEARER[name] * self.evaluations(name, rtol)
         return self.least if name == DEFAULT else 0.0

@@ -22,8 +22,7 @@ from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.states import per_speed
+from flexclear.pipeline.dynamics.run.evaluation.start import per_speed, project
 
 #: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
 #: and above which it is not singular
@@ -156,9 +155,8 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     still[model.speeds] = 0.0
     engine.attempt(still, t)
     U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
-    along = closure_rows.built_rows(model, engine.h) == 0
     pulled = engine.view(m.RESIDUAL_RATE)[selection.kept_places(model, engine.h)]
-    pulled = np.where(along, pulled / model.length, pulled)
+    pulled = pulled / closure_rows.row_units(model, engine.h, model.length)
     if values[-1] > END_OF_REACH * values[0]:
         return ""
     if not abs(U[:, len(values) - 1] @ pulled) > FASTER * values[-1] * np.linalg.norm(pulled) > 0.0:

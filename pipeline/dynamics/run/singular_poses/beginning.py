@@ -25,11 +25,10 @@ from flexclear.pipeline.dynamics.model.driving import coordinate_of
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import start_motions
 from flexclear.pipeline.dynamics.run.refusals.reach import preserved
 from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
-from flexclear.pipeline.dynamics.run.states import rows_of
 
 #: the way is first as long as the fastest coordinate takes for this fraction of its unit, then half of that, and so on
 FIRST_WAY, WAY_HALVINGS = 0.3, 9
@@ -78,7 +77,7 @@ def _along(engine: Engine, way: Direction, turn: float) -> Collocation | None:
         span = way.reaching(FIRST_WAY * 0.5**k)
         closure_rows.select_rows(engine, way.state(engine.start + span), engine.start + span)
         sampler = Sampler(engine)
-        lead = Lead(way.state, turn if way.at_speed else 0.0)
+        lead = Lead(way.state, turn if way.speeds is None else 0.0)
         made = collocate(sampler, engine.start, way.start, span, lead)
         sampler.restore()
         if made is not None:
@@ -152,11 +151,6 @@ class Direction:
     size: float
     speeds: np.ndarray | None
     progress: Callable[[float], float]
-
-    @property
-    def at_speed(self) -> bool:
-        """Whether it begins with a speed."""
-        return self.speeds is None
 
     def reaching(self, size: float) -> float:
         """How long until the fastest coordinate has gone so many of its units, or to the next break [s]."""

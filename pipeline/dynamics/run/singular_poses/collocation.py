@@ -24,8 +24,7 @@ from flexclear.pipeline.dynamics.equations.observation import Blocks
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import ROUNDING as CLOSED
-from flexclear.pipeline.dynamics.run.evaluation.observation import observe_with
-from flexclear.pipeline.dynamics.run.states import rows_of
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe_with, rows_of
 
 #: points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
@@ -110,10 +109,10 @@ class Sampler:
     """Evaluates closed states with the laws and contacts in force; `restore` leaves the engine as it was."""
 
     def __init__(self, engine: Engine) -> None:
-        self.engine, self.evaluations, contacts = engine, 0, slice(len(engine.model.contacts))
+        self.engine, self.evaluations = engine, 0
         laws = engine.model.arrays.size(m.N_LAWS)
         self._pieces = engine.n[engine.n[m.ACTIVE] :][:laws].copy()
-        self._contacts = engine.modes[contacts].copy(), engine.latched[contacts].copy()
+        self._contacts = engine.modes.copy(), engine.latched.copy()
         self._kept = engine.w.copy(), engine.n.copy()
 
     def restore(self) -> None:
