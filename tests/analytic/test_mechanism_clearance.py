@@ -21,10 +21,6 @@ SMOOTH = (("joint.A1.friction.static", 0.0), ("joint.A1.friction.dynamic", 0.0))
 LEG = ("rod1", "cylinder1", "ball_A1", "ball_B1")
 
 
-def test_number_of_impacts_is_the_same() -> None:
-    assert len(impacts(run(SCENE))["start"]) == np.sum(KNOWN["impact_approach"] > 1e-4)
-
-
 def test_impacts_happen_when_and_as_hard_as_in_the_second_derivation() -> None:
     found = impacts(run(SCENE))
     # the motion is not chaotic: errors of 1e-10 grow some ten times over the run

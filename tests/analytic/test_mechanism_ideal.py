@@ -53,11 +53,6 @@ def close(found: xr.DataArray, expected: list[np.ndarray], fraction: float) -> b
 
 
 @every_case
-def test_all_scenes_share_the_output_times(scene: str) -> None:
-    assert np.array_equal(run(scene).time, run("sps4/ideal").time)
-
-
-@every_case
 def test_pose_is_the_inverse_of_the_leg_lengths_at_every_output(scene: str) -> None:
     dataset = run(scene).sel(body="platform")
     height = RAISED if scene.endswith("stacked") else 0.0
