@@ -20,6 +20,7 @@ from benchmarks.layouts import ROD_CENTRE, ROD_END, Layout, edits
 from flexclear.commands.scenes import Workplace, bundles, open_workplace
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.scene.integrators import DEFAULT
 from flexclear.pipeline.core.scene.load import compose, scene_of
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
@@ -134,7 +135,8 @@ def scene(p: Parameters, rtol: float | None = None) -> Scene:
     if p.modes:
         table["body"]["rod1"] = _flexible(table["body"]["rod1"], p)
     _time(table, p)
-    table["solver"] = {"evaluations": CAP} | ({"rtol": rtol} if rtol else {})
+    # a method of its own: the program would look for the loosest tolerance that suffices up to the horizon
+    table["solver"] = {"integrator": DEFAULT, "evaluations": CAP} | ({"rtol": rtol} if rtol else {})
     table.pop("ensemble", None)
     made = scene_of(table, moved)
     made._name = "stability"
