@@ -7,6 +7,7 @@ import inspect
 import flexclear as fc
 from benchmarks.page import DOCS
 from benchmarks.site.keys import table
+from flexclear import public
 from flexclear.pipeline.core.artifacts import schema as artifacts
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.schema import Schema
@@ -181,7 +182,7 @@ and `fc.ResourceError` where the machine lacks memory or disk. The command ends 
 
 def python() -> str:
     """The page."""
-    names = [name for name in fc.__all__ if inspect.isfunction(getattr(fc, name, None))]
+    names = [name for name in public.__all__ if inspect.isfunction(getattr(fc, name, None))]
     return PYTHON + "".join(_section(name) for name in names) + PROMISES
 
 
