@@ -17,11 +17,11 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.linear.campbell import campbell as over_speeds
-from tests.analytic.test_unbalanced_rotors import ACROSS, ALONG, MASS, MIXED, SIDE, SLOPE, TURNS, Table, rotor
+from tests.analytic.test_unbalanced_rotors import ACROSS, ALONG, MASS, MIXED, SIDE, SLOPE, axes, damped, rotor
 
 
-def diagram(table: Table, at: list[float]) -> xr.Dataset:
-    return over_speeds(Scene.model_validate(table), {}, silent, at)
+def diagram(scene: Scene, at: list[float]) -> xr.Dataset:
+    return over_speeds(scene, {}, silent, at)
 
 
 def whirls(speed: float) -> np.ndarray:
@@ -35,7 +35,7 @@ def whirls(speed: float) -> np.ndarray:
 @pytest.mark.parametrize("unbalance, turn", [(0.0, "upright"), (1e-6, "oblique")])
 def test_an_overhung_rotor_has_the_whirls_and_the_critical_speed_of_its_equations(unbalance: float, turn: str) -> None:
     at = [0.0, 60.0, 120.0, 140.0, 200.0, 400.0]
-    made = diagram(rotor(20.0, unbalance, TURNS[turn]), at)
+    made = diagram(rotor(20.0, unbalance, axes(turn)), at)
     kinds = made.whirl.values
     assert sorted(kinds) == ["", "", "backward", "backward", "forward", "forward"]
     branches = 2.0 * np.pi * made.whirl_frequency.values[:, kinds != ""]
@@ -55,10 +55,8 @@ def test_an_overhung_rotor_has_the_whirls_and_the_critical_speed_of_its_equation
 
 def test_a_jeffcott_rotor_whirls_at_one_frequency_at_all_speeds() -> None:
     """No gyroscopic moment: sqrt(k/m) forward and backward, and damping that drives it above that speed."""
-    table = rotor(20.0, damping=20.0)
-    table["load"]["shaft"]["stiffness"] = np.diag([SIDE, SIDE, 1e8, 1e6, 1e6, 1e6]).tolist()
     at, natural = [100.0, 200.0, 300.0], np.sqrt(SIDE / MASS)
-    made = diagram(table, at)
+    made = diagram(damped(rotor(20.0), 20.0), at)
     first = np.abs(2.0 * np.pi * made.whirl_frequency.values)
     slowest = np.nanargmin(np.where(made.whirl.values == "forward", first[0], np.nan))
     # damping of 1.4 % moves the frequency by its square
@@ -99,7 +97,7 @@ def test_options_of_a_diagram_need_its_speeds(capsys: pytest.CaptureFixture[str]
 def test_branches_pass_a_critical_speed_that_has_no_steady_motion() -> None:
     """A millimetre of unbalance; at 129 rad/s nothing small is steady."""
     at = [100.0, 110.0, 128.9, 140.0, 150.0]
-    made = diagram(rotor(20.0, 1e-3, TURNS["oblique"]), at)
+    made = diagram(rotor(20.0, 1e-3, axes("oblique")), at)
     there = np.isfinite(made.growth.values)
     assert there[[0, 1, 3, 4]].all()
     kinds = made.whirl.values
