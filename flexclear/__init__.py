@@ -19,10 +19,14 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> object:
-    """What `public` lists, which is imported when it is asked for, and the version."""
-    if name.startswith("__") and name not in ("__all__", "__version__"):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module("flexclear.public"), name)
+    """What `public` lists, which is imported when it is asked for, that module itself, and the version."""
+    listed = name in ("public", "__all__", "__version__")
+    public = import_module("flexclear.public") if listed or not name.startswith("__") else None
+    if name == "public":
+        return public
+    if public is not None and (listed or name in public.__all__):
+        return getattr(public, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -63,15 +63,17 @@ def divergence(time: np.ndarray, separation: np.ndarray, span: float) -> int | N
 def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
     """Index of the time from which on two runs are visibly separated; None where they stay close.
 
-    From there on they are so at most times, until they diverge or end: damped motions forget an impact after some
-    others, and such a difference is none.  Arguments: as of `divergence`.
+    They are so until they diverge or end, but for moments: agreement that lasts ends a separation, as where a damped
+    motion forgets an impact after some others.  Arguments: as of `divergence`.
     """
-    diverged, visible = divergence(time, separation, span), separation > SEPARATED
-    last = len(time) - 1 if diverged is None else diverged
-    for k in lasting(time, visible, LASTING * span).tolist():
-        if k >= last or np.mean(visible[k : last + 1]) > 0.5:
-            return min(k, last)
-    return diverged
+    diverged, least = divergence(time, separation, span), LASTING * span
+    if diverged is not None:
+        time, separation = time[: diverged + 1], separation[: diverged + 1]
+    visible = separation > SEPARATED
+    close = lasting(time, ~visible, least)
+    close = close[time[close] + least <= time[-1:]]  # what begins shortly before the end is a moment
+    apart = lasting(time, visible, least)
+    return next(iter(apart[apart > max(close, default=-1)].tolist()), None)
 
 
 def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:

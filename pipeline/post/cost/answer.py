@@ -88,7 +88,7 @@ def undone(study: xr.Dataset) -> list[str]:
     """Which runs were left undone, and why, a sentence for each reason."""
     reasons = {
         "undone": "Not run within the budget",
-        "given_up": "Not run, since their method used up its evaluations at a looser tolerance",
+        "given_up": "Not run, since their method used up its evaluations at a tolerance no tighter",
     }
     return [f"{text}: {study.attrs[name]}." for name, text in reasons.items() if study.attrs.get(name)]
 

@@ -54,7 +54,7 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
     arrays["horizon"] = np.array(float(run["horizon"].values if "horizon" in run else run["time"].values[-1]))
     attributes = {
         "impact_threshold": f"{IMPACT:g} m/s",
-        "horizon_criterion": f"ensemble, or run and perturbed run, stay separated by {SEPARATED:g} of the motion",
+        "horizon_criterion": f"ensemble, or run and perturbed run, differ by {SEPARATED:g} of the motion from then on, but for moments",
     }
     attributes["references"] = str(run.attrs.get("references", ""))
     title = f"What follows from: {run.attrs['title']}"
@@ -314,7 +314,7 @@ def sentence(horizon: float, end: float, members: float | None = None) -> str:
     neighbour = f"A run whose contacts start {100.0 * PERTURBATION:g} % of their clearance elsewhere"
     difference = f"{100.0 * SEPARATED:g} % of each body's largest motion"
     if horizon >= end:
-        text = f"{neighbour} does not diverge from it: differences of more than {difference} pass."
+        text = f"{neighbour} does not diverge from this one: where it differs by more than {difference}, it comes back."
     else:
         whole = f"the run lasts {1e3 * end:.4g} ms"
         text = f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."

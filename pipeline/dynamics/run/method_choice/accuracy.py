@@ -233,6 +233,8 @@ def _search(search: Search, progress: Progress) -> Attempt:
         except SolverError as error:
             refusal = error
             if rtol <= REFUSED_FOR_GOOD:
+                if not search.predictable:
+                    raise
                 break
             # a tolerance so loose that the run is refused, as its ledger does not close
             too_loose = min(too_loose, rtol)
@@ -276,7 +278,7 @@ def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
     """By how much, and why no tolerance helps."""
     if not best.errors:
-        return "not known: runs at tighter tolerances are refused"
+        return "nobody knows by how much, since tighter runs are refused"
     name = max(requested, key=lambda n: best.errors[n] / requested[n])
     text = (
         f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / requested[name]:.2g} times what is requested"
