@@ -101,3 +101,10 @@ def test_a_run_imports_neither_xarray_nor_what_scipy_computes(
 def test_what_needs_a_library_shows_it(fresh: Path) -> None:
     """The principal moments of a full inertia matrix are eigenvalues: so the test above would see NumPy."""
     assert "numpy" in imported("why", "checks/bennett", results=fresh)
+
+
+def test_the_package_gives_what_public_lists_and_that_module_alone() -> None:
+    said = printed(
+        "import flexclear as fc; print(fc.public.run is fc.run, fc.__version__ != '', hasattr(fc, 'scenes'))"
+    )
+    assert said.split() == ["True", "True", "False"]

@@ -131,8 +131,8 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
 class Acting(NamedTuple):
     """What the rows of a closure are between two sites a and b: each a turn about a direction, or a way along one.
 
-    directions: of each row, unit vectors where the loop is closed, (rows, 3).  turning, factor: of each row, which it is, and what a radian or a metre of it
-    counts for; (rows,).  point: origin of b.
+    directions: of each row, unit vectors where the loop is closed, (rows, 3).  turning, factor: of each row, which it
+    is, and what a radian or a metre of it counts for; (rows,).  point: origin of b.
     """
 
     a: Site
