@@ -169,11 +169,10 @@ CLOSE, VISIBLE, FAR = 0.5 * SEPARATED, 2.0 * SEPARATED, 2.0 * DIVERGED
         # a moment of an impact, and an impact that is forgotten after some others
         ([CLOSE] * 10 + [FAR] + [CLOSE] * 61, None),
         ([CLOSE] * 10 + [VISIBLE] * 20 + [CLOSE] * 42, None),
-        ([CLOSE] * 60 + [VISIBLE] * 8 + [CLOSE] * 4, None),
         # visible to the end, but for a moment
         ([CLOSE] * 10 + [VISIBLE] * 20 + [CLOSE] + [VISIBLE] * 41, 10),
         # one that is forgotten, then one that is not
-        ([CLOSE] * 10 + [VISIBLE] * 10 + [CLOSE] * 30 + [VISIBLE] * 22, 50),
+        ([CLOSE] * 10 + [VISIBLE] * 5 + [CLOSE] * 35 + [VISIBLE] * 22, 50),
         # what comes after two runs have diverged counts no more
         ([CLOSE] * 10 + [VISIBLE] * 10 + [FAR] * 5 + [CLOSE] * 47, 10),
         ([CLOSE] * 10 + [FAR] * 5 + [CLOSE] * 57, 10),

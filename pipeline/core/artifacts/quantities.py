@@ -63,17 +63,16 @@ def divergence(time: np.ndarray, separation: np.ndarray, span: float) -> int | N
 def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
     """Index of the time from which on two runs are visibly separated; None where they stay close.
 
-    They are so until they diverge or end, but for moments: agreement that lasts ends a separation, as where a damped
-    motion forgets an impact after some others.  Arguments: as of `divergence`.
+    From there on they are so most of the time, until they diverge or end: damped motions forget an impact after some
+    others, and such a difference is none.  Arguments: as of `divergence`.
     """
-    diverged, least = divergence(time, separation, span), LASTING * span
+    diverged = divergence(time, separation, span)
     if diverged is not None:
         time, separation = time[: diverged + 1], separation[: diverged + 1]
     visible = separation > SEPARATED
-    close = lasting(time, ~visible, least)
-    close = close[time[close] + least <= time[-1:]]  # what begins shortly before the end is a moment
-    apart = lasting(time, visible, least)
-    return next(iter(apart[apart > max(close, default=-1)].tolist()), None)
+    left = np.cumsum(visible[::-1])[::-1]  # how often from each time on
+    starts = lasting(time, visible, LASTING * span)
+    return next(iter(starts[2 * left[starts] > len(time) - starts].tolist()), None)
 
 
 def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:

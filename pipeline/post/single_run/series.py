@@ -54,7 +54,7 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
     arrays["horizon"] = np.array(float(run["horizon"].values if "horizon" in run else run["time"].values[-1]))
     attributes = {
         "impact_threshold": f"{IMPACT:g} m/s",
-        "horizon_criterion": f"members or run and perturbed run differ by {SEPARATED:g} of the motion for good",
+        "horizon_criterion": f"members or run and perturbed run differ by {SEPARATED:g} of the motion most of the time",
     }
     attributes["references"] = str(run.attrs.get("references", ""))
     title = f"What follows from: {run.attrs['title']}"
