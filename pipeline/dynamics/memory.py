@@ -138,8 +138,8 @@ def row_type(rows: Any) -> np.dtype[Any]:
 
 @dataclass(frozen=True)
 class Room:
-    """What an integration method needs of the work space: rows of the state's length, floats, vectors and matrices of
-    that length, and of all oscillators of the modes pairs and quadratures."""
+    """What an integration method needs of the work space: rows of the state's length, floats, vectors and square
+    matrices of that length; pairs (z, z') and quadratures, each for all oscillators of the modes."""
 
     slopes: int
     dense: int
