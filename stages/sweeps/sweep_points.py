@@ -88,7 +88,7 @@ def work(
 
 def _together(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]]) -> list[Point]:
     """Points concurrently, each in a thread, where that can be."""
-    places = runner.abreast(scene, len(points))
+    places = runner.places(scene, len(points))
 
     def one(k: int, alive: Progress) -> Point:
         with places.place() if places else nullcontext() as where:

@@ -72,7 +72,7 @@ def test_points_are_the_same_to_the_last_bit_whichever_are_evaluated_with_them(
     assert_same(abreast(ball, points, error=True), known)
     assert_same(abreast(ball, points[::-1], error=True), known[::-1])
     assert_same(abreast(ball, points[:3], error=True), known[:3])
-    assert evaluations_abreast == ([points_of.ABREAST] * 3 if not INTERPRETED else [])
+    assert evaluations_abreast == ([points_of.TOGETHER] * 3 if not INTERPRETED else [])
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_points_are_the_same_to_the_last_bit_whichever_are_evaluated_with_them(
 def test_points_of_a_closed_mechanism_with_friction_are_the_same_to_the_last_bit(
     root: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:
-    monkeypatch.setattr(points_of, "ABREAST", 4)  # as in a test of ensembles, whose code is on disk by then
+    monkeypatch.setattr(points_of, "TOGETHER", 4)  # as in a test of ensembles, whose code is on disk by then
     paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "60 ms", "solver.integrator": integrator})
     points = [{"joint.A1.clearance": c} for c in (3e-4, 4e-4, 5e-4)] + [{"joint.A1.normal.restitution": 0.7}]
     keep = ("platform.velocity.largest", "A1.peak_force", "A1.impact_times.count")
@@ -101,7 +101,7 @@ def test_points_whose_friction_takes_different_numbers_of_turns_are_the_same_to_
     known = alone(crank, points, keep=keep)
     assert [bool(p.refused) for p in known] == [False, False, False, True, False, False]
     assert_same(abreast(crank, points, keep=keep), known)
-    assert evaluations_abreast == ([points_of.ABREAST] if not INTERPRETED else [])
+    assert evaluations_abreast == ([points_of.TOGETHER] if not INTERPRETED else [])
 
 
 def test_a_point_that_fails_fails_alone_and_in_the_same_words(root: Path) -> None:

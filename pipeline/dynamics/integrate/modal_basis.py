@@ -145,9 +145,9 @@ def into_axes(d, n):
 
 
 @kernel
-def rotate(entries, a, b, apart, n, c, s):
-    """Turn n entries from a and from b on, so far apart, into each other."""
-    for k in range(0, apart * n, apart):
+def rotate(entries, a, b, stride, n, c, s):
+    """Turn n entries from a and from b on, `stride` entries from one to the next, into each other."""
+    for k in range(0, stride * n, stride):
         x, y = entries[a + k], entries[b + k]
         entries[a + k], entries[b + k] = c * x - s * y, s * x + c * y
 

@@ -83,10 +83,10 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     return labelled(variables, {name: values for part in parts for name, values in part[1].items()})
 
 
-def series(scene: Scene, motions: Motions, wanted: Collection[Quantity], time: np.ndarray) -> dict[str, np.ndarray]:
+def series(scene: Scene, motions: Motions, requested: Collection[Quantity], time: np.ndarray) -> dict[str, np.ndarray]:
     """Quantities over time, (rows, components), by name; time: of the rows [s]."""
-    arrays = chosen(scene, motions, {term for one in wanted for term in one.terms()}, time)
-    return {one.name: quantities.series(arrays, one) for one in wanted}
+    arrays = chosen(scene, motions, {term for one in requested for term in one.terms()}, time)
+    return {one.name: quantities.series(arrays, one) for one in requested}
 
 
 #: beginnings of the variables that the ledger makes

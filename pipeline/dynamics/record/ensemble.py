@@ -88,7 +88,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     def done(k: int) -> None:
         progress(k / requested.members, f"member {k} of {requested.members}")
 
-    places = abreast(engine, requested.members, width(), progress)
+    places = places_of(engine, requested.members, width(), progress)
 
     def member(k: int, alive: Progress) -> Member:
         name = f"member-{k}-{piece}"
@@ -112,7 +112,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     return conform(made, ENSEMBLE, **facts, seed=requested.seed, perturbation=requested.perturbation)
 
 
-def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Places | None:
+def places_of(engine: Engine, members: int, threads: int, progress: Progress) -> Places | None:
     """Places for so many engines like this one, in so many threads; None where each is to take its own steps.
 
     Either way they, as `another` makes them of it, evaluate with the same bits.

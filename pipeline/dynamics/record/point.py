@@ -45,7 +45,7 @@ LOOKS = 50
 #: how much tighter the tolerance of the run is by which the error is estimated
 TIGHTER = 1e-2
 #: points that step side by side, and the fewest that do: of less, each is evaluated alone all the same
-ABREAST, FEWEST = 8, 3
+TOGETHER, FEWEST = 8, 3
 
 
 @dataclass
@@ -90,11 +90,11 @@ class Runner:
             return Point({}, {}, {}, 0, str(error))
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
 
-    def abreast(self, scene: Scene, points: int) -> Places | None:
+    def places(self, scene: Scene, points: int) -> Places | None:
         """Where so many points like that of a scene may step together; None where each is to be run alone."""
-        return Places(ABREAST, 1) if points >= FEWEST and self._steps_abreast(scene) else None
+        return Places(TOGETHER, 1) if points >= FEWEST and self._steps_together(scene) else None
 
-    def _steps_abreast(self, scene: Scene) -> bool:
+    def _steps_together(self, scene: Scene) -> bool:
         if scene.event:
             return False
         try:
@@ -192,8 +192,8 @@ def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[R
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    wanted = {one.quantity for one in kept if one.quantity.over_time}
-    known = series(scene, Motions(engine.model, seen), wanted, trajectory.time)
+    over_time = {one.quantity for one in kept if one.quantity.over_time}
+    known = series(scene, Motions(engine.model, seen), over_time, trajectory.time)
     values: Values = {}
     for one in kept:
         if one.quantity.over_time:

@@ -34,7 +34,7 @@ REDUCTION_STEP = 1e-6
 WITHOUT = ("count", "sections")
 
 
-class Wanted(NamedTuple):
+class Requested(NamedTuple):
     """What is differentiated: a quantity, over time where it has no reduction."""
 
     name: str
@@ -42,7 +42,7 @@ class Wanted(NamedTuple):
     recorded: Recorded | None
 
 
-def wanted_of(scene: Scene, names: Sequence[str]) -> list[Wanted]:
+def requested_of(scene: Scene, names: Sequence[str]) -> list[Requested]:
     """Return what names mean; InputError for one that the scene lacks."""
     made = []
     for name in names:
@@ -58,7 +58,7 @@ def wanted_of(scene: Scene, names: Sequence[str]) -> list[Wanted]:
                 raise InputError(f"of: '{name}'", str(error)) from None
         if recorded is not None and recorded.reduction in WITHOUT:
             raise InputError(f"of: '{name}'", f"a {recorded.reduction} has no derivative")
-        made.append(Wanted(name, quantity, recorded))
+        made.append(Requested(name, quantity, recorded))
     return made
 
 
@@ -77,7 +77,7 @@ def sensitivities(
     """
     import xarray as xr
 
-    wanted = wanted_of(scene, of)
+    requested = requested_of(scene, of)
     if scene.solver.integrator != "dop853":
         scene = with_numbers(scene, {"solver.integrator": "dop853", "solver.step": None})
     engine = engine_of(scene, bundles, progress)
@@ -87,23 +87,23 @@ def sensitivities(
     start = consistent_start(engine)
     run = differentiate(engine, start, [*directions, start_direction(engine, start)], progress)
     grown = growth(engine, run, len(directions))
-    series = {one.quantity.name: one.quantity for one in wanted if one.quantity.over_time}
+    series = {one.quantity.name: one.quantity for one in requested if one.quantity.over_time}
     values = read(family, engine, run, series.values())
-    columns: dict[str, list[np.ndarray]] = {one.name: [] for one in wanted}
+    columns: dict[str, list[np.ndarray]] = {one.name: [] for one in requested}
     for k, parameter in enumerate(parameters):
         progress((k + 1) / len(parameters), f"quantities by {parameter.path}")
         changes = derivatives(family, run, k, parameter, series.values())
-        for one in wanted:
+        for one in requested:
             columns[one.name].append(
                 _derivative(one, family.engine.model, run, k, values, changes, horizon) / parameter.unit
             )
     time = run.trajectory.time
-    made = {one.name: _variable(one, np.array(columns[one.name])) for one in wanted}
+    made = {one.name: _variable(one, np.array(columns[one.name])) for one in requested}
     coordinates: dict[str, Any] = {
         "parameter": list(to),
         "parameter_value": ("parameter", [p.value for p in parameters]),
     }
-    if any(one.recorded is None for one in wanted):
+    if any(one.recorded is None for one in requested):
         coordinates["time"] = ("time", time, {"units": "s", "long_name": "time"})
     facts: dict[str, Any] = attributes(scene) | {"title": f"Sensitivities of {subject(scene)}", "method": METHOD}
     facts["evaluations"] = run.trajectory.counters["evaluations"]
@@ -116,7 +116,7 @@ def sensitivities(
 METHOD = "variational equations of the tangent of the equations of motion, with the jumps of impacts"
 
 
-def _variable(one: Wanted, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
+def _variable(one: Requested, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
     quantity, recorded = one.quantity, one.recorded
     inner = (quantity.dim,) if quantity.dim else ()
     dims = ("time", *inner) if recorded is None else recorded.dims
@@ -126,7 +126,7 @@ def _variable(one: Wanted, values: np.ndarray) -> tuple[tuple[str, ...], np.ndar
 
 
 def _derivative(
-    one: Wanted, model: Model, run: Differentiated, k: int, values: Series, changes: Series, horizon: float
+    one: Requested, model: Model, run: Differentiated, k: int, values: Series, changes: Series, horizon: float
 ) -> np.ndarray:
     """Return the derivative along direction k, NaN beyond the horizon."""
     time, recorded = run.trajectory.time, one.recorded
@@ -167,7 +167,7 @@ def _of_largest(time: np.ndarray, series: np.ndarray, change: np.ndarray) -> tup
 
 
 def _of_contact(
-    one: Wanted, model: Model, run: Differentiated, k: int, values: Series, changes: Series
+    one: Requested, model: Model, run: Differentiated, k: int, values: Series, changes: Series
 ) -> tuple[float, float]:
     """Return until when the motion decides what a contact does, and the derivative of that."""
     assert one.recorded is not None

@@ -32,15 +32,15 @@ NORMAL_FORCE = "normal force"
 Series = dict[str, np.ndarray]
 
 
-def read(family: Family, engine: Engine, run: Differentiated, wanted: Collection[Quantity]) -> Series:
+def read(family: Family, engine: Engine, run: Differentiated, requested: Collection[Quantity]) -> Series:
     """Return quantities over time, (rows, components), by name; and NORMAL_FORCE, (rows, contacts)."""
     seen = observed(engine, run.trajectory)
-    made = series(family.scene, Motions(engine.model, seen), wanted, run.trajectory.time)
+    made = series(family.scene, Motions(engine.model, seen), requested, run.trajectory.time)
     return made | {NORMAL_FORCE: seen.touch["normal_force"]}
 
 
 def derivatives(
-    family: Family, run: Differentiated, k: int, parameter: Parameter, wanted: Collection[Quantity]
+    family: Family, run: Differentiated, k: int, parameter: Parameter, requested: Collection[Quantity]
 ) -> Series:
     """Return the derivatives of the same along direction k of a run, per unit of the parameter."""
     made: Series = {}
@@ -49,7 +49,7 @@ def derivatives(
     for power in np.unique(powers):
         rows, step = np.flatnonzero(powers == power), 10.0**power
         around = {
-            j: read(family, family.changed(parameter, j * step), moved(run, k, rows, j * step), wanted)
+            j: read(family, family.changed(parameter, j * step), moved(run, k, rows, j * step), requested)
             for j in (-2, -1, 1, 2)
         }
         for name in around[1]:
