@@ -1,13 +1,13 @@
 r"""Static compliance of a reduced body at its frames, from the reduced matrices alone.
 
-With frame j held and a force at frame i, the rigid motion follows j. With the motion :math:`S_i` of the frames per
-modal coordinate and the rigid transport :math:`R_i R_j^{-1}`,
+With frame j held and a force at frame i, rigid motion follows j. With the motion :math:`S_i` of the frames per modal
+coordinate and the rigid transport :math:`R_i R_j^{-1}`,
 
 .. math:: \Delta_{ij} = S_i - R_i R_j^{-1} S_j, \qquad C_{ij} = \Delta_{ij} K^{-1} \Delta_{ij}^T .
 
-With nothing held (i = j) the inertia forces of the free body balance the load:
-:math:`\Delta_{ii} = S_i - R_i (R^T M R)^{-1} R^T M \Phi`. By the principle of minimum energy no reduced compliance
-exceeds that of the full model. Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 17.
+With nothing held (i = j) the inertia forces of the free body balance the load: :math:`\Delta_{ii} = S_i - R_i
+(R^T M R)^{-1} R^T M \Phi`. By the principle of minimum energy no reduced compliance exceeds the full model's.
+Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 17 (inertia relief).
 """
 
 from __future__ import annotations
