@@ -1,7 +1,7 @@
 """Three answers about a scene: what accuracy costs, whether its run is stable, which effects matter.
 
-Runs within a budget of processor time give the answers: half of it goes to the costs of accuracy, half to the effects.
-Stability is judged from the scene's run and from the runs that measured the costs of accuracy.
+Runs within a budget of processor time give the answers, half for the costs of accuracy, half for the effects. Stability
+is judged from the scene's run and from the runs that measured the costs of accuracy.
 """
 
 from __future__ import annotations

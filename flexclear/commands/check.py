@@ -57,7 +57,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> int:
-    """Print all errors of all files; exit code 2 where there are any, 4 where a file only asks for too much.
+    """Print all errors of all files; exit code 2 for errors, 4 where a file only asks for too much.
 
     Implausible values are warnings, which leave the exit code 0.
     """
@@ -100,7 +100,7 @@ def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | No
 
 @dataclass
 class Findings:
-    """errors: refusals.  warnings: doubtful values.  notes: kind of the file, and facts of it, in words."""
+    """errors: refusals.  warnings: doubtful values.  notes: kind and facts of the file, in words."""
 
     errors: list[FlexclearError] = field(default_factory=list)
     warnings: list[InputError] = field(default_factory=list)

@@ -156,7 +156,7 @@ def findings() -> Iterator[tuple[str, str, bool | None]]:
 
 
 def _results(root: Path) -> tuple[str, bool]:
-    """Return the folder of results with its free space and obstacles to writing, and True when there is none."""
+    """Return the folder of results with its free space and obstacles to writing, and True without obstacles."""
     free = machine.disk(root)
     wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
     if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):

@@ -31,7 +31,7 @@ def check_format(target: Path, endings: Sequence[str] = tuple(NEEDS), option: st
 
 
 def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",)) -> None:
-    """Write a dataset: ``.nc`` and ``.mat`` hold all of it, tables the variables with the dimensions `rows`."""
+    """Write a dataset: ``.nc`` and ``.mat`` hold everything, tables the variables with the dimensions `rows`."""
     if target.suffix == ".nc":
         write_dataset(target, dataset)
         return

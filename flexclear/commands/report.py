@@ -138,8 +138,8 @@ def of_scene(
     """Bring everything in the report of a scene up to date; return the page.
 
     One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
-    there is no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: False leaves out those
-    that take further runs. Raises FailedTasksError when the run itself fails.
+    the page has no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: False leaves out
+    those that take further runs. Raises FailedTasksError when the run itself fails.
     """
     scene = graph.scene
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)

@@ -111,7 +111,7 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
 def results(scene: Scene | str | Path) -> xr.DataTree:
     """Return the datasets of a scene below results/runs, or the dataset in a file, as a tree; nothing is run.
 
-    InputError when there is nothing, or the file holds something else.
+    InputError without results, or for a file with other contents.
     """
     import xarray as xr
 
@@ -385,7 +385,7 @@ def _refuse_namesakes(scenes: list[Scene]) -> None:
     """Raise InputError when two files given together have the same scene name."""
     folders: dict[str, Path] = {}
     for scene in scenes:
-        path, name = _file(scene), file_names.folded(scene.name)  # as Windows and macOS name folders
+        path, name = _file(scene), file_names.folded(scene.name)  # equal names on Windows and macOS
         if path is not None and folders.setdefault(name, path) != path:
             raise InputError(
                 str(path),
