@@ -15,7 +15,7 @@ from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.pipeline.structure.stress.beam import Outline, outline, recover
 from flexclear.stages.graph import Graph
-from tests.analytic.beam_models import build
+from tests.analytic.beam_models import GENERAL, build
 
 NU = 0.33
 R, HOLE, WIDTH, HEIGHT = 0.010, 0.006, 0.02, 0.03
@@ -148,8 +148,7 @@ def test_a_tapered_tube_knows_its_end_sections() -> None:
 
 
 def test_a_general_section_has_forces_but_no_stresses() -> None:
-    general = {"type": "general", "area": 3e-4, "torsion": 1e-8, "second_y": 8e-9, "second_z": 9e-9}
-    found = reduced(section=general)
+    found = reduced(section=GENERAL)
     assert "section_place" in found
     assert "fibre_stress" not in found
 
