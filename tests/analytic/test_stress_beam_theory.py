@@ -148,7 +148,7 @@ FINE = 5e-7  #: [s]
 
 def test_section_forces_at_the_interfaces_are_the_joint_forces() -> None:
     """P1 at the lower end, where all of the rod's inertia was summed on the way; the ball's stem at the upper end."""
-    far = run("sps4/far_cb", {})
+    far = run("sps4/far_cb", {"time.end": "20 ms"})
     for kind in ("force", "moment"):
         inside = np.linalg.norm(far[f"section_{kind}"].values, axis=2)
         for section, joint in ((0, "P1"), (-1, "fixed_ball_A1")):
