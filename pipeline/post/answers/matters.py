@@ -27,6 +27,7 @@ IDEAL = "clearance and flexibility"
 SLIGHT = 0.01
 #: accuracies of which the answer says which effects they call for, where the scene asks for none
 LEVELS = (0.1, 0.01, 0.001)
+OF_WHAT = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
 #: members of which Student's t is that of any larger number
 MANY = 1000
 #: a change of so many times the quantity's size is not given in per cent of that
@@ -182,6 +183,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     more = "no more" if before else "none"
     said += [f"{name} calls for {more}." for name in calm[:1]]
     said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
+    said += [] if requested else [OF_WHAT]
     return " ".join(said + undone)
 
 
