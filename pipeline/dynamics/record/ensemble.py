@@ -35,7 +35,7 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, per
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.pieces import digest
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.pipeline.dynamics.run.run import engines, follow, observed
+from flexclear.pipeline.dynamics.run.run import engines, follow, observed, require_shallow
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -174,6 +174,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
     peak, count, fraction = _contact_statistics(engine, trajectory)
     rows = np.searchsorted(trajectory.time, regular)
     seen = observed(engine, trajectory)
+    require_shallow(model, trajectory, seen)
     require_closed(model, trajectory, seen)
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     return {

@@ -205,7 +205,7 @@ def _delivered(search: Search, progress: Progress) -> xr.Dataset:
     requested = {q.name: w for q, w in search.requested(best.run).items()}
     met = best.fraction <= ACCEPTED
     verdict = "met" if met else _missed(search, best, requested)
-    progress(None, f"accuracy {'met' if met else 'missed: ' + verdict} (relative tolerance {best.rtol:.1e})")
+    progress(None, f"accuracy {verdict} (relative tolerance {best.rtol:.1e})")
     if "method_reason" in best.run.attrs:
         progress(None, str(best.run.attrs["method_reason"]))
     meaning = "largest error of the time integration, estimated by two runs with a tolerance ratio of 100"
@@ -278,11 +278,10 @@ def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
     """Return a sentence with the missed accuracy and the reason why no tolerance helps."""
     if not best.errors:
-        return "nobody knows by how much, since tighter runs are refused"
+        return "not verified: runs at tighter tolerances are refused, so that the error is unknown"
     name = max(requested, key=lambda n: best.errors[n] / requested[n])
-    text = (
-        f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / requested[name]:.2g} times what is requested"
-    )
+    error, times = best.errors[name], best.errors[name] / requested[name]
+    text = f"missed: {name} is good to {error:.2g}, {times:.2g} times what is requested"
     looser = min((r for r in search.runs if r > best.rtol), default=None)
     if looser is None:
         return text
