@@ -51,7 +51,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
     )
     parser.add_argument(
-        "--show", action="store_true", help="also write the start pose of each scene, and what does not fit there"
+        "--show", action="store_true", help="also draw the start pose of each scene, with gaps where joints do not fit"
     )
     add_options(parser, "set", "json", "said")
 
