@@ -26,7 +26,7 @@ from flexclear.stages.workplace import Workplace, check, open_workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scene_arguments(parser, "json")
     parser.add_argument(
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
@@ -46,7 +46,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring scenes up to date; say what their bundles lack where those were asked for."""
+    """Bring scenes up to date; print the deficits of their bundles where those are the last stage."""
     check_out(options.out, options.scenes)
     if options.verify and not options.planned:
         raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
@@ -75,7 +75,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _result(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, object]:
-    """What `run --json` prints of a scene: the files that are shown, warnings, and the verdict on its accuracy."""
+    """Return the JSON record of a scene: its shown files, warnings, and the verdict on its accuracy."""
     folder, record = workplace.store.root / graph.simulate.folder, outcome.records.get(graph.simulate)
     said = {} if record is None else record.said
     return {

@@ -50,7 +50,8 @@ class Solver(Part):
         for key, (owner, _) in OWN.items():
             if table.get(key) is not None and owner != name:
                 raise ValueError(f"{key} belongs to {owner}, {name} does not have it: remove it")
-        return {key: default for key, (owner, default) in OWN.items() if owner == name} | dict(table)
+        own = {key: default for key, (owner, default) in OWN.items() if owner == name and table.get(key) is None}
+        return dict(table) | own
 
     @model_validator(mode="after")
     def _located_unless_fixed(self) -> Self:

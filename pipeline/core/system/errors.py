@@ -29,6 +29,14 @@ class FlexclearError(Exception):
 
     exit_code = 1
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Processes hand errors to each other as they are: what `__init__` was given is no longer known."""
+        return _as_it_was, (type(self), self.args), self.__dict__
+
+
+def _as_it_was(kind: type[FlexclearError], args: tuple[str, ...]) -> FlexclearError:
+    return kind.__new__(kind, *args)
+
 
 class InputError(FlexclearError):
     """The user's input is wrong: the error names location, value, rule and remedy.

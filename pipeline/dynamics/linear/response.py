@@ -5,9 +5,9 @@ Small motions are those of the links, x, and of the bodies' elastic coordinates,
 
 .. math:: G x + B q = 0, \qquad M\,(\ddot x, \ddot q) + K q = f(t), \qquad M = \sum_b J_b^T M_b J_b
 
-with the forces f that joints, inertia and gravity bring on deformations in the ideal motion, and the links' mass moved
-along. Its vibrations are the assembled mechanism's; from rest each coordinate of them is the quasi-static one and a
-vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
+with the forces f that joints, loads, inertia and gravity bring on deformations in the ideal motion, and the links' mass
+moved along. Its vibrations are the assembled mechanism's; from rest each coordinate of them is the quasi-static one and
+a vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
 undamped). Rates are the vibrations' own; forces of joints hold the accelerations, by the adjoint solution of the joint.
 
 The pose is held where it is, so that several of the motion are examined. The result is the sum of all amplitudes,
@@ -80,7 +80,7 @@ def response(
         n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
     ]
     loads = joint_wrenches(motions, held)
-    forces = np.hstack([clearance_response.modal_forces(model, motions, n, b, loads)[once] for n, b in bundles.items()])
+    forces = np.hstack([clearance_response.modal_forces(motions, n, b, loads)[once] for n, b in bundles.items()])
     joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
