@@ -38,7 +38,7 @@ class Limits(Part):
     disk: Bytes | None = None
     """default: four fifths of what is free"""
     parts: Annotated[int, Field(ge=1)] = 2000
-    """largest number of bodies, of joints, of drives and of loads"""
+    """largest number of parts of each family, such as bodies or joints"""
     cells: Annotated[int, Field(ge=1)] = 500_000
     """largest number of elements or cells of one mesh"""
     modes: Annotated[int, Field(ge=1)] = 2000

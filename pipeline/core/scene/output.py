@@ -54,7 +54,7 @@ def table(text: str) -> Schema:
 
 
 class Gauge(Part):
-    """A point on the surface of a solid where stress is recorded, given by one of position, frame and region."""
+    """Part of a solid's surface where stress is recorded, given by one of position, frame and region."""
 
     body: str
     """the solid, one of those in `stress`"""
