@@ -124,15 +124,3 @@ def test_a_tapered_cantilever_deflects_as_the_integral_says(theory: str) -> None
     # cubic elements are exact for uniform cells only; the error falls with the fourth power, 32 leave 1e-5
     assert deflection == pytest.approx(expected, rel=2e-5)
     assert deflection < expected
-
-
-def test_tapered_tube_and_its_mass() -> None:
-    """Mass and first moment of a hollow cone against the volume of frusta."""
-    tube = [{"type": "tube", "radius": r, "inner_radius": 0.5 * r} for r in (THICK, THIN)]
-    rod = taper((tube[0], tube[1]), 3)
-    ones = np.zeros((rod.sizes["node"], 6))
-    ones[:, 0] = 1.0
-    found = beam.assemble(rod)
-    mass = ones.ravel() @ found.mass @ ones.ravel()
-    frustum = math.pi * L / 3.0 * (THICK**2 + THICK * THIN + THIN**2)
-    assert mass == pytest.approx(RHO * 0.75 * frustum, rel=1e-14)

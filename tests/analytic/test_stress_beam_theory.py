@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from tests.analytic.beam_solutions import PAPER_ROD as ROD
-from tests.analytic.stress_runs import last, recorded, run
+from tests.analytic.mechanism_runs import run_with_sections as run
+from tests.analytic.mechanism_runs import with_sections
 
 AREA, SECOND = np.pi * ROD.radius**2, np.pi * ROD.radius**4 / 4.0
 WEIGHT = ROD.density * AREA * 9.81  #: [N/m]
@@ -18,6 +19,13 @@ TIP = (40.0, 30.0, -50.0)  #: force at the tip [N]
 SPIN = 100.0  #: [rad/s]
 #: overdamped, a rod comes to rest: the slowest motion falls by exp(-30) in 20 ms
 RESTING = {"body.rod.damping": 1.0}
+
+
+def last(dataset: xr.Dataset) -> dict[str, Any]:
+    """Forces, moments and peaks of every section at the last time, with the places of the sections."""
+    now = dataset.isel(time=-1)
+    names = ("section_place", "section_force", "section_moment", "peak_axial_stress", "peak_von_mises_stress")
+    return {name: now[name].values for name in names}
 
 
 @cache
@@ -167,7 +175,7 @@ def test_each_piece_is_moved_by_the_forces_at_its_ends() -> None:
     omega, alpha = rod["angular_velocity"].values[:, None], rod["angular_acceleration"].values[:, None]
     u = data["modal_velocity"].values
     du = (u[2:] - u[:-2]) / (2.0 * FINE)
-    reduced = recorded("sps4/far_cb", {})[1]["rod1"]
+    reduced = with_sections("sps4/far_cb", {})[1]["rod1"]
     # of the middle of each piece against the rod's centre of mass, both per modal coordinate; extension is linear there
     mass = float(reduced["mass"])
     middle = 0.5 * (reduced["shape_translation"].values[1:] + reduced["shape_translation"].values[:-1])
