@@ -126,7 +126,7 @@ class Lump:
     inertia: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def frequencies(
+def exact_frequencies(
     pieces: list[Piece], lumps: list[Lump], held: tuple[str, str], count: int, *, parts: int = 3
 ) -> np.ndarray:
     """The lowest elastic frequencies [Hz].  held: dofs at the start and at the end, digits of ux uy uz rx ry rz."""
