@@ -45,11 +45,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     tightest = next(reversed(ensembles.values()), None)
     split = {q.name: causes_of(q, points, runs, LOCATED, tightest) for q in chosen}
     title = params["title"]
-    said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
-    said += (*answer.undone(study),)
+    notes = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
+    notes += (*answer.undone(study),)
     study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
-    result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", said))
+    result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", notes))
     result |= files("quantities", answer.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")

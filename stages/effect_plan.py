@@ -40,8 +40,8 @@ def task(scene: Scene) -> Task:
     whole = Graph(edited(scene, {"accuracy": None}), shown=False)
     inputs = whole.bodies() | Graph(rigid, shown=False).bodies()
     for k, counts in enumerate(levels(scene)):
-        less = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
-        inputs |= {f"{FEWER}{k}/{body}": less.bundle[body] for body in counts}
+        with_fewer = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
+        inputs |= {f"{FEWER}{k}/{body}": with_fewer.bundle[body] for body in counts}
     counts = elements(scene)
     if counts:
         finer = Graph(edited(scene, {"accuracy": None}), shown=False, recipe={"elements": TWICE})
@@ -121,8 +121,8 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
     def filled(scene: Scene) -> Scene:
         """Return the scene with the numbers of the rigid bodies that recipes describe."""
-        mine = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
-        return simulation.rebuild(simulation.params(scene), mine)
+        of_scene = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
+        return simulation.rebuild(simulation.params(scene), of_scene)
 
     bodies = params["simulate"]["scene"]["body"]  # types as in the scene itself, before any body is made rigid
     own = {name: data for name, data in rigid.items() if bodies[name.removeprefix(simulation.RIGID)]["type"] == "rigid"}

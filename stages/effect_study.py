@@ -91,14 +91,14 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.post.answers import effect_sizes
 
-    there = [Effect(*three) for three in params["effects"]]
+    all_effects = [Effect(*three) for three in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
     points = {
         frozenset(gone): watched(inputs[f"variant{k}"], params["owners"][k], chosen)
         for k, gone in enumerate(params["variants"])
     }
     progress(None, "comparing")
-    dataset = effect_sizes.assemble(there, chosen, points, params["members"], params["units"])
+    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
     return result | effect_sizes.chart("effects", dataset, f"What each effect does: {params['title']}")
 

@@ -265,11 +265,11 @@ class Graph:
 
     def _simulation(self, stage: str, params: Mapping[str, Any], shown: str = "", function: str = "") -> Task:
         """Return a task of `simulation` or `analyses`; function, shown: names that differ from the stage's."""
-        alone = shown == "run"
-        run = "simulation:run" if alone else f"analyses:{function or stage}"
-        modules = simulation.modules(self.scene, alone=alone)
+        single_run = shown == "run"
+        run = "simulation:run" if single_run else f"analyses:{function or stage}"
+        modules = simulation.modules(self.scene, alone=single_run)
         task = self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
-        return replace(task, met=simulation.met(self.scene)) if alone else task
+        return replace(task, met=simulation.met(self.scene)) if single_run else task
 
     def _folder(self, below: str = "") -> str:
         return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""

@@ -21,17 +21,17 @@ WHERE = "[output] stress"
 
 def params(scene: Scene, body: str) -> dict[str, Any]:
     """Return whether and where stresses, and whether shortening by bending, are requested; else no entry."""
-    asked: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
+    requested: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
     if gauges := scene.output.on(body):
-        asked["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
-    return asked | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
+        requested["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
+    return requested | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
 
 
 def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
     """Return the modules for the requested stresses and shortening; raise InputError when there is none."""
-    asked = params(scene, body)
-    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in asked else ()
-    return (*stress, *((SHORTENING,) if "stiffening" in asked else ()))
+    requested = params(scene, body)
+    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in requested else ()
+    return (*stress, *((SHORTENING,) if "stiffening" in requested else ()))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -45,8 +45,8 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     if what != "modes":
         values["bodies"] = _looks(scene)
     if scene.view is not None and what != "modes":
-        asked = scene.view.model_dump(mode="json", exclude={"watch", "source"}, exclude_none=True)
-        values |= {"view": asked} if asked else {}
+        view = scene.view.model_dump(mode="json", exclude={"watch", "source"}, exclude_none=True)
+        values |= {"view": view} if view else {}
     if (what == "joint" and kind in ("png", "html")) or (what in FILMED and kind in ("gif", "mp4")):
         terms = [term for quantity in scene.watched() for term in quantity.terms()]
         values["watched"] = list(dict.fromkeys(term.owner for term in terms if term.owner))

@@ -146,8 +146,8 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = N
 
     table, name = params["scene"], str(params.get("name", "scene"))
     body = filled(table["body"], inputs or {})
-    mine = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
-    scene = Scene.model_validate({**table, **mine})
+    own = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
+    scene = Scene.model_validate({**table, **own})
     scene._name = name
     return scene
 

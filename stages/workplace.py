@@ -64,10 +64,10 @@ def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) ->
         if name == "usual":
             add_options(parser, "set", "jobs", "limit", "said", **changed)
         elif name == "said":
-            said = parser.add_mutually_exclusive_group()
+            group = parser.add_mutually_exclusive_group()
             for option in ("quiet", "verbose"):
                 flags, keys = OPTIONS[option]
-                said.add_argument(*flags, **keys)
+                group.add_argument(*flags, **keys)
         else:
             (flags, keys), more = OPTIONS[name], changed.get(name, {})
             text = f"{keys['help']} (default {more['default']})" if "default" in more else keys["help"]
@@ -143,8 +143,8 @@ class Workplace:
         """Bring tasks up to date and return their artifacts; raise FailedTasksError when a task or an input fails."""
         outcome = self.bring(list(tasks), jobs)
         check(outcome)
-        there = self.artifacts(outcome)
-        return [there[task] for task in tasks]
+        by_task = self.artifacts(outcome)
+        return [by_task[task] for task in tasks]
 
     def datasets(self, *tasks: Task, jobs: int | None = None) -> list[xr.Dataset]:
         """Bring tasks up to date and return their main files."""

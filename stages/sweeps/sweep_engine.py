@@ -82,7 +82,7 @@ class Engine:
                 enough = together or (left >= POINTS_TOGETHER * width and left * evaluations >= WORTH_CODE)
                 together = evaluations >= WORTH_TOGETHER and enough
                 mine = _take(waiting, _portion(left, seconds_each, width, together) if seconds_each else 1)
-                running[self._given(mine, families, alone=not seconds_each, together=together)] = mine
+                running[self._given(mine, families, others_idle=not seconds_each, together=together)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
@@ -104,10 +104,10 @@ class Engine:
                 first, lost = not seconds_each, 0  # the first batch's time includes compiling and fetching
                 seconds_each = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
-    def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, together: bool) -> Future[Any]:
+    def _given(self, mine: list[Job], families: dict[str, bytes], *, others_idle: bool, together: bool) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
         try:
-            return self.submit(family, families[family], points, alone, together)
+            return self.submit(family, families[family], points, others_idle, together)
         except (BrokenProcessPool, ConnectionError, EOFError) as error:  # the latter two: worker killed at its start
             if not self.here:
                 raise
@@ -233,7 +233,7 @@ def _quiet(library: str) -> Iterator[None]:
 
 def _on_cluster(client: Any, where: str) -> Engine:
     """Return the executor of a cluster; its scheduler reruns points that are lost with a worker."""
-    executor, seen = client.get_executor(), [time.monotonic(), _threads(client, where)]
+    executor, last_poll = client.get_executor(), [time.monotonic(), _threads(client, where)]
     held: dict[str, Any] = {}
 
     def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
@@ -245,9 +245,9 @@ def _on_cluster(client: Any, where: str) -> Engine:
 
     def width() -> int:
         """Return the current number of threads; workers may join and leave."""
-        if time.monotonic() - seen[0] > LOOK:
-            seen[:] = time.monotonic(), sum(client.nthreads().values())
-        return max(1, int(seen[1]))
+        if time.monotonic() - last_poll[0] > LOOK:
+            last_poll[:] = time.monotonic(), sum(client.nthreads().values())
+        return max(1, int(last_poll[1]))
 
     return Engine(submit, width, here=False)
 

@@ -63,21 +63,21 @@ def plan_size(plan: Plan) -> float:
 
 def write(path: Path, slabs: Iterator[xr.Dataset], along: str) -> None:
     """Write a dataset as a Zarr folder, in full or not at all. slabs: its parts in order; along: their dimension."""
-    made = path.with_name(f".{path.stem}.part{SUFFIX}")
+    unfinished = path.with_name(f".{path.stem}.part{SUFFIX}")
     with disk_limits(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(made, ignore_errors=True)
+        shutil.rmtree(unfinished, ignore_errors=True)
         for k, slab in enumerate(slabs):
             # NumPy's texts have a fixed length, which the next slab may exceed; texts as objects have any length
             texts = {name: v.astype(object) for name, v in slab.variables.items() if v.dtype.kind == "U"}
             whole = slab.assign({n: v for n, v in texts.items() if n in slab.data_vars})
             whole = whole.assign_coords({n: v for n, v in texts.items() if n in slab.coords})
             if k == 0:
-                whole.to_zarr(made, mode="w", consolidated=False)
+                whole.to_zarr(unfinished, mode="w", consolidated=False)
             else:
-                whole.to_zarr(made, append_dim=along, consolidated=False)
+                whole.to_zarr(unfinished, append_dim=along, consolidated=False)
         shutil.rmtree(path, ignore_errors=True)
-        os.replace(made, path)
+        os.replace(unfinished, path)
 
 
 def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> xr.Dataset:
@@ -90,19 +90,19 @@ def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> 
 
 
 def _slabs(plan: Plan, store: Store, done: Mapping[str, Point]) -> Iterator[xr.Dataset]:
-    places = dict(_places(plan, store))
+    records_by_key = dict(_batch_records(plan, store))
     opened = lru_cache(BATCHES)(lambda k: unpacked(store.load(records[k]), plan.recorded))
-    records = {record.key: record for record in places.values()}
+    records = {record.key: record for record in records_by_key.values()}
     complete = int(all(job.key in done for job in plan.jobs))
     count = plan.design.shape[0]
     rows = ceil(count / max(1, ceil(plan_size(plan) / SLAB)))
     for first in range(0, count, rows):
         part = plan.rows(first, first + rows)
-        here = {job.key: opened(places[job.key].key)[job.key] for job in part.jobs if job.key in places}
+        here = {job.key: opened(records_by_key[job.key].key)[job.key] for job in part.jobs if job.key in records_by_key}
         yield part.dataset(here).assign_attrs(complete=complete)
 
 
-def _places(plan: Plan, store: Store) -> Iterator[tuple[str, Record]]:
+def _batch_records(plan: Plan, store: Store) -> Iterator[tuple[str, Record]]:
     """Yield the key of each stored point with the record of its batch."""
     for family in plan.families:
         for record, batch in family.batches(store):

@@ -68,10 +68,10 @@ class Family:
 
     def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
         """Return all points of the family in sound stored batches, with their values of the `recorded` quantities."""
-        points: dict[str, Point] = {}
+        points_by_key: dict[str, Point] = {}
         for _, batch in self.batches(store):
-            points |= results.unpacked(batch, recorded)
-        return points
+            points_by_key |= results.unpacked(batch, recorded)
+        return points_by_key
 
     def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
         """Yield the sound batches that `keep` has stored, with their records."""
@@ -118,8 +118,8 @@ class Plan:
         """Return the part of the plan with entries `first` to `last` (excluded) of the first dimension."""
         axes, each = self.design.axes, prod(self.design.shape[1:])
         cut = [replace(axis, values=axis.values[first:last]) for axis in (axes[:1] if self.design.grid else axes)]
-        made = Design((*cut, *axes[len(cut) :]), self.design.grid)
-        return replace(self, design=made, jobs=self.jobs[first * each : last * each])
+        part = Design((*cut, *axes[len(cut) :]), self.design.grid)
+        return replace(self, design=part, jobs=self.jobs[first * each : last * each])
 
     @property
     def time(self) -> np.ndarray:
@@ -149,13 +149,13 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     except InputError as error:
         raise _placed(f"{where} [set]", error) from None
     check_members(sweep.members or 0, base.limits, f"{where} [members]")
-    made = design(sweep)
-    _check_values(base, made, where)
-    base = edited(base, made.points()[0])
-    recorded = tuple(_kept(base, name, where) for name in sweep.keep)
-    _check_recorded(sweep, base, made, recorded, where)
-    _check_units(base, made, recorded, where)
-    return Plan(sweep, base, made, recorded)
+    sweep_design = design(sweep)
+    _check_values(base, sweep_design, where)
+    base = edited(base, sweep_design.points()[0])
+    recorded = tuple(_recorded(base, name, where) for name in sweep.keep)
+    _check_recorded(sweep, base, sweep_design, recorded, where)
+    _check_units(base, sweep_design, recorded, where)
+    return Plan(sweep, base, sweep_design, recorded)
 
 
 def _placed(where: str, error: InputError) -> InputError:
@@ -163,29 +163,29 @@ def _placed(where: str, error: InputError) -> InputError:
     return InputError(where, problem, remedy)
 
 
-def _check_values(base: Scene, made: Design, where: str) -> None:
+def _check_values(base: Scene, sweep_design: Design, where: str) -> None:
     """Raise InputError for a value that the scene refuses; of a sample with many points the extreme ones are examined.
 
     In a grid each value is combined with the first values of the other parameters: whether all combinations suit the
     mechanism is known only when they are run.
     """
-    points = made.points()
+    points = sweep_design.points()
     try:
         edited(base, points[0])
     except InputError as error:
-        raise _placed(f"{where} [vary{_guilty(base, made)}]", error) from None
-    for axis in made.axes:
-        for k in _looked_at(axis):
-            chosen = points[k] if not made.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
+        raise _placed(f"{where} [vary{_refused_parameter(base, sweep_design)}]", error) from None
+    for axis in sweep_design.axes:
+        for k in _checked_indices(axis):
+            chosen = points[k] if not sweep_design.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
             try:
                 with_numbers(base, chosen)
             except InputError as error:
                 raise _placed(f"{where} [vary.{axis.name}]", error) from None
 
 
-def _guilty(base: Scene, made: Design) -> str:
+def _refused_parameter(base: Scene, sweep_design: Design) -> str:
     """Return the parameter whose first value the scene refuses on its own, after a dot; or an empty string."""
-    for axis in made.axes:
+    for axis in sweep_design.axes:
         try:
             edited(base, dict.fromkeys(axis.places, axis.values[0]))
         except InputError:
@@ -193,7 +193,7 @@ def _guilty(base: Scene, made: Design) -> str:
     return ""
 
 
-def _looked_at(axis: Axis) -> Sequence[int]:
+def _checked_indices(axis: Axis) -> Sequence[int]:
     numbers = axis.coordinate
     if len(numbers) <= CHECKED or isinstance(numbers[0], str):
         return range(len(numbers))
@@ -201,15 +201,15 @@ def _looked_at(axis: Axis) -> Sequence[int]:
     return by_size[0], by_size[-1]
 
 
-def _kept(base: Scene, name: str, where: str) -> Recorded:
+def _recorded(base: Scene, name: str, where: str) -> Recorded:
     try:
         return parse_recorded(name, base.owners())
     except ValueError as error:
         raise InputError(f"{where} [keep]", str(error)) from None
 
 
-def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
-    varied = {path for axis in made.axes for path in axis.places}
+def _check_recorded(sweep: Sweep, base: Scene, sweep_design: Design, recorded: Sequence[Recorded], where: str) -> None:
+    varied = {path for axis in sweep_design.axes for path in axis.places}
     timed = sorted(varied & set(TIMES))
     for one in recorded:
         if one.reduction == "series" and timed:
@@ -238,11 +238,11 @@ def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[
         )
 
 
-def _check_units(base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
+def _check_units(base: Scene, sweep_design: Design, recorded: Sequence[Recorded], where: str) -> None:
     """Raise InputError for a quantity whose unit differs between points."""
-    for axis, scene in _worded(base, made):
+    for axis, scene in _worded(base, sweep_design):
         for one in recorded:
-            if _kept(scene, one.name, where).unit != one.unit:
+            if _recorded(scene, one.name, where).unit != one.unit:
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
                     f"'{one.name}' is a force at some points and a torque at others",
@@ -250,13 +250,13 @@ def _check_units(base: Scene, made: Design, recorded: Sequence[Recorded], where:
                 )
 
 
-def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
+def _worded(base: Scene, sweep_design: Design) -> Iterator[tuple[Axis, Scene]]:
     """Yield the scene at a point for each value that is text, and so may name other parts."""
-    points = made.points()
-    for axis in made.axes:
+    points = sweep_design.points()
+    for axis in sweep_design.axes:
         texts = list(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else []
         for k in (texts.index(text) for text in dict.fromkeys(texts)):
-            chosen = points[0] | dict.fromkeys(axis.places, axis.values[k]) if made.grid else points[k]
+            chosen = points[0] | dict.fromkeys(axis.places, axis.values[k]) if sweep_design.grid else points[k]
             yield axis, edited(base, chosen)
 
 

@@ -65,20 +65,20 @@ def work(
     key: str,
     packed: bytes,
     points: Sequence[Mapping[str, Any]],
-    alone: bool,
+    others_idle: bool,
     together: bool = False,
     sources: str = "",
 ) -> tuple[list[Point], float]:
     """Run points of a family; return them and the processor time that they took [s].
 
-    packed: the pickled `Family`. points: key path in the scene -> value. alone: whether no other worker is busy.
+    packed: the pickled `Family`. points: key path in the scene -> value. others_idle: whether no other worker is busy.
     together: whether points are evaluated together; no result depends on it. sources: digest of the caller's sources
     when the caller is on another machine; InputError when this worker's differ, as those of a worker that joined later
     may.
     """
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
-    cores.set_idle(alone)
+    cores.set_idle(others_idle)
     threadpool_limits(1)  # NumPy may have been loaded with more threads
     scene, runner = _opened(key, packed)
     begun = time.process_time()

@@ -32,9 +32,9 @@ def reduced(motion: np.ndarray, rigid: np.ndarray, relief: np.ndarray, stiffness
     result = np.empty((p, p, 6))
     for i in range(p):
         for j in range(p):
-            carried = relief if i == j else np.linalg.solve(rigid[j], motion[j])
-            moved = motion[i] - rigid[i] @ carried
-            result[i, j] = np.einsum("dn,nd->d", moved, np.linalg.solve(stiffness, moved.T))
+            rigid_motion = relief if i == j else np.linalg.solve(rigid[j], motion[j])
+            deformation = motion[i] - rigid[i] @ rigid_motion
+            result[i, j] = np.einsum("dn,nd->d", deformation, np.linalg.solve(stiffness, deformation.T))
     return result
 
 
@@ -47,8 +47,8 @@ def fractions(of_modes: np.ndarray, full: np.ndarray) -> np.ndarray:
 def of_bundle(bundle: xr.Dataset) -> np.ndarray:
     """Return the compliances of a bundle's frames as `reduced` does, shape (frame, frame, 6)."""
     R_BF = bundle["frame_rotation"].values
-    turned = [np.swapaxes(R_BF, 1, 2) @ bundle[f"frame_{name}_shape"].values for name in ("translation", "rotation")]
-    motion = np.concatenate(turned, axis=1)
+    shapes = [np.swapaxes(R_BF, 1, 2) @ bundle[f"frame_{name}_shape"].values for name in ("translation", "rotation")]
+    motion = np.concatenate(shapes, axis=1)
     arms = -skew(bundle["frame_position"].values)
     eye = np.broadcast_to(np.eye(3), arms.shape)
     rigid = np.block([[eye, arms], [np.zeros_like(arms), eye]])

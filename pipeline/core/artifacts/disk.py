@@ -70,24 +70,24 @@ def digest_of(path: Path) -> str:
 
 def publish(path: Path, content: bytes) -> str:
     """Write a file so that it exists in full or not at all; return its SHA-256 digest."""
-    with temporary(path) as made:
-        made.write_bytes(content)
-        if made.read_bytes() != content:
+    with temporary(path) as scratch:
+        scratch.write_bytes(content)
+        if scratch.read_bytes() != content:
             raise OSError(errno.EIO, "what was written does not read back", str(path))
-        digest = settle(made, path)
+        digest = settle(scratch, path)
     platforms.sync_folder(path.parent)
     return digest
 
 
-def settle(made: Path, path: Path) -> str:
+def settle(scratch: Path, path: Path) -> str:
     """Force a file's bytes to the disk and rename the file to `path`; return its SHA-256 digest.
 
     The new name is on the disk only after `platforms.sync_folder`, which covers all names of the folder.
     """
-    with made.open("rb+") as file:  # Windows syncs only files that are open for writing
+    with scratch.open("rb+") as file:  # Windows syncs only files that are open for writing
         os.fsync(file.fileno())
-    digest = digest_of(made)
-    platforms.replace(made, path)
+    digest = digest_of(scratch)
+    platforms.replace(scratch, path)
     return digest
 
 
@@ -114,14 +114,14 @@ def _digest(table: Mapping[str, Any]) -> str:
 def copy(source: Path, target: Path) -> None:
     """Make `target` a read-only copy with the time of `source`; where the disk can share blocks, it takes no space."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    with temporary(target) as made:
-        with source.open("rb") as old, made.open("wb") as new:
+    with temporary(target) as scratch:
+        with source.open("rb") as old, scratch.open("wb") as new:
             if not platforms.share_blocks(old, new):
                 shutil.copyfileobj(old, new, PIECE)
         status = source.stat()
-        os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))
-        made.chmod(0o444)
-        platforms.replace(made, target)
+        os.utime(scratch, ns=(status.st_atime_ns, status.st_mtime_ns))
+        scratch.chmod(0o444)
+        platforms.replace(scratch, target)
 
 
 def is_copy(source: Path, target: Path) -> bool:
@@ -138,12 +138,12 @@ def is_copy(source: Path, target: Path) -> bool:
 def temporary(path: Path) -> Iterator[Path]:
     """Yield a name next to `path` that no other process uses; remove the file at the end, also after an error."""
     stem = path.name.lstrip(".").partition(".")[0]
-    made = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
+    scratch = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
     try:
-        yield made
+        yield scratch
     finally:
         with contextlib.suppress(PermissionError):  # on Windows, open in a library that failed: `sweep` removes it
-            platforms.remove(made)
+            platforms.remove(scratch)
 
 
 @contextlib.contextmanager
@@ -166,20 +166,20 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
 
     platforms.set_aside(path)
     lock = FileLock(path, thread_local=False, fallback_to_soft=False)
-    mine = _acquire(lock, wait=False)
-    if mine is None and wait:
+    held = _acquire(lock, wait=False)
+    if held is None and wait:
         waiting()
-        mine = _acquire(lock, wait=True)
+        held = _acquire(lock, wait=True)
     try:
-        yield mine is not None
+        yield held is not None
     finally:
-        stays = mine is not None and not _unlinked(path)  # while held: waiting processes then look for the file again
+        remains = held is not None and not _removed(path)  # while held: waiting processes then look for the file again
         lock.release()
-        if stays:  # Windows removes no open file; this attempt, too, fails where another process now holds the lock
-            _unlinked(path)
+        if remains:  # Windows removes no open file; this attempt, too, fails where another process now holds the lock
+            _removed(path)
 
 
-def _unlinked(path: Path) -> bool:
+def _removed(path: Path) -> bool:
     """Remove a file; return True when it no longer exists."""
     try:
         path.unlink(missing_ok=True)
@@ -220,8 +220,8 @@ def sweep(root: Path) -> int:
                     path.unlink()
                     removed += 1
             elif name.endswith(".lock"):
-                with contextlib.suppress(OSError), locked(path, wait=False) as mine:
-                    removed += mine  # its release removes it
+                with contextlib.suppress(OSError), locked(path, wait=False) as held:
+                    removed += held  # its release removes it
     return removed
 
 

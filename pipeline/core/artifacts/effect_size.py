@@ -132,13 +132,13 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
     """
     if quantity.kind == "impact_times":
         return _impact_times(a, b, quantity.name)
-    differences, doubts = [], []
+    differences, uncertainties = [], []
     for what in _compared(quantity):
         distance, error = _along(a, b, what, members)
-        doubt = chance(members) * error
-        differences.append(float(_beyond(distance, doubt).max(initial=0.0)))
-        doubts.append(float(doubt.max(initial=0.0)))
-    return Influence(max(differences), max(doubts))
+        uncertainty = chance(members) * error
+        differences.append(float(_beyond(distance, uncertainty).max(initial=0.0)))
+        uncertainties.append(float(uncertainty.max(initial=0.0)))
+    return Influence(max(differences), max(uncertainties))
 
 
 def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray, np.ndarray]:
@@ -158,9 +158,9 @@ def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray
     return np.linalg.norm(one - two, axis=1), error
 
 
-def _beyond(distance: np.ndarray, doubt: np.ndarray) -> np.ndarray:
+def _beyond(distance: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
     """Return the part of distances that exceeds chance."""
-    squares: np.ndarray = np.maximum(0.0, distance**2 - doubt**2)
+    squares: np.ndarray = np.maximum(0.0, distance**2 - uncertainty**2)
     return np.sqrt(squares)
 
 
@@ -181,8 +181,8 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
             return Influence(np.inf)
         of_pairs, allowed = _of_pairs(a, b, what), _allowed(b, what, requested)
         alike = allowed <= requested
-        doubt = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
-        error = max(error, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
+        uncertainty = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
+        error = max(error, float((_beyond(distance, uncertainty) * requested / allowed).max(initial=0.0)))
         most = max(most, error, float(distance[alike].max(initial=0.0)))
     return Influence(error, most - error)
 
@@ -216,20 +216,21 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
         return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
     results = []
     for what in _compared(quantity):
-        distance, doubt = _along(planned, full, what, members)
+        distance, uncertainty = _along(planned, full, what, members)
         if np.isinf(distance).any():
             return Agreement(np.inf, 0.0, requested)
-        doubt = chance(members) * doubt
+        uncertainty = chance(members) * uncertainty
         if min(len(planned.members), len(full.members)) > 1:
-            doubt = np.minimum(doubt, stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, what))
-        error, allowed = _beyond(distance, doubt), _allowed(full, what, requested)
+            of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, what)
+            uncertainty = np.minimum(uncertainty, of_pairs)
+        error, allowed = _beyond(distance, uncertainty), _allowed(full, what, requested)
         floor = np.maximum(allowed, np.finfo(float).tiny)  # the allowed error of a constant quantity is zero
-        worst = int(np.argmax((error - doubt) / floor))
-        if error[worst] - doubt[worst] <= allowed[worst]:
-            worst = int(np.argmax((error + doubt) / floor))
+        worst = int(np.argmax((error - uncertainty) / floor))
+        if error[worst] - uncertainty[worst] <= allowed[worst]:
+            worst = int(np.argmax((error + uncertainty) / floor))
         beyond = allowed > requested
         horizon = float(np.argmax(beyond)) / len(beyond) if beyond.any() else 1.0
-        results.append(Agreement(float(error[worst]), float(doubt[worst]), float(allowed[worst]), horizon))
+        results.append(Agreement(float(error[worst]), float(uncertainty[worst]), float(allowed[worst]), horizon))
     missed = [one for one in results if one.missed]
     worst_of = max(missed or results, key=lambda one: one.fraction)
     same = all(one.error == one.chance == 0.0 for one in results)
@@ -260,8 +261,8 @@ def _impact_times(a: Point, b: Point, name: str) -> Influence:
     if f"{name}.count" not in a.values or f"{name}.count" not in b.values:
         return Influence(np.inf)
     counts = {float(p.values[f"{name}.count"]) for p in (a, b)}
-    parted = any(float(p.deviation.get(f"{name}.count", 0.0)) > 0.0 for p in (a, b))
-    if len(counts) > 1 or parted:
+    scattered = any(float(p.deviation.get(f"{name}.count", 0.0)) > 0.0 for p in (a, b))
+    if len(counts) > 1 or scattered:
         return Influence(np.inf)
     if counts == {0.0}:
         return Influence(0.0)

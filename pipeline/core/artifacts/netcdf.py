@@ -37,7 +37,7 @@ def write(path: Path, data: LabelledArrays) -> None:
 
     listed, whole = _listed(data)
     compress = data.nbytes >= COMPRESSED
-    with _alone(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+    with _serialised(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
         for name, value in {**data.attrs, **whole}.items():
             texts = isinstance(value, (list, tuple)) and len(value) and all(isinstance(one, str) for one in value)
             (file.setncattr_string if texts else file.setncattr)(name, value)
@@ -50,10 +50,10 @@ def write(path: Path, data: LabelledArrays) -> None:
 
 
 @contextlib.contextmanager
-def _alone() -> Iterator[None]:
+def _serialised() -> Iterator[None]:
     """Serialise the use of the library, which is not made for threads, also against its use by xarray."""
-    theirs = sys.modules.get("xarray.backends.netCDF4_")  # another thread may be importing it, so it may lack its lock
-    with _LOCK, getattr(theirs, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
+    backend = sys.modules.get("xarray.backends.netCDF4_")  # another thread may be importing it, so it may lack its lock
+    with _LOCK, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
         yield
 
 
@@ -81,15 +81,15 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
 def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
     """Return attribute `coordinates` by array, and that of the file for coordinates that fit no array's dimensions."""
     additional = sorted(data.coords - data.sizes.keys())
-    attributes, left = dict[str, dict[str, str]](), set(additional)
+    attributes, unlisted = dict[str, dict[str, str]](), set(additional)
     for name, array in data.variables.items():
         if name in additional or name in array.dims:
             continue
         own = [other for other in additional if set(data[other].dims) <= set(array.dims)]
         if own:
             attributes[name] = {_COORDINATES: " ".join(own)}
-            left -= set(own)
-    return attributes, {_COORDINATES: " ".join(sorted(left))} if left else {}
+            unlisted -= set(own)
+    return attributes, {_COORDINATES: " ".join(sorted(unlisted))} if unlisted else {}
 
 
 def read(content: bytes) -> LabelledArrays:
@@ -99,14 +99,14 @@ def read(content: bytes) -> LabelledArrays:
     """
     import netCDF4
 
-    with _alone(), netCDF4.Dataset("in memory", memory=content) as file:
+    with _serialised(), netCDF4.Dataset("in memory", memory=content) as file:
         file.set_auto_maskandscale(False)
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
-        coords = {name for name in file.variables if name in file.dimensions} | set(_words(attrs))
+        coords = {name for name in file.variables if name in file.dimensions} | set(_taken_coordinates(attrs))
         variables = {}
         for name, variable in file.variables.items():
             own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != _FILL}
-            coords |= set(_words(own))
+            coords |= set(_taken_coordinates(own))
             values = np.asarray(variable[...], dtype=str if variable.dtype is str else None)
             if own.get("dtype") == "bool":
                 del own["dtype"]
@@ -115,6 +115,6 @@ def read(content: bytes) -> LabelledArrays:
     return LabelledArrays(variables, frozenset(coords & variables.keys()), attrs)
 
 
-def _words(attrs: dict[str, Any]) -> list[str]:
+def _taken_coordinates(attrs: dict[str, Any]) -> list[str]:
     """Remove the list of coordinates from the attributes and return it."""
     return str(attrs.pop(_COORDINATES, "")).split()

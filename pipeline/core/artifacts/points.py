@@ -52,9 +52,9 @@ def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Datas
     done = list(points.values())
     variables: dict[str, Any] = {}
     for statistic, one in itertools.product(STATISTICS, recorded):
-        there = [getattr(point, statistic)[one.name] for point in done if one.name in getattr(point, statistic)]
-        if there:
-            rows = _rows(done, one.name, statistic, np.shape(there[0]))
+        values = [getattr(point, statistic)[one.name] for point in done if one.name in getattr(point, statistic)]
+        if values:
+            rows = _rows(done, one.name, statistic, np.shape(values[0]))
             variables[variable(one, statistic)] = (("point", *one.dims), rows)
     variables["evaluations"] = (("point",), np.array([point.evaluations for point in done], dtype=np.int64))
     variables["refused"] = (("point",), np.array([point.refused for point in done], dtype=object))

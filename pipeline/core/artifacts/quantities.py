@@ -105,9 +105,9 @@ def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray
     kind = KINDS[quantity.kind]
     values: np.ndarray = run[kind.variable].values
     if kind.owner == "section":  # at each time the section of the body with the largest value
-        mine = values[:, run["section_body"].values == quantity.owner].reshape(len(values), -1, 3 if kind.dim else 1)
-        largest = np.argmax(np.linalg.norm(mine, axis=2), axis=1)
-        values = np.take_along_axis(mine, largest[:, None, None], axis=1)
+        of_body = values[:, run["section_body"].values == quantity.owner].reshape(len(values), -1, 3 if kind.dim else 1)
+        largest = np.argmax(np.linalg.norm(of_body, axis=2), axis=1)
+        values = np.take_along_axis(of_body, largest[:, None, None], axis=1)
     elif kind.owner:
         values = values[:, run[kind.owner].values.tolist().index(quantity.owner)]
     values = values.reshape(len(values), -1)
@@ -177,11 +177,11 @@ def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.nda
     """
     if quantity.kind == "impulse":
         return series(run, quantity)[-1]
-    mine = (run["event_contact"].values == quantity.owner) & (run["event_kind"].values == "closing")
-    mine &= run["event_time"].values <= until
+    selected = (run["event_contact"].values == quantity.owner) & (run["event_kind"].values == "closing")
+    selected &= run["event_time"].values <= until
     if quantity.kind == "peak_force":
-        return np.array([run["event_peak_force"].values[mine].max(initial=0.0)])
-    impact = mine & (run["event_approach_speed"].values > IMPACT)
+        return np.array([run["event_peak_force"].values[selected].max(initial=0.0)])
+    impact = selected & (run["event_approach_speed"].values > IMPACT)
     times: np.ndarray = run["event_time"].values[impact]
     return times
 

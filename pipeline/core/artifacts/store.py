@@ -135,8 +135,8 @@ class Store:
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else _written(path, content)
             attributes = getattr(product.get(MAIN), "attrs", {})  # empty where the main file is no dataset
-            said = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
-            record = Record(stage, key, digests, dict(facts), said, computed_by or {})
+            reported = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
+            record = Record(stage, key, digests, dict(facts), reported, computed_by or {})
             publish(self.path(stage, key, "json"), checked(record.table()))
         return record
 
@@ -261,8 +261,8 @@ class Store:
             with disk_limits(path.parent):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 stack.enter_context(locked(path, waiting=waiting))
-            for left in path.parent.glob(f".{key}.*.tmp"):
-                left.unlink(missing_ok=True)
+            for leftover in path.parent.glob(f".{key}.*.tmp"):
+                leftover.unlink(missing_ok=True)
             yield
 
     def sweep(self) -> None:
@@ -309,11 +309,11 @@ def _written(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
     from flexclear.pipeline.core.artifacts.labelled import of
 
     data = of(dataset)
-    with temporary(path) as made:
+    with temporary(path) as scratch:
         try:
-            netcdf.write(made, data)
+            netcdf.write(scratch, data)
         except (OSError, RuntimeError) as error:
             # the HDF5 library does not report that the disk is full; writing plain bytes raises that error
-            made.write_bytes(bytes(data.nbytes + 2**20))
+            scratch.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
-        return settle(made, path)
+        return settle(scratch, path)

@@ -51,8 +51,8 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
         fault = store.fault(record) if whole else None
         if fault is not None:
             damaged.append(fault)
-        there = [file.stat() for file in files if file.is_file()]
-        artifacts.append(Artifact(record, sum(s.st_size for s in there), time.time() - path.stat().st_mtime))
+        statuses = [file.stat() for file in files if file.is_file()]
+        artifacts.append(Artifact(record, sum(s.st_size for s in statuses), time.time() - path.stat().st_mtime))
     damaged += [f"{store.below(path)} is no record, or damaged" for path in unreadable]
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
@@ -72,8 +72,8 @@ def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
             above = (digest for fact, digest in record.facts.items() if fact.startswith("input "))
             waiting += [made[digest] for digest in above if digest in made]
     of_sweeps = {stage for stage, key in in_use if key == FAMILY}
-    mine = [a for a in listed.artifacts if a.age > older and a.record.stage not in of_sweeps]
-    return [a for a in mine if (a.record.stage, a.record.key) not in in_use]
+    candidates = [a for a in listed.artifacts if a.age > older and a.record.stage not in of_sweeps]
+    return [a for a in candidates if (a.record.stage, a.record.key) not in in_use]
 
 
 def remove(store: Store, artifact: Artifact) -> None:

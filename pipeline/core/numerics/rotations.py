@@ -87,9 +87,9 @@ def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
     rows = ((w, wx, wy, wz), (wx, x, xy, zx), (wy, xy, y, yz), (wz, zx, yz, z))
     best, q = np.argmax(squares, axis=0), np.empty((*R.shape[:-2], 4), order="F")
     for largest, row in enumerate(rows):
-        those = best == largest
+        selected = best == largest
         for k in range(4):
-            np.copyto(q[..., k : k + 1], row[k][..., None], where=those[..., None])
+            np.copyto(q[..., k : k + 1], row[k][..., None], where=selected[..., None])
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] >= 0.0, q, -q)
 

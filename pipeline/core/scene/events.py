@@ -101,12 +101,12 @@ def switched(part: Any, event: Event) -> Any:
 
 def with_switched(scene: Any) -> Any:
     """Return the scene with the new parts of all switches added, so that it names all parts that a run may need."""
-    made: dict[str, dict[str, Any]] = {}
+    new_parts: dict[str, dict[str, Any]] = {}
     for name, event in scene.event.items():
         if event.kind == "switch":
             family, part = event.part
-            made.setdefault(family, {})[f"{part}.{name}"] = switched(getattr(scene, family)[part], event)
-    return scene.model_copy(update={family: {**getattr(scene, family), **parts} for family, parts in made.items()})
+            new_parts.setdefault(family, {})[f"{part}.{name}"] = switched(getattr(scene, family)[part], event)
+    return scene.model_copy(update={family: {**getattr(scene, family), **parts} for family, parts in new_parts.items()})
 
 
 def require_possible(scene: Any) -> None:
@@ -116,7 +116,7 @@ def require_possible(scene: Any) -> None:
     for name, event in scene.event.items():
         for key, problem in _problems(scene, name, event):
             raise ValueError(f"event.{name}{'.' if key else ''}{key}: {problem}")
-    _require_apart(scene)
+    _require_distinct(scene)
     for name, load in scene.load.items():
         if isinstance(load, SampledPid):
             raise ValueError(f"load.{name}: a sampled controller does not go on over events: use a continuous 'pid'")
@@ -199,7 +199,7 @@ def _chain(events: Mapping[str, Event], name: str) -> Collection[str]:
     return before
 
 
-def _require_apart(scene: Any) -> None:
+def _require_distinct(scene: Any) -> None:
     """Raise ValueError for two events that release, or lock, the same part."""
     done: dict[tuple[str, tuple[str, str]], str] = {}
     for name, event in scene.event.items():

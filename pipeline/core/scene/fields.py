@@ -181,16 +181,16 @@ def given(part: Part, keys: tuple[str, ...]) -> list[str]:
 
 def require_one(part: Part, keys: tuple[str, ...], says: str) -> None:
     """Raise ValueError unless a part has exactly one of these keys; says: their purpose, as "says where"."""
-    there = given(part, keys)
-    if len(there) != 1:
-        text = f"{' and '.join(there)} do" if there else "nothing does"
+    present = given(part, keys)
+    if len(present) != 1:
+        text = f"{' and '.join(present)} do" if present else "nothing does"
         raise ValueError(f"one of {', '.join(keys)} {says}; here {text}")
 
 
 def given_once(part: Part, ways: tuple[str, ...]) -> None:
     """Raise ValueError when an orientation is given in more than one of these ways."""
-    if len(there := given(part, ways)) > 1:
-        raise ValueError(f"an orientation is given once, not by {' and '.join(there)}")
+    if len(present := given(part, ways)) > 1:
+        raise ValueError(f"an orientation is given once, not by {' and '.join(present)}")
 
 
 class Pose(Part):

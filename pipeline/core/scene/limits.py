@@ -83,8 +83,8 @@ def require_scatter(scene: Any, where: str) -> None:
 
 def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:
     """Raise ResourceError when an otherwise unchecked scene has more parts of a family than the limits allow."""
-    asked = table.get("limits")
-    most = asked.get("parts") if isinstance(asked, dict) else None
+    limits = table.get("limits")
+    most = limits.get("parts") if isinstance(limits, dict) else None
     most = most if isinstance(most, int) else Limits().parts
     for family in families:
         count = len(table[family]) if isinstance(table.get(family), dict) else 0

@@ -31,20 +31,20 @@ def located(error: InputError) -> InputError:
     if position is None:
         return error
     file, line = position
-    said = _PLACE.match(error.place)
-    other = "" if said is None or Path(said["file"]).resolve() == file.resolve() else f" of {file}"
+    match = _PLACE.match(error.place)
+    other = "" if match is None or Path(match["file"]).resolve() == file.resolve() else f" of {file}"
     return InputError(f"{error.place}, line {line}{other}", error.problem, error.remedy)
 
 
 def where(error: InputError) -> tuple[Path, int] | None:
     """Return file and line of an error's key path, which may be written in a scene that the file extends."""
-    said = _PLACE.match(error.place)
-    if said is None:
+    match = _PLACE.match(error.place)
+    if match is None:
         return None
-    return _found(Path(said["file"]), tuple(said["keys"].split(".")), ())
+    return _position(Path(match["file"]), tuple(match["keys"].split(".")), ())
 
 
-def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[Path, int] | None:
+def _position(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[Path, int] | None:
     try:
         extends, lines = _read(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
@@ -55,7 +55,7 @@ def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[
             if (*edit, *keys[:length]) in lines:
                 return file, lines[(*edit, *keys[:length])]
     if isinstance(extends, str) and file not in above:
-        below = _found(file.parent / extends, keys, (*above, file))
+        below = _position(file.parent / extends, keys, (*above, file))
         if below is not None:
             return below
     return (file, lines[keys[:1]]) if keys[:1] in lines else None
@@ -111,11 +111,11 @@ def not_toml(path: Path, text: str, message: str) -> InputError:
     number = int(match[1]) if match else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""
     where = f"{path}, line {number}" if number else str(path)
-    problem, hint = _guessed(line) or _said(message, line)
+    problem, hint = _common_error(line) or _reader_message(message, line)
     return InputError(where, f"is not TOML: {problem}", hint)
 
 
-def _guessed(line: str) -> tuple[str, str] | None:
+def _common_error(line: str) -> tuple[str, str] | None:
     """Return the probable error in a line, and what to write instead; None where no common error fits."""
     bare = line.strip()
     value = re.match(r"([\w.\"'-]+)\s*=\s*(.*)$", bare)
@@ -141,7 +141,7 @@ def _guessed(line: str) -> tuple[str, str] | None:
     return None
 
 
-def _said(message: str, line: str) -> tuple[str, str | None]:
+def _reader_message(message: str, line: str) -> tuple[str, str | None]:
     """Return the TOML reader's message without the position in the text, and a hint where it needs one."""
     text = _AT.sub("", message)
     twice = re.match(r"Cannot declare \((.*?),?\) twice", text)

@@ -344,13 +344,13 @@ def _edit_family(result: dict[str, Any], family: str, parts: object, edit: str, 
     if not isinstance(parts, dict):
         raise InputError(f"{where}]", "expected a table of named parts")
     _absolute_files({family: parts}, path)
-    there = result.get(family, {})
+    existing = result.get(family, {})
     for name, part in parts.items():
-        if name not in there:
+        if name not in existing:
             raise InputError(
-                f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, there)
+                f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, existing)
             )
-        there[name] = part if edit == "replace" else _merged(there[name], part)
+        existing[name] = part if edit == "replace" else _merged(existing[name], part)
 
 
 def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
@@ -363,15 +363,15 @@ def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path: Path) -> None:
-    there = result.setdefault(family, {})
+    existing = result.setdefault(family, {})
     for name, part in parts.items():
-        if name in there:
+        if name in existing:
             raise InputError(
                 f"{path} [{family}.{name}]",
                 f"the extended scene already has a {family} called '{name}'",
                 f"write [replace.{family}.{name}] or [set.{family}.{name}]",
             )
-        there[name] = part
+        existing[name] = part
 
 
 def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:

@@ -85,8 +85,8 @@ class Output(Part):
     def _gauges_are_on_stressed_bodies(self) -> Self:
         for name, gauge in (self.gauges or {}).items():
             if gauge.body not in (self.stress or ()):
-                asked = ", ".join(self.stress or ()) or "none"
-                raise ValueError(f"gauges.{name}: '{gauge.body}' is none of the bodies in `stress` ({asked}); add it")
+                known = ", ".join(self.stress or ()) or "none"
+                raise ValueError(f"gauges.{name}: '{gauge.body}' is none of the bodies in `stress` ({known}); add it")
         return self
 
     def gauge_names(self, body: str) -> list[str]:
@@ -110,7 +110,7 @@ class Output(Part):
 
     def requests(self) -> dict[str, Any]:
         """Return the requests, by key."""
-        return {name: asked for name in VARIABLES if (asked := getattr(self, name)) is not None}
+        return {name: request for name in VARIABLES if (request := getattr(self, name)) is not None}
 
 
 #: key of `Output` -> variables that it adds to a run; all are optional

@@ -215,10 +215,10 @@ def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     left, right = (_magnitude(side, owners) for side in sides[::2])
     measure([*left, *right, "max"])
     larger, smaller = (left, right) if sides[1] == ">" else (right, left)
-    made = Quantity("", EXPRESSION, text=text, steps=(*larger, *smaller, "-"))
-    if not made.terms():
+    difference = Quantity("", EXPRESSION, text=text, steps=(*larger, *smaller, "-"))
+    if not difference.terms():
         raise ValueError(f"'{text}' compares numbers: name a quantity")
-    return made
+    return difference
 
 
 def _magnitude(text: str, owners: Mapping[str, Collection[str]]) -> list[Any]:

@@ -149,8 +149,8 @@ class View(Part):
 
     @model_validator(mode="after")
     def _points(self) -> Self:
-        for asked in (self.direction, self.up):
-            if asked is not None and not any(asked):
+        for direction in (self.direction, self.up):
+            if direction is not None and not any(direction):
                 raise ValueError("a direction must not have the length zero")
         return self
 

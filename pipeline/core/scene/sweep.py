@@ -171,16 +171,16 @@ class Sweep(Part):
 
     @model_validator(mode="after")
     def _each_place_once(self) -> Sweep:
-        seen: dict[str, str] = {}
+        varied_by: dict[str, str] = {}
         for name in self.vary:
             if name in RESERVED or name.startswith(self.keep):
                 raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
             if not name.strip() or "/" in name or not name.isprintable():
                 raise ValueError(f"vary.{name}: is no name of a dimension; choose one without slashes")
             for where in self.places(name):
-                if where in seen:
-                    raise ValueError(f"vary.{name}: '{where}' is varied by '{seen[where]}' already")
-                seen[where] = name
+                if where in varied_by:
+                    raise ValueError(f"vary.{name}: '{where}' is varied by '{varied_by[where]}' already")
+                varied_by[where] = name
         return self
 
     def _check_sample(self) -> None:

@@ -60,19 +60,19 @@ def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel
     for e in error.errors(include_url=False)[:MOST_ERRORS]:
         invalid = _input_error(path, e, model)
         places.setdefault(invalid.place, []).append((e["type"], invalid))
-    unique = {str(e): e for there in places.values() for e in _nearest(there)}
+    unique = {str(e): e for candidates in places.values() for e in _nearest(candidates)}
     return InputErrors(list(unique.values()))
 
 
-def _nearest(there: list[tuple[str, InputError]]) -> list[InputError]:
+def _nearest(candidates: list[tuple[str, InputError]]) -> list[InputError]:
     """Return the errors at one location: of several alternatives, only those that fit the value's kind."""
-    fitting = [candidate for kind, candidate in there if kind not in OTHER_KIND]
-    others = {candidate.problem: candidate for kind, candidate in there if kind in OTHER_KIND}
+    fitting = [candidate for kind, candidate in candidates if kind not in OTHER_KIND]
+    others = {candidate.problem: candidate for kind, candidate in candidates if kind in OTHER_KIND}
     if fitting or len(others) < 2:
         return fitting or list(others.values())
     problems = [problem.partition(" (got ") for problem in others]
     rules = list(dict.fromkeys(rule.removeprefix("must be ").removeprefix("expected ") for rule, _, _ in problems))
-    return [InputError(there[0][1].place, f"expected {' or '.join(rules)}{''.join(problems[0][1:])}")]
+    return [InputError(candidates[0][1].place, f"expected {' or '.join(rules)}{''.join(problems[0][1:])}")]
 
 
 def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputError:
@@ -123,18 +123,18 @@ def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], lis
 
     pydantic inserts the type that selected a part's model into the location; the file has no such key.
     """
-    keys, here, known_keys = list[Any](), [model], list[str]()
+    keys, alternatives, known_keys = list[Any](), [model], list[str]()
     for key in loc:
-        inner = [candidate for a in here for candidate in _inside(a, key)]
+        inner = [candidate for a in alternatives for candidate in _inside(a, key)]
         if inner:
             keys.append(key)
-            known_keys, here = _keys(here), inner
-        elif any(_chosen_by(a, key) for a in here):
-            here = [a for a in here if _chosen_by(a, key)]
-        elif any(_is_model(a) for a in here) and not str(key).startswith(VALIDATORS):
+            known_keys, alternatives = _keys(alternatives), inner
+        elif any(_chosen_by(a, key) for a in alternatives):
+            alternatives = [a for a in alternatives if _chosen_by(a, key)]
+        elif any(_is_model(a) for a in alternatives) and not str(key).startswith(VALIDATORS):
             keys.append(key)
-            known_keys, here = _keys(here), []
-    return keys, known_keys, [kind for a in here for kind in _types(a)]
+            known_keys, alternatives = _keys(alternatives), []
+    return keys, known_keys, [kind for a in alternatives for kind in _types(a)]
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:

@@ -74,11 +74,11 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
             if getattr(body, key) is not None:
                 listed.append(Effect(f"body.{name}.{key}", key, whole.name))
     for name, joint in scene.contacts().items():
-        there = name in loose(scene)
-        if there:
+        removable = name in loose(scene)
+        if removable:
             listed.append(Effect(f"joint.{name}.clearance", CLEARANCE))
         if joint.friction is not None:
-            listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
+            listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if removable else ""))
     listed += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
     for name, load in scene.load.items():
         if load.type in OF_THE_WORLD:
@@ -237,8 +237,8 @@ def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
         ends += new
     uncoupled_parts = [part_name for part_name in parts if part_name in neighbours and part_name not in reached]
     names = {part_name.partition(".")[2] for part_name in uncoupled_parts}
-    spoken = {text.partition(".")[0] for key in SETTINGS if key not in FOLLOWING for text in _texts(table.get(key))}
-    return () if names & spoken else tuple(uncoupled_parts)
+    referenced = {text.partition(".")[0] for key in SETTINGS if key not in FOLLOWING for text in _texts(table.get(key))}
+    return () if names & referenced else tuple(uncoupled_parts)
 
 
 def lessened(scene: Scene, removed: Collection[str]) -> Scene:

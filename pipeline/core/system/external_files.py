@@ -45,10 +45,10 @@ def require_file(path: Path, where: str) -> None:
     Reading a device may never end; a pipe waits for a writer.
     """
     try:
-        there, ordinary = path.exists(), path.is_file()
+        exists, ordinary = path.exists(), path.is_file()
     except (OSError, ValueError) as error:
         raise InputError(where, f"'{path}' can be no file: {error}") from None
-    if not there:
+    if not exists:
         raise InputError(where, f"there is no file {path}", "paths are relative to the file that names them")
     if not ordinary:
         raise InputError(where, f"'{path}' is no ordinary file")
@@ -141,14 +141,14 @@ def _parsed(path: Path) -> meshio.Mesh:
     import meshio  # slow to import, and only meshes from files need it
     import numpy as np
 
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), np.errstate(over="ignore"):
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), np.errstate(over="ignore"):
             # to detect binary files, meshio interprets text as the length of one, which may overflow
             mesh = meshio.read(path)
     except SystemExit:
         # meshio prints its reason and ends the process where the content does not fit the suffix
-        raise ValueError(" ".join(said.getvalue().split()) or "meshio does not know its format") from None
+        raise ValueError(" ".join(printed.getvalue().split()) or "meshio does not know its format") from None
     points = np.asarray(mesh.points)
     mesh.points = points if points.size else np.empty((0, 3))
     if mesh.points.ndim != 2 or not 1 <= mesh.points.shape[1] <= 3 or points.dtype.kind not in "iuf":

@@ -71,10 +71,10 @@ def share_blocks(source: Any, target: Any) -> bool:
     return True
 
 
-def replace(made: Path, path: Path) -> None:
+def replace(scratch: Path, path: Path) -> None:
     """Rename a file to `path` and replace the file there, also if it is read-only or briefly open on Windows."""
     set_aside(path)
-    _insist(lambda: os.replace(made, path), path)
+    _insist(lambda: os.replace(scratch, path), path)
 
 
 def set_aside(path: Path) -> None:

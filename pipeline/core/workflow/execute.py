@@ -32,7 +32,7 @@ def key_of(task: Task, inputs: Mapping[str, Record], sources: Sources) -> str:
 
 def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
     """Show an up-to-date artifact in its task's folder and return its record; None when there is none."""
-    record = _found(task, inputs, store, sources)
+    record = _stored(task, inputs, store, sources)
     if record is not None:
         store.show(record, task.folder, task.names, task.label)
     return record
@@ -46,7 +46,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
     known = _facts(task, inputs, sources)
     name = key(known)
     with store.lock(task.stage, name, lambda: progress(None, "waiting for another process that makes the same")):
-        record = _found(task, inputs, Store(store.root), sources)  # silent store: `find` has reported faults already
+        record = _stored(task, inputs, Store(store.root), sources)  # silent store: `find` has reported faults already
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
@@ -79,14 +79,14 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
     last = store.last(task.folder, task.label)
     # code for events that the last run did not meet is not compared
-    always, seen = set(task.roots(())), last.facts if last is not None else {}
-    names = [name for name, those in task.met.items() if any(f"module {m}" in seen for m in {*those} - always)]
+    always, last_facts = set(task.roots(())), last.facts if last is not None else {}
+    names = [name for name, code in task.met.items() if any(f"module {m}" in last_facts for m in {*code} - always)]
     now = _facts(task, fresh, sources, names)
     if last is None and stale:
         return State(task, None, ("never run",))
     above = [f"its input {name} would be made again" for name in sorted(stale)]
     if not stale:
-        record = _found(task, fresh, store, sources)
+        record = _stored(task, fresh, store, sources)
         if record is not None:
             return State(task, record, ())
     why = reasons(now, None if last is None else last.facts, stale) + above
@@ -99,7 +99,7 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
     return State(task, None, tuple(why))
 
 
-def _found(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
+def _stored(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
     """Return the artifact of a task, whichever of its possible events the run has met."""
     for count in range(len(task.met) + 1):
         for met in combinations(task.met, count):

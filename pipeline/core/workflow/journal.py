@@ -107,12 +107,12 @@ def current() -> Journal | None:
 @contextlib.contextmanager
 def storage(folder: Path, key: str) -> Iterator[Journal]:
     """Yield the journal of a task, and write its pieces when the work fails or is stopped; the caller removes them."""
-    made = Journal(folder, key)
-    before = _current.set(made)
+    journal = Journal(folder, key)
+    before = _current.set(journal)
     try:
-        yield made
+        yield journal
     except BaseException:
-        made.write()
+        journal.write()
         raise
     finally:
         _current.reset(before)

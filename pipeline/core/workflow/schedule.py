@@ -98,9 +98,9 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
         width = min(jobs or cores.cores(), _width(plan.waiting))
         with stopping.gently(monitor.say):
             if width == 1:
-                _alone(plan, store, sources, monitor)
+                _run_here(plan, store, sources, monitor)
             else:
-                _together(plan, store, sources, monitor, width)
+                _run_in_workers(plan, store, sources, monitor, width)
         monitor.end()
         for task in plan.tasks:
             if task in plan.failed:
@@ -128,7 +128,7 @@ def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
                 plan.waiting.remove(task)
 
 
-def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
+def _run_here(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
     """Run the tasks one after the other in this process."""
     while ready := plan.ready():
         why = stopping.requested()
@@ -144,7 +144,7 @@ def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> Non
         plan.give_up_below_failures()
 
 
-def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
+def _run_in_workers(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
     """Run the tasks in worker processes."""
     running: dict[Future[Record | Failure], _Running] = {}
     with workers.team(width) as team, stopping.heeded():
@@ -205,8 +205,8 @@ def _submit(
     """
     others_idle = not running and len(plan.ready()) == 1
     for task in sorted(plan.ready(), key=lambda t: t.exclusive):
-        alone = any(other.task.exclusive for other in running.values())
-        if len(running) >= width or alone or (task.exclusive and running):
+        exclusive_running = any(other.task.exclusive for other in running.values())
+        if len(running) >= width or exclusive_running or (task.exclusive and running):
             return
         inputs = plan.inputs(task)
         key = key_of(task, inputs, sources)
@@ -265,7 +265,7 @@ def _work(
     where: tuple[Path, Path, Path | None],
     others_idle: bool,
 ) -> Record | Failure:
-    """Run a task in a worker as `_alone` does; report progress to the parent as often as the parent reads it."""
+    """Run a task in a worker as `_run_here` does; report progress to the parent as often as the parent reads it."""
     root, source, memo = where
     cores.set_idle(others_idle)
     last = 0.0
@@ -288,7 +288,7 @@ def attempt(
     try:
         return execute(task, inputs, store, sources, progress)
     except StoppedError as stopped:
-        code, text = stopped.exit_code, _left(task, stopped, store)
+        code, text = stopped.exit_code, _stopped_message(task, stopped, store)
     except FlexclearError as error:
         code, text = error.exit_code, str(error)
     except MemoryError:
@@ -298,13 +298,13 @@ def attempt(
     return Failure(task, code, f"{task.scene} {task.label}: {text}")
 
 
-def _left(task: Task, stopped: StoppedError, store: Store) -> str:
+def _stopped_message(task: Task, stopped: StoppedError, store: Store) -> str:
     """Return the message about a stopped task, and write its partial result, if any, next to the shown files."""
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
     if time is None:  # the partial result is of a piece of the work, such as an ensemble member, and no dataset
         return f"{stopped}; run it again, and what is finished of it is not computed again"
     path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
-    there = (
+    partial = (
         f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)" if path is not None else ""
     )
-    return f"{stopped}; run it again{there}"
+    return f"{stopped}; run it again{partial}"

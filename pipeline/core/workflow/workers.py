@@ -162,16 +162,16 @@ def team(width: int) -> Iterator[Team]:
         while _idle and _idle[-1].width < width:
             _idle.pop().pool.shutdown()
         # a team for reuse may serve a wider call later; workers that are never needed are never started
-        mine = _idle.pop() if _idle else _team(max(width, cores.cores()) if _keeping else width)
-        stack.callback(kill, mine.pool)
-        mine.channel.received()  # discards reports of the last call
-        yield mine
+        current = _idle.pop() if _idle else _team(max(width, cores.cores()) if _keeping else width)
+        stack.callback(kill, current.pool)
+        current.channel.received()  # discards reports of the last call
+        yield current
         if not stopping.requested():
             stack.pop_all()
             if _keeping:
-                _idle.append(mine)
+                _idle.append(current)
             else:
-                mine.pool.shutdown()
+                current.pool.shutdown()
 
 
 def _team(width: int) -> Team:
