@@ -5,7 +5,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pytest
 import xarray as xr
 
 from flexclear.commands import scenes as stages
@@ -13,10 +12,7 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.stages.workplace import Workplace, open_workplace
 from tests.properties.mechanisms import simulated
 
@@ -110,12 +106,3 @@ def frequencies(name: str, overrides: Overrides = (), time: float | None = None,
 
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
     return analyses.frequencies(scene, bundles(scene), silent, time, None, moving)
-
-
-def refusal(name: str, text: str, folder: Path) -> str:
-    """What is said of a scene with more text at its end, before anything is compiled."""
-    path = folder / "wrong.toml"
-    path.write_text((TREE / "scenes" / f"{name}.toml").read_text() + f"\n{text}\n")
-    with pytest.raises(InputError) as error:
-        tabulate(build(load_scene(path), {}))
-    return str(error.value)

@@ -6,10 +6,9 @@ import pytest
 
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.kinds import kind
-from tests.analytic.beam_models import RECIPE, WITHOUT_SHAPE
+from tests.analytic.beam_models import GENERAL, RECIPE, WITHOUT_SHAPE
 
 CIRCLE = {"type": "circle", "radius": "10 mm"}
-GENERAL = {"type": "general", "area": "300 mm^2", "torsion": 1e-8, "second_y": 8e-9, "second_z": 5e-9}
 
 
 def segmented(*cuts: tuple[float, float], **more: Any) -> dict[str, Any]:

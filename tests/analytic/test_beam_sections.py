@@ -4,9 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.linalg
-import scipy.sparse as sp
-import scipy.sparse.linalg
 
 from flexclear.pipeline.structure.fe import section
 from flexclear.pipeline.structure.kinds import kind
@@ -25,43 +22,6 @@ def test_torsion_of_rectangles_is_the_printed_one(ratio: float) -> None:
     found = section.rectangle_torsion(0.02 * ratio, 0.02) / (ratio * 0.02**4)
     assert found == pytest.approx(PRINTED_TORSION[ratio], abs=6e-4)  # three digits are printed
     assert section.rectangle_torsion(0.02, 0.02 * ratio) == section.rectangle_torsion(0.02 * ratio, 0.02)
-
-
-@pytest.mark.parametrize("ratio", [1.0, 1.7, 4.0])
-def test_torsion_of_rectangles_is_that_of_prandtls_membrane(ratio: float) -> None:
-    """Laplace(phi) = -2 on the rectangle, J = 2 int phi, by finite differences and extrapolation."""
-    coarse, fine = (_membrane(ratio, n) for n in (40, 80))
-    # second order: a third of the difference is left
-    expected = fine + (fine - coarse) / 3.0
-    # the extrapolated rest is of fourth order, with a logarithm from the corners: 7e-6 for the longest
-    assert section.rectangle_torsion(ratio, 1.0) == pytest.approx(expected, rel=1e-5)
-
-
-def _membrane(ratio: float, n: int) -> float:
-    lines = []
-    for length in (ratio, 1.0):
-        h = length / n
-        lines.append(sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n - 1, n - 1)) / h**2)
-    eye = sp.eye_array(n - 1)
-    A = sp.csc_array(sp.kron(lines[0], eye) + sp.kron(eye, lines[1]))
-    phi = scipy.sparse.linalg.spsolve(A, np.full((n - 1) ** 2, 2.0))
-    return float(2.0 * phi.sum() * ratio / n**2)
-
-
-def test_second_moments_are_those_of_the_area() -> None:
-    node, weight = np.polynomial.legendre.leggauss(3)
-    y, z = np.meshgrid(0.015 * node, 0.01 * node, indexing="ij")
-    dA = 0.015 * 0.01 * np.outer(weight, weight)
-    found = section.rectangle(0.03, 0.02)
-    assert found.area == pytest.approx(dA.sum(), rel=1e-14)
-    assert found.second_y == pytest.approx((dA * z**2).sum(), rel=1e-14)
-    assert found.second_z == pytest.approx((dA * y**2).sum(), rel=1e-14)
-
-
-def test_a_tube_is_a_circle_less_a_circle() -> None:
-    tube, outer, inner = section.tube(0.02, 0.015), section.circle(0.02), section.circle(0.015)
-    for name in ("area", "torsion", "second_y", "second_z", "polar"):
-        assert getattr(tube, name) == pytest.approx(getattr(outer, name) - getattr(inner, name), rel=1e-14)
 
 
 def test_shear_coefficients_are_cowpers() -> None:

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline.structure import closed_form
-from flexclear.pipeline.structure.fe import beam
-from flexclear.pipeline.structure.fe.slices import slices
 from flexclear.pipeline.structure.kinds import kind
-from tests.analytic.beam_models import WITHOUT_SHAPE, build, lowest, order
+from tests.analytic.beam_models import WITHOUT_SHAPE, lowest, order
 from tests.analytic.beam_solutions import PAPER_ROD
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
 
@@ -105,51 +103,6 @@ def test_stepped_rods_with_masses_converge_at_order_four() -> None:
     rods = [kind.build(recipe(n, "timoshenko", masses={"ball": BALL})) for n in meshes]
     errors = [lowest(rod, "", "", 6) / exact - 1.0 for rod in rods]
     np.testing.assert_allclose(order([1, 2, 4], np.array(errors)), 4.0, atol=0.3)
-
-
-def test_stepped_cantilever_deflects_as_the_pieces_add_up() -> None:
-    """End force in y: int (L - x)^2 / EI + 1 / (kappa G A) over the pieces; one element each is exact."""
-    found = beam.assemble(kind.build(recipe((1, 1, 1), "timoshenko")))
-    free = np.arange(6, found.size)
-    force = np.zeros(found.size)
-    force[found.nodal_size - 5] = 1.0
-    deflection = np.linalg.solve(found.stiffness.toarray()[np.ix_(free, free)], force[free])[found.nodal_size - 11]
-    expected = 0.0
-    for (start, end, _, _), piece in zip(PLAN, pieces("timoshenko"), strict=True):
-        expected += ((0.24 - start) ** 3 - (0.24 - end) ** 3) / (3.0 * piece.bend[1]) + (end - start) / piece.shear[0]
-    assert deflection == pytest.approx(expected, rel=1e-10)  # condition of the matrix, 1e6
-
-
-def test_rigid_inertia_is_that_of_the_parts() -> None:
-    """Steiner by hand: pieces as prisms about their centres, the ball about its own."""
-    rod = kind.build(recipe((2, 3, 2), "rayleigh", masses={"ball": BALL}))
-    body = slices(rod, beam.assemble(rod))
-    second = np.einsum("p,pk,pl->kl", body.mass, body.position, body.position) + body.spread.sum(axis=0)
-    inertia = np.trace(second) * np.eye(3) - second
-    expected, mass, first = np.zeros((3, 3)), 0.0, np.zeros(3)
-    for (start, end, _, _), piece in zip(PLAN, pieces("rayleigh"), strict=True):
-        h, m = end - start, piece.line_mass * (end - start)
-        polar, y, z = piece.rotary
-        own = np.array([polar * h, y * h + m * h**2 / 12.0, z * h + m * h**2 / 12.0])
-        centre = np.array([0.5 * (start + end), 0.0, 0.0])
-        expected += np.diag(own) + m * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        mass, first = mass + m, first + m * centre
-    centre = np.array([0.252, 0.004, -0.003])
-    expected += np.diag(BALL["inertia"]) + 0.35 * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    np.testing.assert_allclose(body.mass.sum(), mass + 0.35, rtol=1e-14)
-    np.testing.assert_allclose(body.position.T @ body.mass, first + 0.35 * centre, rtol=1e-13)
-    np.testing.assert_allclose(inertia, expected, rtol=1e-13, atol=1e-16)
-
-
-def test_segments_of_one_section_are_the_straight_rod() -> None:
-    section = {"type": "circle", "radius": PAPER_ROD.radius}
-    cuts = [(0.0, 0.08, 4), (0.08, 0.24, 8)]
-    segments = [{"start": a, "end": b, "elements": n, "section": section} for a, b, n in cuts]
-    shape = {"type": "segmented-beam", "length": 0.24, "segments": segments}
-    cut, whole = kind.build({**WITHOUT_SHAPE, "shape": shape}), build()
-    for name in whole.data_vars:
-        # places are sums of lengths on two ways, which rounding may set some units of the last place apart
-        np.testing.assert_allclose(cut[name].values, whole[name].values, rtol=1e-14, atol=1e-15, err_msg=str(name))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from scipy.special import iv, jv, kv, yv
 
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, BENDING_Z, EXTENSION, RECIPE, TORSION, frequencies, order
 from tests.analytic.beam_solutions import PAPER_ROD, scan
 
@@ -137,8 +136,3 @@ def test_tapered_tube_and_its_mass() -> None:
     mass = ones.ravel() @ found.mass @ ones.ravel()
     frustum = math.pi * L / 3.0 * (THICK**2 + THICK * THIN + THIN**2)
     assert mass == pytest.approx(RHO * 0.75 * frustum, rel=1e-14)
-
-
-def test_a_taper_has_no_closed_form_of_a_uniform_rod() -> None:
-    modes = solve(taper(CONE, 8), "free-free", 7)
-    assert not [name for name in modes.data_vars if str(name).startswith("exact")]

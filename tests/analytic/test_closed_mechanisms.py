@@ -32,31 +32,6 @@ def test_bennetts_linkage_keeps_its_relation_of_angles() -> None:
 
 
 @pytest.mark.slow
-def test_sarrus_linkage_moves_as_its_one_coordinate_does() -> None:
-    """The coordinate is the angle of the plates against the floor; half a plate is 0.1 m."""
-    dataset = run("checks/sarrus", TIGHT)
-    m, inertia = 0.3, 1e-3
-
-    def rates(_: float, y: np.ndarray) -> list[float]:
-        s, c = np.sin(y[0]), np.cos(y[0])
-        rise, height = 0.4 * c, 0.4 * s
-        mass = 2.0 * rise**2 + 2.0 * (2.0 * inertia + 0.01 * m + m * (0.01 * s**2 + 0.09 * c**2))
-        slope = -2.0 * 2.0 * 0.16 * s * c - 2.0 * m * 0.16 * s * c
-        push = -400.0 * (height - 0.3) - 2.0 * rise * y[1] - 2.0 * G - m * G * 2.0 * (0.25 + 0.75)
-        return [y[1], (push * rise - 0.5 * slope * y[1] ** 2) / mass]
-
-    t = dataset.time.values
-    known = solve_ivp(rates, (0.0, t[-1]), [np.radians(50.0), 0.0], "DOP853", t, rtol=1e-12, atol=1e-14).y
-    platform = dataset.sel(body="platform")
-    # both integrate with rtol 1e-12 over a second
-    assert platform.position.values[:, 2] == pytest.approx(0.4 * np.sin(known[0]), abs=1e-9)
-    assert platform.velocity.values[:, 2] == pytest.approx(0.4 * np.cos(known[0]) * known[1], abs=1e-8)
-    assert np.abs(platform.position.values[:, :2]).max() < 1e-12
-    assert set(dataset.mobility.values) == {1}
-    assert dataset.attrs["redundant_closure_rows"] == 1
-
-
-@pytest.mark.slow
 def test_watts_governor_moves_as_its_two_coordinates_do() -> None:
     """The coordinates are the spindle's angle and that of the arms against the spindle."""
     dataset = run("checks/governor", TIGHT)

@@ -29,13 +29,9 @@ GENTLE, STEEP = at(0.1, 0.15, 0.1, "30 ms"), at(1.2, 0.15, 0.1, "10 ms")
 
 
 @pytest.mark.parametrize("overrides", [GENTLE, STEEP], ids=["rolls", "slides"])
-def test_friction_stays_below_its_limit_and_only_takes(overrides: Overrides) -> None:
-    require_coulomb(run(ROLLING, overrides))
-
-
-@pytest.mark.parametrize("overrides", [GENTLE, STEEP], ids=["rolls", "slides"])
-def test_ledger_closes_with_the_energy_of_the_bristles(overrides: Overrides) -> None:
+def test_bristles_stay_below_their_limit_only_take_and_close_the_ledger(overrides: Overrides) -> None:
     dataset = run(ROLLING, overrides)
+    require_coulomb(dataset)
     swing = float(np.ptp(dataset.potential.values))
     assert np.abs(dataset.energy_error).max() <= 1e-6 * swing
     # the ball rests on its contact, whose energy is there without friction too; the bristles' comes and goes

@@ -36,6 +36,8 @@ def normal(**law: object) -> Overrides:
 
 def test_falling_ball_bounces_as_the_reference_says() -> None:
     dataset, known = run(BOUNCE), np.array(KNOWN)
+    # along the vertical
+    assert np.abs(dataset.position.sel(body="ball").values[:, :2]).max() <= 1e-15
     found = {name: values[: len(known)] for name, values in impacts(dataset).items()}
     # asked for are 1e-4 s and 0.5 %; errors of 1e-10 per contact add up
     assert found["start"] == pytest.approx(known[:, 0], abs=1e-8)
@@ -81,7 +83,7 @@ def test_the_peak_force_is_located_however_early_it_comes(restitution: float) ->
 def test_a_ball_that_bounces_without_loss_keeps_its_energy(stiffness: float) -> None:
     """Under its weight, at the default tolerance, over all of the bounces of a second."""
     lossless = (("joint.contact.normal.restitution", 1.0), ("joint.contact.normal.stiffness", stiffness))
-    dataset = run("checks/bounce", lossless)
+    dataset = run(BOUNCE, lossless)
     energy = MASS * 9.81 * 0.1
     assert len(of_kind(dataset, "closing")) >= 3
     # three bounces of 1e-10 each, of which rounding is a hundredth: steps in contact are ten times tighter than asked
@@ -92,7 +94,7 @@ def test_a_ball_that_bounces_without_loss_keeps_its_energy(stiffness: float) -> 
 def test_a_contact_begins_with_a_step_as_long_as_that_of_the_last_one(stiffness: float) -> None:
     """The steps that look for where the ball touches are rejected; those that look for a length only once."""
     lossless = (("joint.contact.normal.restitution", 1.0), ("joint.contact.normal.stiffness", stiffness))
-    dataset = run("checks/bounce", (*lossless, ("time.end", "5 s"), ("output.interval", "10 ms")))
+    dataset = run(BOUNCE, (*lossless, ("time.end", "5 s"), ("output.interval", "10 ms")))
     # ten a contact, fifteen without that memory; means of seventeen contacts, within half a step of each other
     assert dataset.attrs["rejected_steps"] < 12.5 * len(of_kind(dataset, "closing"))
 
@@ -161,3 +163,23 @@ def test_the_ledger_must_close_as_well_as_the_steps_are_asked_to_be(solver: dict
 def test_a_law_that_cannot_be_had_is_a_clear_error(law: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         run(BOUNCE, normal(**law))
+
+
+def test_impulse_only_grows_in_contact() -> None:
+    csj = run("sps4/csj")
+    impulse, closed = csj.contact_impulse.values[:, 0], csj.contact_normal_force.values[:, 0] > 0.0
+    apart = ~closed[:-1] & ~closed[1:]
+    steps = np.diff(impulse)
+    assert steps.min() >= 0.0
+    # a contact may fall between two outputs; events are outputs too, so none falls between two open ones
+    assert np.abs(steps[apart]).max() == 0.0
+
+
+def test_every_recorded_penetration_carries_its_force() -> None:
+    """Also in the step that ends with the opening, after which the contact has no force any more."""
+    bounce = run(BOUNCE, (("output.interval", 1e-5), ("time.end", 0.2)))
+    depth, force = bounce.contact_penetration.values[:, 0], bounce.contact_normal_force.values[:, 0]
+    inside = depth > 1e-9  # far above rounding of the 0.1 m gap
+    assert inside.sum() > 10
+    assert (force[inside] > 0.0).all()
+    assert (force[depth == 0.0] == 0.0).all()

@@ -1,12 +1,10 @@
 """PID controllers against matrix exponentials, and a sampled one against its exact discretisation."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from tests.analytic.mechanism_runs import refusal, run
+from tests.analytic.mechanism_runs import run
 
 SCENE = "checks/controllers"
 
@@ -94,26 +92,3 @@ def test_a_sampled_controller_holds_its_force_between_samples() -> None:
     )
     work = float(dataset.load_work[-1])
     assert np.abs(dataset.energy_error.values).max() < 1e-9 * work
-
-
-WRONG: dict[str, tuple[str, ...]] = {
-    'type = "pid"\njoint = "A"\nreference = 1.0': ("needs a gain",),
-    'type = "pid"\njoint = "A"\nreference = "3 deg"\nproportional = 1.0': ("load.c.reference", "an angle", "length"),
-    'type = "pid"\njoint = "A"\nreference = 1.0\nproportional = "2 N"': ("load.c", "a stiffness belongs here"),
-    'type = "pid"\njoint = "A"\nreference = 1.0\nmeasured = "K"\nproportional = 1.0': (
-        "load.c.measured",
-        "no joint 'K'",
-    ),
-    'type = "pid"\njoint = "A"\nreference = 1.0\nintegral = 1.0\nlimits = [0.0, 1.0]': ("tracking_time",),
-    'type = "pid"\njoint = "A"\nreference = 1.0\nintegral = 1.0\nlimits = [1.0, 1.0]': ("1 is not below 1",),
-    'type = "sampled-pid"\njoint = "A"\nreference = 1.0\nintegral = 1.0\nperiod = 1e-9': (
-        "load.c.period",
-        "1e+09 samples",
-    ),
-}
-
-
-@pytest.mark.parametrize("text", WRONG)
-def test_what_is_no_controller_is_refused_in_words(text: str, tmp_path: Path) -> None:
-    said = refusal(SCENE, f"[load.c]\n{text}", tmp_path)
-    assert [word for word in WRONG[text] if word not in said] == []

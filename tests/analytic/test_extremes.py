@@ -53,11 +53,3 @@ def test_rows_inside_steps_leave_the_trajectory_as_it_is() -> None:
     # the loops of recorded states are closed to rounding, from starts that the dense output gives alike
     assert np.array_equal(plain.event_time.values, dense.event_time.values)
     assert np.abs(a.position.values - b.position.values).max() < 1e-13
-
-
-def test_compressions_are_where_the_penetration_is_largest() -> None:
-    plain, dense = pair("sps4/csj")
-    depth = plain.contact_penetration.sel(contact="A1")
-    deepest = float(plain.event_peak_penetration.max())
-    assert float(depth.max()) == pytest.approx(deepest, rel=1e-9)  # a row lies there, to the location's error squared
-    assert float(dense.contact_penetration.max()) <= deepest * (1.0 + 1e-9)

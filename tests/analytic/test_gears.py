@@ -1,7 +1,5 @@
 """Gears and racks against closed forms: Willis' equation, equivalent inertia, reactions; what repeats is redundant."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,7 +10,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import tabulate
-from tests.analytic.mechanism_runs import TREE, bundles, refusal, run
+from tests.analytic.mechanism_runs import TREE, bundles, run
 
 SCENE = "checks/gears"
 G = 9.81
@@ -69,22 +67,6 @@ def test_gears_count_in_the_mobility_and_repeated_ones_as_redundant() -> None:
     assert analyse(tabulate(build(fewer, {}))).mobility == 3
     one = without.model_copy(update={"gear": {k: v for k, v in without.gear.items() if k != "R3"}})
     assert analyse(tabulate(build(one, {}))).redundant == found.redundant - 1
-
-
-WRONG: dict[str, tuple[str, ...]] = {
-    'first = "sun"\nsecond = "sun"\nratio = 2.0': ("couples two coordinates",),
-    'first = "sun"\nsecond = "moon"\nratio = 2.0': ("gear.g.second", "no joint 'moon'", "known: P1"),
-    'first = "sun"\nsecond = "P1"\nratio = "2 mm/rad"': ("gear.g.ratio", "length per angle"),
-    'first = "wheel"\nsecond = "rack"\nratio = "2 N"': ("gear.g.ratio", "length per angle", "m/rad"),
-    'first = "sun"\nsecond = "P1"\nratio = 0.0': ("ratio is 0", "drive"),
-    'first = "ring_fixed"\nsecond = "P1"\nratio = 1.0': ("gear.g.first", "no coordinate"),
-}
-
-
-@pytest.mark.parametrize("text", WRONG)
-def test_what_is_no_gear_is_refused_in_words(text: str, tmp_path: Path) -> None:
-    said = refusal(SCENE, f"[gear.g]\n{text}", tmp_path)
-    assert [word for word in WRONG[text] if word not in said] == []
 
 
 def crank(*changes: tuple[str, object]) -> xr.Dataset:

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 from flexclear.pipeline.core.scene.load import load_scene
-from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, platform_deviations, run, second_derivation
+from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, run, second_derivation
 
 
 def at(dataset: xr.Dataset, time: np.ndarray) -> xr.Dataset:
@@ -42,11 +42,6 @@ def test_clearance_first_impacts_are_those_of_the_second_derivation() -> None:
     assert found["peak_force"][:first] == pytest.approx(known["impact_peak_force"][:first], rel=1e-4)
 
 
-def test_the_rods_compliance_softens_the_first_impact() -> None:
-    soft, hard = impacts(run("sps4/variants/first_far_csj_cb")), impacts(run("sps4/variants/first_csj"))
-    assert 0.5 < soft["peak_force"][0] / hard["peak_force"][0] < 0.65
-
-
 def test_fixed_fixed_modes_leave_the_mechanism_ideal_in_pose_and_velocity() -> None:
     """Both joints sit on end nodes, which these modes do not move."""
     ideal = run("sps4/ideal").sel(body="platform")
@@ -54,14 +49,6 @@ def test_fixed_fixed_modes_leave_the_mechanism_ideal_in_pose_and_velocity() -> N
     assert np.abs(ideal.position.values - fixed.position.values).max() <= 1e-10
     assert np.abs(ideal["quaternion"].values - fixed["quaternion"].values).max() <= 1e-10
     assert np.abs(ideal.velocity.values - fixed.velocity.values).max() <= 1e-10
-
-
-def test_deviations_from_ideal_have_the_known_magnitudes() -> None:
-    angle, place, speed = platform_deviations("sps4/variants/first_far_cb", "sps4/variants/first")
-    # 3.48e-6 rad, 3.0e-4 mm, 0.70 mm/s of independent programs; the ringing is not resolved to digits
-    assert angle == pytest.approx(3.48e-6, rel=0.03)
-    assert place == pytest.approx(3.0e-7, rel=0.03)
-    assert speed == pytest.approx(0.70e-3, rel=0.05)
 
 
 @pytest.mark.parametrize("scene", ["far_free", "far_fixed", "far_cb"])

@@ -99,11 +99,3 @@ def test_a_consistent_mass_of_nodes_that_turn_is_refused(tmp_path: Path) -> None
     given = build(TABLE, tmp_path)
     with pytest.raises(InputError, match=r"not lumped at the nodes.*\n.*lump the mass"):
         of_mesh(given).assemble(given)
-
-
-def test_a_node_that_is_heavier_one_way_is_refused(tmp_path: Path) -> None:
-    mass = np.tile([1.0, 1.0, 1.001, 1e-3, 1e-3, 1e-3], NODES)
-    write(tmp_path, sp.diags_array(mass))
-    given = build(TABLE, tmp_path)
-    with pytest.raises(InputError, match="differs for motion along x, y and z"):
-        of_mesh(given).assemble(given)

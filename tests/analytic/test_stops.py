@@ -1,13 +1,11 @@
 """Ends of joint coordinates against closed forms: half sines, restitution, angles beyond a full turn."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from flexclear.pipeline.core.system.errors import InputError
-from tests.analytic.mechanism_runs import impacts, refusal, run
+from tests.analytic.mechanism_runs import impacts, run
 
 SCENE = "checks/stops"
 
@@ -84,26 +82,6 @@ def test_angles_reach_their_ends_beyond_a_full_turn(coordinate: str, ends: dict[
     series = dataset.joint_velocity.sel(coordinate=coordinate).values
     assert series[-1] == pytest.approx(velocity, rel=1e-7)
     assert np.abs(dataset.energy_error.values).max() < 1e-6
-
-
-WRONG: dict[str, tuple[str, ...]] = {
-    'joint = "A"\nnormal = { law = "hertz", stiffness = 1.0 }': ("neither",),
-    'joint = "A"\nupper = 0.2\nnormal = { law = "hertz" }': ("normal.stiffness",),
-    'joint = "A"\nupper = "3 deg"\nnormal = { law = "hertz", stiffness = 1.0 }': ("stop.s.upper", "an angle", "length"),
-    'joint = "A"\nupper = 0.1\nlower = 0.2\nnormal = { law = "hertz", stiffness = 1.0 }': ("lower = 0.2", "below"),
-    'joint = "K"\nupper = 0.1\nnormal = { law = "hertz", stiffness = 1.0 }': ("stop.s.joint", "no joint 'K'"),
-    'joint = "A"\nupper = 0.1\nnormal = { law = "kelvin-voigt", stiffness = 1.0, restitution = 0.5 }': (
-        "effective_mass",
-    ),
-    'joint = "A"\nupper = 0.1\nnormal = { law = "flores", stiffness = 1.0 }': ("stop.s.normal", "restitution"),
-    'joint = "A"\nupper = 0.1\nfloor = -1.0\nnormal = { law = "hertz", stiffness = 1.0 }': ("stop.s.floor", "positive"),
-}
-
-
-@pytest.mark.parametrize("text", WRONG)
-def test_what_is_no_stop_is_refused_in_words(text: str, tmp_path: Path) -> None:
-    said = refusal(SCENE, f"[stop.s]\n{text}", tmp_path)
-    assert [word for word in WRONG[text] if word not in said] == []
 
 
 def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_given() -> None:

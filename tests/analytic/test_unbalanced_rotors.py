@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from benchmarks.families.classes import ACROSS, ALONG, ARM, MASS, MIXED, SIDE, SLOPE, deflection, rotor
+from benchmarks.families.classes import ARM, MASS, SIDE, deflection, rotor
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
@@ -31,15 +31,6 @@ def damped(scene: Scene, damping: float) -> Scene:
 
 def steady(scene: Scene) -> xr.Dataset:
     return analyses.frequencies(scene, {}, silent, moving=True)
-
-
-def test_the_disc_turns_inside_of_its_unbalance_above_the_critical_speed() -> None:
-    """From outside to beyond its centre of mass's opposite side, as it is self-centred: -1 far above."""
-    assert deflection(100.0) > 0.0
-    assert deflection(150.0) == pytest.approx(-4.6, abs=0.05)
-    K = np.array([[SIDE, -MIXED], [-MIXED, SLOPE]])
-    turning = np.linalg.eigvals(np.linalg.solve(np.diag([MASS, ACROSS - ALONG]), K)).real
-    assert np.sqrt(turning[turning > 0.0]) == pytest.approx([129.0], abs=0.5)
 
 
 @pytest.mark.parametrize(
@@ -75,16 +66,9 @@ def test_neither_direction_nor_unbalance_makes_a_rotor_unsteady(unbalance: float
 
 
 def test_weight_across_an_axle_is_unsteady_still() -> None:
+    weight = {**GRAVITY["gravity"], "acceleration": [0.0, 0.0, -1e-4]}
     with pytest.raises(SolverError, match="not steady"):
-        steady(heavy(9.81))
-    with pytest.raises(SolverError, match="not steady"):
-        steady(heavy(1e-4))
-
-
-def heavy(g: float) -> Scene:
-    """The oblique rotor in a gravity field."""
-    weight = {**GRAVITY["gravity"], "acceleration": [0.0, 0.0, -g]}
-    return edited(rotor(20.0, 1e-6, axes("oblique")), {"load.weight": weight})
+        steady(edited(rotor(20.0, 1e-6, axes("oblique")), {"load.weight": weight}))
 
 
 @pytest.mark.parametrize("speed, turn", [(200.0, "upright"), (300.0, "oblique")])

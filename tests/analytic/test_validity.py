@@ -9,14 +9,17 @@ import pytest
 import xarray as xr
 
 from flexclear import load_scene
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
 from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate, simulated
+from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulated
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it
 FIRST = 3.798
@@ -106,7 +109,7 @@ def test_the_largest_displacement_is_that_of_all_nodes_and_rows() -> None:
     assert largest(shapes, q, 1e3) == (0, 0.0)
 
 
-def dropped(depth: float) -> xr.Dataset:
+def dropped(depth: float) -> Scene:
     """A ball of 20 mm in a socket, with a contact so soft that it sinks in by about `depth` [m].
 
     m g d = K d^2.5 / 2.5, the fall through the clearance left out.
@@ -114,14 +117,19 @@ def dropped(depth: float) -> xr.Dataset:
     bodies = {"g": {"type": "ground", "frames": {"S": {}}}, "ball": rigid(1.0, 1e-3, {"B": {}}, pose={})}
     normal = {"law": "hertz", "stiffness": 2.5 * 9.81 / depth**1.5}
     socket = joint("clearance-spherical", "g.S", "ball.B", clearance=1e-4, ball_radius=0.02, normal=normal)
-    return simulate(scene(bodies, {"j": socket}, 0.2, 1e-8, load=GRAVITY, output={"interval": 1e-3}))
+    return Scene.model_validate(scene(bodies, {"j": socket}, 0.2, 1e-8, load=GRAVITY, output={"interval": 1e-3}))
 
 
 @pytest.mark.slow
 def test_a_deep_contact_is_reported_and_a_ball_that_leaves_through_its_socket_refused() -> None:
-    assert reported(dropped(1e-3)) == []
-    (said,) = reported(dropped(5e-3))
+    assert reported(simulated(dropped(1e-3))) == []
+    (said,) = reported(simulated(dropped(5e-3)))
     assert "joint j: the surfaces are up to 0.005" in said
     assert "contact laws hold below 0.1" in said
     with pytest.raises(SolverError, match=r"joint j: the surfaces went 0\.0451 m deep .* radius \(0\.02 m\)"):
-        dropped(4.5e-2)
+        simulated(dropped(4.5e-2))
+
+
+def test_an_ensemble_whose_balls_leave_through_their_sockets_is_refused() -> None:
+    with pytest.raises(SolverError, match=r"joint j: the surfaces went 0\.0451 m deep"):
+        analyses.ensemble(edited(dropped(4.5e-2), {"ensemble": {"members": 2}}), {}, silent)

@@ -86,15 +86,14 @@ def test_a_map_keeps_totals_and_puts_them_where_the_contact_was() -> None:
     assert np.count_nonzero(found[:, 4:]) == 0
 
 
-@pytest.mark.slow
 def test_an_impact_takes_what_the_rebound_lacks() -> None:
-    """Of a ball of 1 kg, which has its weight on it meanwhile."""
+    """Its momentum turns around: of a ball of 1 kg, which has its weight on it meanwhile."""
     post = derive(run("checks/bounce"))
     done = np.isfinite(post.impact_separation_speed.values)
     before, after = post.impact_approach_speed.values[done], post.impact_separation_speed.values[done]
     known = before + after + 9.81 * post.impact_duration.values[done]
-    # rtol 1e-10 of the run's largest impulse and energy, in the ledger since the start
-    assert post.impact_impulse.values[done] == pytest.approx(known, rel=1e-6)
+    # both come from one run at rtol 1e-10; impulses of later bounces are differences of a growing sum
+    assert post.impact_impulse.values[done] == pytest.approx(known, rel=1e-8)
     loss = 0.5 * (before**2 - after**2)
     assert post.impact_damping_loss.values[done] == pytest.approx(loss, rel=1e-6, abs=1e-8)
     assert done.sum() > 3

@@ -16,7 +16,6 @@ TREE = Path(__file__).resolve().parents[2]
 SCENES = TREE / "scenes"
 FILES = sorted(p.relative_to(SCENES).as_posix() for p in SCENES.glob("**/*.toml") if "sweeps" not in p.parts)
 MECHANISMS = [f for f in FILES if f.startswith("sps4/") and "frequencies" not in f]
-MAIN = ["ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb"]
 #: positions are typed to 17 digits; some ten products and sums of lengths below 1 m round to this, each by 1e-16
 ROUNDING = 3e-15
 
@@ -99,11 +98,6 @@ def differing(a: str, b: str) -> set[str]:
 @pytest.mark.parametrize("name", FILES)
 def test_every_scene_loads_under_its_own_name(name: str) -> None:
     assert scene(name).name == name.removesuffix(".toml")
-
-
-@pytest.mark.parametrize("name", MAIN)
-def test_the_papers_eight_scenes_are_there(name: str) -> None:
-    assert f"sps4/{name}.toml" in FILES
 
 
 @pytest.mark.parametrize("name", MECHANISMS)

@@ -26,6 +26,7 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled
+from flexclear.pipeline.core.numerics.rotations import cross, skew
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
@@ -37,7 +38,14 @@ from flexclear.pipeline.dynamics.model.constraints import Constraint, constraint
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches, reached
+from flexclear.pipeline.dynamics.record.wrenches import (
+    Acting,
+    Wrench,
+    joint_wrenches,
+    on_frames,
+    path_wrenches,
+    reached,
+)
 from flexclear.pipeline.dynamics.run.run import Run
 
 #: number of poses of the motion at which bounds are computed
@@ -172,25 +180,40 @@ def centre(model: Model, poses: Sequence[Placement], body: str) -> np.ndarray:
     return np.asarray(poses[i].of(model.mechanism.links[i].places[body].of(Placement(com))).p)
 
 
-def modal_forces(
-    model: Model,
-    motions: Motions,
-    name: str,
-    bundle: Labelled,
-    loads: Mapping[str, tuple[np.ndarray, np.ndarray]],
-) -> np.ndarray:
-    """Return forces of joints, inertia and gravity along the elastic coordinates of a body, shape (rows, mode) [N]."""
+def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[str, Wrench]) -> np.ndarray:
+    r"""Return all forces on a body along its elastic coordinates in a rigid motion, shape (rows, mode) [N].
+
+    joints: wrenches of its joints, from `joint_wrenches`.  Inertia and gravity act in its volume,
+    :math:`-\int \rho\,S^T (a - g + A x)`, :math:`A = \tilde\alpha + \tilde\omega\tilde\omega`, at the points x of its
+    own frame; on a motion of the body as a whole the sum is zero.
+    """
+    model = motions.model
     i = model.mechanism.link_of[name]
-    R_WB = motions.link(i).R @ model.mechanism.links[i].places[name].R
+    place = model.mechanism.links[i].places[name]
+    own = motions.link(i).at(place.p, place.R)
+    a, alpha, omega = (np.einsum("tji,tj->ti", own.R, x) for x in (own.a - model.gravity, own.alpha, own.omega))
+    A = skew(alpha) + skew(omega) @ skew(omega)
+    forces = -a @ bundle["modal_first_moment"].values
+    forces -= np.einsum("tlk,klj->tj", A, bundle["position_mode_moment"].values)
     shapes, turns = bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values
     frames = [str(frame) for frame in bundle["frame"].values]
-    accelerations = np.einsum("tji,tj->ti", R_WB, motions.link(i).a - model.gravity)
-    forces = -accelerations @ bundle["modal_first_moment"].values
-    for joint, (frame, sign) in _ports(model.scene, name).items():
-        k = frames.index(frame)
-        moment, force = (sign * np.einsum("tji,tj->ti", R_WB, part) for part in loads[joint])
-        forces = forces + force @ shapes[k] + moment @ turns[k]
+    for frame, moment, force in _acting(motions, name, joints):
+        k = frames.index(frame.partition(".")[2])
+        about = moment - cross(motions.positions([frame])[:, 0], force)
+        turning, pushing = (np.einsum("tji,tj->ti", own.R, part) for part in (about, force))
+        forces += pushing @ shapes[k] + turning @ turns[k]
     return np.asarray(forces)
+
+
+def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[Acting]:
+    """What acts on a body at its frames: joints, paths, loads; moments about the kernels' origin."""
+    model, acting = motions.model, list[Acting]()
+    for joint, (frame, sign) in _ports(model.scene, name).items():
+        moment, force = joints[joint]
+        second = motions.positions([model.scene.joint[joint].between[1]])[:, 0]
+        acting.append((f"{name}.{frame}", sign * (moment + cross(second, force)), sign * force))
+    paths = [one for one in path_wrenches(model, motions.seen) if one[0].partition(".")[0] == name]
+    return acting + paths + on_frames(model, motions.seen, name)
 
 
 def openings(

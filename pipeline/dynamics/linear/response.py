@@ -5,7 +5,7 @@ Small motions are those of the links, x, and of the bodies' elastic coordinates,
 
 .. math:: G x + B q = 0, \qquad M\,(\ddot x, \ddot q) + K q = f(t), \qquad M = \sum_b J_b^T M_b J_b
 
-with the forces f of joints, inertia and gravity on deformations in the ideal motion, and the mass of the moving
+with the forces f of joints, loads, inertia and gravity on deformations in the ideal motion, and the mass of the moving
 links. The vibrations are those of the assembled mechanism. From rest, each of their coordinates is quasi-static plus a
 vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
 undamped). Rates are those of the vibrations; joint forces follow from accelerations, by the joint's adjoint solution.
@@ -80,7 +80,7 @@ def response(
         n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
     ]
     loads = joint_wrenches(motions, held)
-    forces = np.hstack([clearance_response.modal_forces(model, motions, n, b, loads)[once] for n, b in bundles.items()])
+    forces = np.hstack([clearance_response.modal_forces(motions, n, b, loads)[once] for n, b in bundles.items()])
     joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]

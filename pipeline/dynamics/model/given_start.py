@@ -1,4 +1,4 @@
-"""What a scene says of its start, against what its drives and joints make of it: refused, or mended and reported."""
+"""Contradictions between the start that a scene gives and its drives and joints: refused, or corrected and reported."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
-#: a start further from its drive's law than this, as fraction of the mechanism's size or in rad, is a contradiction
+#: a start that is further from its drive's law than this is refused, as a fraction of the mechanism's size and in rad
 FAR_FROM_LAW, FAR_ANGLE = 0.05, 0.1
-#: what is moved by less than this, as fraction of the mechanism's size or in rad, was given as well as it was written
+#: corrections below this, as a fraction of the mechanism's size or in rad, come from the digits that were written
 WRITTEN = 1e-6
-#: most bodies of which a mend is reported one by one
+#: largest number of bodies whose correction is reported one by one
 MOST_REPORTED = 8
 
 
 @dataclass(frozen=True)
 class Miss:
-    """A coordinate whose start, in the poses given, is not where a drive's law or the scene starts it [m or rad].
+    """A coordinate whose value `now` in the given poses is not the `value` of a drive's law or of the scene [m or rad].
 
-    rule: what starts it at `value`, in words.  drive: its drive, or nothing.
-    of_path: the coordinate is one of a path, not of a joint.
+    rule: name of what prescribes `value`.  drive: its drive, or None.
+    of_path: True for a coordinate of a path, not of a joint.
     """
 
     drive: str | None
@@ -48,12 +48,12 @@ class Miss:
 
     @property
     def size(self) -> float:
-        """Difference of the two; angles that differ by whole turns are one."""
+        """Absolute difference of the two values [m or rad]; angles are compared modulo full turns."""
         difference = self.now - self.value
         return abs((difference + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(difference)
 
     def text(self) -> str:
-        """What is given, and what the law says."""
+        """Return a sentence with both values and their difference."""
         unit = "rad" if self.turning else "m"
         return (
             f"{self.what} starts at {_written(self.now)} {unit} in the poses given, and at "
@@ -63,14 +63,14 @@ class Miss:
 
 
 def _written(value: float) -> str:
-    """A coordinate [m or rad] in words; rounding of poses is nought."""
+    """Return a coordinate [m or rad] as text; values below 1e-12 are rounding and become 0."""
     return f"{0.0 if abs(value) < 1e-12 else value:.6g}"
 
 
 def misses(
     mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement], given: Mapping[str, Pieces]
 ) -> list[Miss]:
-    """Starts of coordinates against the poses that the scene gives; a body without a pose contradicts nothing.
+    """Return coordinates whose prescribed start contradicts the given poses; bodies without a pose are not examined.
 
     given: laws that replace the scene's; they were made for these poses and are not examined.
     """
@@ -88,7 +88,7 @@ def misses(
 
 
 def given_links(mechanism: Mechanism) -> set[int]:
-    """Links whose pose the scene gives, the ground among them."""
+    """Return the links whose pose the scene gives, and the ground."""
     bodies = mechanism.scene.body
     return {0} | {
         i
@@ -130,9 +130,9 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
 
 
 def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
-    """InputError for poses given that contradict a joint's drive by more than a mend may move them.
+    """Raise InputError for given poses that contradict a joint's drive by more than a correction may move them.
 
-    What a path leads is put where the path begins, however far that is, and reported: the path says where the body is.
+    A frame on a path is moved to the start of the path, however far that is, and the correction is reported.
     """
     for miss in far:
         if miss.of_path:
@@ -150,7 +150,7 @@ def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
 
 
 def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[str, Pieces]) -> None:
-    """InputError for starts of driven coordinates that are not those of the drives' laws.
+    """Raise InputError for given starts of driven coordinates that differ from the drives' laws.
 
     given: laws that replace the scene's; they were made for this start.
     """
@@ -172,7 +172,7 @@ def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[
 
 
 def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
-    """A sentence about the bodies that do not start where the scene gives them, with amounts; else nothing.
+    """Return a sentence that lists bodies which do not start where the scene gives them, with amounts; else nothing.
 
     now: frames of all links at the start.
     """
