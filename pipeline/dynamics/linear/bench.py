@@ -188,7 +188,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
 
 
 def rows(bench: Bench, states: np.ndarray) -> np.ndarray:
-    """Return rows of the record for states; contacts keep their modes."""
+    """Return rows of the record for states, with all contacts in mode 1: a contact acts where it penetrates."""
     return observation.rows_of(bench.engine, states, bench.time, 1.0, NO_IMPACT)
 
 

@@ -101,7 +101,7 @@ def _symmetric(K: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 def _principal(K: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return eigenvalues and axes of a symmetric stiffness; limp motions have the eigenvalue 0.
+    """Return eigenvalues and axes of a symmetric stiffness; `limp` motions have the eigenvalue 0.
 
     For a positive definite one, the singular values of its Cholesky factor are the frequencies: rounding
     is then relative to the highest frequency, not to its square.

@@ -29,7 +29,7 @@ def apply(d, k):
 
 
 def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:
-    """Return viscous coefficient [N s/m or N m s/rad], static and dynamic friction [N or N m], and their speeds."""
+    """Return the load's row: viscous coefficient [N s/m or N m s/rad], dry friction [N or N m] and its speeds."""
     viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
     if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
         raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")

@@ -22,7 +22,7 @@ def apply(d, k):
 
 
 def row(load: JointSpring, path: str, coordinate: Coordinate) -> Row:
-    """Return stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], and rest value [m or rad]."""
+    """Return the load's row: stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
     kind = "torsional " if coordinate.turning else ""
     stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")
     if stiffness < 0.0 or damping < 0.0 or stiffness == damping == 0.0:
