@@ -224,7 +224,7 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     forces = bias(engine)
     if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")
-    slip = engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)]
+    slip = engine.view(m.RESIDUAL_RATE)[selection.selected_indices(engine.model, engine.h)]
     return Balance(modes_of(engine.model.arrays) @ forces, *inertia(engine), slip)
 
 
