@@ -75,7 +75,8 @@ def command(options: argparse.Namespace) -> None:
 def levels(scene: Scene, workplace: Workplace) -> str:
     """What three accuracies of all watched quantities call for, as a table.
 
-    Raises InputError for a scene without effects, or that watches nothing.
+    Raises InputError for a scene without effects, or that watches nothing; where no accuracy has a plan, what the last
+    one was refused for.
     """
     from flexclear.pipeline.post.answers.plan import levels as shown
 
@@ -84,7 +85,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
         try:
             plans[level] = bring(asking(scene, level), workplace).made.dataset()
         except (InputError, FailedTasksError) as error:
-            if not variants.effects(scene):
+            if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
             plans[level] = str(error)
     return as_markdown(shown(plans))
