@@ -40,18 +40,18 @@ OPTIONS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "help": "change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
         },
     ),
-    "jobs": (("--jobs",), {"type": int, "metavar": "N", "help": "processes at most; default: one for each core"}),
+    "jobs": (("--jobs",), {"type": int, "metavar": "N", "help": "number of processes at most (default: one per core)"}),
     "limit": (
         ("--limit",),
         {
             "metavar": "TIME",
-            "help": "stop in good order after, e.g., 2h (exit code 4); what is finished is not computed again",
+            "help": "stop after this time, such as 2h, with exit code 4; finished results are stored",
         },
     ),
     "budget": (("--budget",), {"metavar": "TIME", "help": "processor time for trial runs, such as 10s, 2min or 1h"}),
     "json": (("--json",), {"action": "store_true", "help": "print the results as JSON"}),
-    "quiet": (("-q", "--quiet"), {"action": "store_true", "help": "say nothing but errors, warnings and results"}),
-    "verbose": (("-v", "--verbose"), {"action": "store_true", "help": "keep every line of progress, with times"}),
+    "quiet": (("-q", "--quiet"), {"action": "store_true", "help": "print only errors, warnings and results"}),
+    "verbose": (("-v", "--verbose"), {"action": "store_true", "help": "print every line of progress, with times"}),
 }
 
 

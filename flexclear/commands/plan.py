@@ -36,9 +36,9 @@ LEVELS = ("10 %", "1 %", "0.1 %")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
-    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
+    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="also write the planned scene here (one scene)")
     parser.add_argument(
-        "--verify", action="store_true", help="run the full scene and say what the plan's true error is"
+        "--verify", action="store_true", help="also run the full scene, and report the plan's true error"
     )
 
 

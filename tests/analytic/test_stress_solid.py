@@ -27,8 +27,7 @@ from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.model import solid_of, unknowns_of
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.stress.solid import at_nodes
-from tests.analytic import stress_runs
-from tests.analytic.mechanism_runs import bundles
+from tests.analytic.mechanism_runs import bundles, run_with_sections
 from tests.analytic.solid_models import ALUMINIUM, block, build
 
 SIZE = (0.1, 0.02, 0.01)
@@ -378,7 +377,7 @@ def test_a_part_without_a_clear_node_is_refused(tmp_path: Path) -> None:
 
 def test_a_rod_and_a_solid_are_recorded_side_by_side(tmp_path: Path) -> None:
     """The peak of a rod is that of its sections, its principal stresses those of bending and shear at that fibre."""
-    run = stress_runs.run("checks/clamped_rod", {"time.end": "1 ms"})
+    run = run_with_sections("checks/clamped_rod", {"time.end": "1 ms"})
     largest = run["peak_von_mises_stress"].max("section")
     assert run["gauge"].values.tolist() == ["rod"]
     assert run["von_mises_stress"].sel(gauge="rod").values == pytest.approx(largest.values, rel=1e-12)
@@ -413,7 +412,7 @@ def test_pictures_show_what_is_recorded(tmp_path: Path) -> None:
 
 
 def test_a_run_without_stress_has_no_picture_of_it(tmp_path: Path) -> None:
-    run = stress_runs.run("checks/clamped_rod", {"time.end": "0.2 ms"})
+    run = run_with_sections("checks/clamped_rod", {"time.end": "0.2 ms"})
     bare = run.drop_vars([name for name in run if "gauge" in run[name].dims])
     with pytest.raises(FlexclearError, match=r"--what stress.*\n.*\[output\] stress"):
         mechanism(bare, {}, stressed=True)

@@ -44,7 +44,8 @@ class Resolved:
 class Hysteresis:
     """A law F = K d^n (1 + a d'/d'0); `factor` gives a for the requested coefficient of restitution.
 
-    valid: range of restitutions that the law delivers within RESTITUTION_ERROR. exponent: default exponent n.
+    valid: range of restitutions that the law delivers within RESTITUTION_ERROR.
+    exponent: default exponent n.
     """
 
     name: str

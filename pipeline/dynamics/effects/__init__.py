@@ -121,7 +121,7 @@ def _touches(scene: Scene) -> bool:
 
 
 def _loops(scene: Scene) -> bool:
-    """Return True when joints, contacts, paths or gears close loops; cuts of the tree at shared bodies do not count."""
+    """Return True when joints, contacts, paths or gears close loops; the tree may break some loops of shared bodies."""
     if scene.gear:
         return True
     paths = [("", drive.frame) for drive in scene.drive.values() if isinstance(drive, PathDrive)]

@@ -21,25 +21,31 @@ PACKAGE = "flexclear.pipeline.dynamics.effects"
 class Effect:
     """An effect; it names functions of the modules in its folder as ``"module:function"``.
 
-    name: of its folder. kinds: for a scene with the effect the kinds by which its code is composed, often none; None
-    for other scenes. family: package below `dynamics` whose members these kinds are. named: family members that it
-    names in a scene: family, name, and key path in the scene. wiring, numbers: rows of its tables in h and f by table
-    name (`memory`). A table in h adds a size ``n_<table>`` to the header, a ledger the size ``<name>_slot``.  work:
-    likewise in w, each after the number of its rows. stretches: arrays in w, each with its length, as `memory` writes
-    them. compose: arguments that it adds to generated files, or replaces, by the point in `compile.sources` where it
-    does so.  In their texts, ``<module.name>`` is a name in its folder, ``{file}`` the `compile.sources.Composition`,
-    and ``{kinds}`` the tuple of the modules of its kinds. changeable: keys of a scene, as ``table.key``, that change
-    only numbers of the effect (`model.refill`). touches: True when it has contacts, which open and close at events.
-    fill: ``fill(filling)`` -> rows of the tables by name (`model.filling`). ledger: ``ledger(mechanism, energies,
-    lengths)`` -> groups of its block of the ledger (`model.filling.blocks`). guards: ``guards(mechanism)`` -> rows of
-    the table GUARDS, on which steps end. states: ``states(model, sites, internal)`` -> its internal states that follow
-    from the frames of sites (`model.initial.of_effects`). samples: ``sampler(engine)`` -> ``sample(y, t)``, the state
-    after a break of the run, from the state before. losses: ``losses(model)`` -> the variables of its ledger that are
-    losses (`run.ledger.Losses`). refuses: ``refuse(model, trajectory, seen)``, which raises SolverError for an unusable
-    run. explains: ``explanation(engine)`` -> the reason why the run stopped, in words, or None. records:
-    ``series(model, seen)`` -> variables and coordinates of the run's dataset, by prefixes of the variables' names.
-    acts: ``acting(model, seen)`` -> frames on which it acts, moments and forces (`record.wrenches`). warns:
-    ``warnings(run)`` -> warnings about the results of a run.
+    name: of its folder.
+    kinds: for a scene with the effect the kinds by which its code is composed, often none; None for other scenes.
+    family: package below `dynamics` whose members these kinds are.
+    named: family members that it names in a scene: family, name, and key path in the scene.
+    wiring, numbers: rows of its tables in h and f by table name (`memory`). A table in h adds a size ``n_<table>`` to
+    the header, a ledger the size ``<name>_slot``.  work: likewise in w, each after the number of its rows.
+    stretches: arrays in w, each with its length, as `memory` writes them.
+    compose: arguments that it adds to generated files, or replaces, by the point in `compile.sources` where it does so.
+    In their texts, ``<module.name>`` is a name in its folder, ``{file}`` the `compile.sources.Composition`, and
+    ``{kinds}`` the tuple of the modules of its kinds.
+    changeable: keys of a scene, as ``table.key``, that change only numbers of the effect (`model.refill`).
+    touches: True when it has contacts, which open and close at events.
+    fill: ``fill(filling)`` -> rows of the tables by name (`model.filling`).
+    ledger: ``ledger(mechanism, energies, lengths)`` -> groups of its block of the ledger (`model.filling.blocks`).
+    guards: ``guards(mechanism)`` -> rows of the table GUARDS, on which steps end.
+    states: ``states(model, sites, internal)`` -> its internal states that follow from the frames of sites
+    (`model.initial.of_effects`).
+    samples: ``sampler(engine)`` -> ``sample(y, t)``, the state after a break of the run, from the state before.
+    losses: ``losses(model)`` -> the variables of its ledger that are losses (`run.ledger.Losses`).
+    refuses: ``refuse(model, trajectory, seen)``, which raises SolverError for an unusable run.
+    explains: ``explanation(engine)`` -> the reason why the run stopped, in words, or None.
+    records: ``series(model, seen)`` -> variables and coordinates of the run's dataset, by prefixes of the variables'
+    names.
+    acts: ``acting(model, seen)`` -> frames on which it acts, moments and forces (`record.wrenches`).
+    warns: ``warnings(run)`` -> warnings about the results of a run.
     """
 
     name: str

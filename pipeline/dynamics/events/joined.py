@@ -84,8 +84,8 @@ def _raised(model: Model) -> float:
     return -float(mass * model.gravity @ model.mechanism.origin)
 
 
-def joined(scene: Scene, phases: Sequence[Phase], doubts: Sequence[str]) -> LabelledArrays:
-    """Return the dataset of a run with events (schema RUN); doubts: sentences for its warnings."""
+def joined(scene: Scene, phases: Sequence[Phase], notes: Sequence[str]) -> LabelledArrays:
+    """Return the dataset of a run with events (schema RUN); notes: sentences for its warnings."""
     runs = [phase.run for phase in phases if phase.run is not None]
     parts = [recorded(run) for run in runs]
     names = {dim: _names(parts, dim) for dim in dict.fromkeys(d for data in parts for d in data.sizes)}
@@ -110,7 +110,7 @@ def joined(scene: Scene, phases: Sequence[Phase], doubts: Sequence[str]) -> Labe
     coords = frozenset(name for data in parts for name in data.coords if name in made)
     table = _table(phases, parts)
     whole = LabelledArrays(made | table, coords | {n for n in table if n in EVENT_COORDS})
-    facts = attributes(scene) | _facts(parts, doubts)
+    facts = attributes(scene) | _facts(parts, notes)
     facts["events"] = "\n".join(_sentence(one, loss) for one, loss in _events(phases))
     schema = RUN | {name: replace(RUN[name], gaps=True) for name in gaps}
     return conformed(whole, schema, title=f"Motion of {subject(scene)}", **facts)
@@ -247,7 +247,7 @@ def _continued(listed: Sequence[dict[str, Any]], one: dict[str, Any], start: flo
     return True
 
 
-def _facts(parts: Sequence[LabelledArrays], doubts: Sequence[str]) -> dict[str, Any]:
+def _facts(parts: Sequence[LabelledArrays], notes: Sequence[str]) -> dict[str, Any]:
     """Return the attributes of all phases: sums of counts, the largest of other numbers, all sentences."""
     facts: dict[str, Any] = {}
     for name in dict.fromkeys(n for data in parts for n in data.attrs):
@@ -258,5 +258,5 @@ def _facts(parts: Sequence[LabelledArrays], doubts: Sequence[str]) -> dict[str, 
             facts[name] = "\n".join(dict.fromkeys(line for text in values for line in text.split("\n") if line))
         else:
             facts[name] = sum(values) if COUNTS.fullmatch(name) else max(values)
-    facts["warnings"] = "\n".join(dict.fromkeys([*filter(None, [facts.get("warnings", "")]), *doubts]))
+    facts["warnings"] = "\n".join(dict.fromkeys([*filter(None, [facts.get("warnings", "")]), *notes]))
     return facts

@@ -70,12 +70,12 @@ def simulated(
             start, happened = plan.changed(event, *after, phase)
         phases[-1] = replace(phase, happened=happened)
         progress(None, f"at t = {phase.end:.6g} s: {event} ({happened.kind})")
-    doubts = [f"event {name} did not happen in this run" for name in waiting]
+    notes = [f"event {name} did not happen in this run" for name in waiting]
     if scene.contacts() or scene.stop:
-        doubts.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
-    for doubt in doubts:
-        progress(None, f"warning: {doubt}")
-    return joined(scene, phases, doubts)
+        notes.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
+    for note in notes:
+        progress(None, f"warning: {note}")
+    return joined(scene, phases, notes)
 
 
 @contextmanager

@@ -17,17 +17,17 @@ from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, ill
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
-from flexclear.pipeline.dynamics.model.laws import NONE
+from flexclear.pipeline.dynamics.model.laws import NO_LAWS
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.placing import assemblies, chosen
+from flexclear.pipeline.dynamics.model.placing import ambiguity, assemblies
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
 #: residuals of joints below this fraction of the mechanism's size come from rounded input
 MEANT_TO_FIT = 1e-4
 
 
-def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
+def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS) -> Mechanism:
     """Return the mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
 
     Mechanisms with flexible bodies or paths are only checked: the engine closes them, with deformation and prescribed
@@ -48,15 +48,15 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
     if wrong is not None:
         raise wrong
-    missed = given_start.misses(mechanism, joints, poses, given)
-    given_start.refuse_far(mechanism, missed)
-    residual = max([*residuals(judged, poses).values(), *(miss.size for miss in missed)], default=0.0)
+    contradicted = given_start.contradictions(mechanism, joints, poses, given)
+    given_start.refuse_far(mechanism, contradicted)
+    residual = max([*residuals(judged, poses).values(), *(one.size for one in contradicted)], default=0.0)
     mechanism = replace(mechanism, start_residual=residual, placed=tuple(poses))
     if search:
         return _searched(mechanism, joints, placed, starts)
     asked = bool(starts or mechanism.deformation)
     if mechanism.has_paths or not (mechanism.all_rigid or asked):
-        return settled(mechanism, poses)
+        return with_starts(mechanism, poses)
     closed = close(mechanism, joints, poses)
     fitting = way(mechanism.scene, "frames to a tolerance") if closed is None else None
     if fitting is not None and (scene := fitting.fitted(mechanism, joints, poses)) is not None:
@@ -65,7 +65,7 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     if closed is None and mechanism.all_rigid:
         _refuse_drives(mechanism, joints, poses)
         raise _impossible(mechanism, joints, poses)
-    return settled(mechanism, closed or poses)
+    return with_starts(mechanism, closed or poses)
 
 
 def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> Mechanism:
@@ -77,10 +77,10 @@ def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], 
         if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
             raise _out_of_reach(mechanism, joints)
         raise _impossible(mechanism, joints, [link.start for link in mechanism.links])
-    return replace(settled(mechanism, candidates[0].poses), choice=chosen(mechanism, joints, candidates, starts))
+    return replace(with_starts(mechanism, candidates[0].poses), choice=ambiguity(mechanism, joints, candidates, starts))
 
 
-def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
+def with_starts(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
     """Return the mechanism with these start poses; massless links of joints follow from the joints' coordinates."""
     links, settled_poses = [], list(poses)
     for i, link in enumerate(mechanism.links):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 #: residuals of the start above this fraction of the mechanism's size are an error of the scene, not rounding
 WORST_GUESS = 0.05
 #: gap [m] above which a length may have been given in mm without a unit
-BARE = 1.0
+LIKELY_MILLIMETRES = 1.0
 #: residuals, in units of the mechanism's size, below which nothing is moved, and at which closing may end; with large
 #: coordinates, so many roundings of these instead if that is more
 CLOSED_EXACTLY, CLOSED_ENOUGH = 1e-13, 1e-11
@@ -176,7 +176,7 @@ def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Seque
                 f"'{a}' and '{b}' start {gap:.3g} m apart, where a {joint.edge.kind} joint holds them together "
                 f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
                 "correct the poses of the bodies, or the frames"
-                + ("; bare numbers are in metres" if gap >= BARE else ""),
+                + ("; bare numbers are in metres" if gap >= LIKELY_MILLIMETRES else ""),
             )
         if turned > WORST_GUESS:
             return InputError(

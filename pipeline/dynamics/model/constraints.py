@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
-from flexclear.pipeline.dynamics.model.laws import NONE, drive_laws
+from flexclear.pipeline.dynamics.model.laws import NO_LAWS, drive_laws
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
@@ -74,7 +74,7 @@ class Constraint:
 
 
 def constraints(
-    mechanism: Mechanism, given: Mapping[str, Pieces] = NONE, starts: Sequence[Given] = ()
+    mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, starts: Sequence[Given] = ()
 ) -> list[Constraint]:
     """Return all joints but contacts and paths: those of the tree in the order of its links, then the closures.
 

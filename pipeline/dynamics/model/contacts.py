@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 #: mechanism of 10 cm [1/s]: in a mechanism of micrometres 1 um/s would be fast
 LEAST_RATE, SLOW_IMPACT = 1e-6, 1e-5
 #: (outer site, inner site) of each contact
-Touching = Sequence[tuple[int, int]]
+SitePairs = Sequence[tuple[int, int]]
 
 
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
@@ -34,15 +34,15 @@ def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
 
 
 def fill(
-    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching, gauges: Gauges, slot: int
+    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], site_pairs: SitePairs, gauges: Gauges, slot: int
 ) -> dict[Any, Any]:
     """Return the tables CONTACTS and CONTACT_NUMBERS.
 
-    touching: (outer site, inner site) of each contact.  gauges: receives those of the stops.  slot: ledger index of the
+    site_pairs: (outer, inner) sites of each contact.  gauges: receives those of the stops.  slot: ledger index of the
     first bristles.
     """
     mechanism, rows, reals, first = numbering.mechanism, [], [], numbering.nq + numbering.nv + slot
-    for contact, law, sites in zip(mechanism.contacts, laws, touching, strict=True):
+    for contact, law, sites in zip(mechanism.contacts, laws, site_pairs, strict=True):
         name, joint, *_ = contact
         length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0

@@ -81,7 +81,7 @@ def _body(mechanism: Mechanism, link: int) -> tuple[str, Labelled]:
     return name, bundle
 
 
-def bow(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray | None:
+def shortening(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray | None:
     """Return a bent body's shortening per pair of modes at a frame [1/(kg m)], or first moment [1/m]; (mode, mode).
 
     link: a flexible one.  frame: its name in the bundle, None for the first moment.  None without stiffening in the
@@ -102,16 +102,16 @@ def bow(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray
 
 
 def shift(
-    shape: np.ndarray, bow: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
+    shape: np.ndarray, shortening: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     r"""Return displacement :math:`S q + \tfrac12 q^T B q\, e_x` of a point in the body frame, and its two rates.
 
-    shape: S, (3, mode).  bow: B, (mode, mode), the shortening of a bent beam; None where the scene leaves it out.
+    shape: S, (3, mode).  shortening: B of a bent beam, (mode, mode); None where the scene leaves it out.
     q, u, du: modal coordinates, rates and second rates, (time, mode).
     """
     displacement, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
-    if bow is not None:
-        bent, turning = q @ bow, u @ bow
+    if shortening is not None:
+        bent, turning = q @ shortening, u @ shortening
         displacement[:, 0] += 0.5 * np.sum(bent * q, axis=1)
         rate[:, 0] += np.sum(bent * u, axis=1)
         second[:, 0] += np.sum(bent * du, axis=1) + np.sum(turning * u, axis=1)
@@ -136,7 +136,7 @@ def _damping(name: str, body: FlexibleBody, bundle: Labelled) -> np.ndarray:
 
 def _forms(mechanism: Mechanism, link: int, n: int) -> list[np.ndarray]:
     """Return int rho B and int rho x B of a body, n n entries each; zeros for a body without stiffening."""
-    first = bow(mechanism, link)
+    first = shortening(mechanism, link)
     second = None if first is None else _body(mechanism, link)[1]["shortening_second_moment"].values
     return [np.zeros(n * n) if form is None else form.ravel() for form in (first, second)]
 
@@ -187,8 +187,8 @@ def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
     if frame is None:
         return False
     _, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
-    drawn = bow(mechanism, link, frame)
-    return any(np.any(shape) for shape in [*shapes, *([] if drawn is None else [drawn])])
+    at_frame = shortening(mechanism, link, frame)
+    return any(np.any(shape) for shape in [*shapes, *([] if at_frame is None else [at_frame])])
 
 
 def coupled(mechanism: Mechanism, link: int) -> bool:
@@ -212,8 +212,8 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
             pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
         chunks: list[np.ndarray] = [(shape @ numbering.bases[link].moving).ravel() for shape in shapes]
         if shortened:
-            drawn = None if frame is None else bow(mechanism, link, frame)
-            chunks.append(np.zeros(n * n) if drawn is None else drawn.ravel())
+            at_frame = None if frame is None else shortening(mechanism, link, frame)
+            chunks.append(np.zeros(n * n) if at_frame is None else at_frame.ravel())
         rows.append((numbering.flexible.index(link), column, len(data)))
         reals.append(pose)
         data += np.concatenate(chunks).tolist()
@@ -228,5 +228,5 @@ def start_place(mechanism: Mechanism, site: Site) -> Placement:
     label = site.frame.partition(".")[2]
     _, moves, turns = frame_shapes(bundle, label)
     rest = np.zeros((1, len(q)))
-    shifted, _, _ = shift(moves, bow(mechanism, site.link, label), q[None], rest, rest)
+    shifted, _, _ = shift(moves, shortening(mechanism, site.link, label), q[None], rest, rest)
     return Placement(site.place.p + shifted[0], rotation_vector_to_matrix(turns @ q) @ site.place.R)

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
 from flexclear.pipeline.dynamics.model.driving import joint_type
-from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift, start_place
+from flexclear.pipeline.dynamics.model.flexible_bodies import shift, shortening, start_place
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.model import Model
@@ -28,7 +28,7 @@ Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 #: errors below this fraction of the requested speeds are rounding
 RIGID = 1e-9
 #: errors of given velocities below this fraction of the speeds come from the digits with which they were written
-WRITTEN = 1e-6
+INPUT_DIGITS = 1e-6
 #: errors above this fraction of the largest given velocity are refused
 WRONG = 0.05
 #: combinations of speeds that change rates by less than this fraction of the largest have no effect, as redundant rows
@@ -189,7 +189,7 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
     if miss > RIGID * equations.fastest:
         speeds, miss = _least(equations.matrix, equations.target)
     largest = float(np.max(np.abs(equations.asked), initial=0.0))
-    if equations.given and miss > max(WRITTEN * equations.fastest, fraction * largest):
+    if equations.given and miss > max(INPUT_DIGITS * equations.fastest, fraction * largest):
         names = ", ".join(path.removeprefix("[body.").removesuffix(".velocity]") for path in equations.given)
         raise InputError(
             equations.given[0],
@@ -220,7 +220,7 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
     """
     requested, changes, unit = with_velocities(model), [], _units(model)
     given = _given(requested)
-    limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
+    limit = INPUT_DIGITS * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
     for name, row in zip(requested, given, strict=True):
         change = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
         if np.nanmax(change / unit) > limit:
@@ -231,7 +231,7 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
             )
     for rate in given_rates(model):
         change = abs(rate.of(sites, y[model.speeds]) - rate.requested)
-        if change > WRITTEN * (_slow(model) * rate.size + abs(rate.requested)):
+        if change > INPUT_DIGITS * (_slow(model) * rate.size + abs(rate.requested)):
             changes.append(
                 f"the start velocity {rate.place} was mended so that joints and drives allow it: by {change:.3g}"
             )
@@ -248,13 +248,13 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
         mine, name = model.numbering.modal_positions[i], model.links[i].flexible
         change, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
         unit = model.length * model.links[i].mass ** 0.5
-        if change > max(WRITTEN * unit, WRONG * largest):
+        if change > max(INPUT_DIGITS * unit, WRONG * largest):
             raise InputError(
                 f"[start.modal.{name}.coordinate]",
                 f"joints and drives do not allow this deformation: they change it by {change:.3g} m",
                 "give another one, or replace a joint by one that leaves more motion",
             )
-        if change > WRITTEN * max(largest, WRITTEN * unit):
+        if change > INPUT_DIGITS * max(largest, INPUT_DIGITS * unit):
             changes.append(
                 f"the deformation given for {name} was mended so that joints and drives allow it: "
                 f"by up to {change:.3g} m"
@@ -292,21 +292,21 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
 class Centre:
     """Centre of mass of a body; place: its position in the frame of its link, undeformed.
 
-    shape, bow: its displacement with the modal coordinates, as in `flexible_bodies.shift`.  positions, speeds: indices
-    of these coordinates among the free ones.
+    shape, shortening: its displacement with the modal coordinates, as in `flexible_bodies.shift`.  positions, speeds:
+    indices of these coordinates among the free ones.
     """
 
     link: int
     place: np.ndarray
     shape: np.ndarray
-    bow: np.ndarray | None = None
+    shortening: np.ndarray | None = None
     positions: range = range(0)
     speeds: range = range(0)
 
     def motion(self, frames: np.ndarray, q: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return angular velocity of the body and velocity of its centre of mass, world axes, shape (6,)."""
         frame, bent, bending = frames[self.link], q[None, self.positions], u[None, self.speeds]
-        moved, rate, _ = shift(self.shape, self.bow, bent, bending, np.zeros_like(bent))
+        moved, rate, _ = shift(self.shape, self.shortening, bent, bending, np.zeros_like(bent))
         arm = frame["axes"] @ (self.place + moved[0])
         v = frame["velocity"] + np.cross(frame["omega"], arm) + frame["axes"] @ rate[0]
         return np.concatenate([frame["omega"], v])
@@ -321,7 +321,7 @@ def centre_of(model: Model, name: str) -> Centre:
         return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
-    bent, numbering = bow(model.mechanism, i), model.numbering
+    bent, numbering = shortening(model.mechanism, i), model.numbering
     bent = None if bent is None else bent / link.mass
     return Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
 

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, covers, jump, piec
 from flexclear.pipeline.dynamics.model.driving import prescribed
 
 #: no laws that replace the scene's
-NONE: Mapping[str, Pieces] = MappingProxyType({})
+NO_LAWS: Mapping[str, Pieces] = MappingProxyType({})
 
 
 def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:

@@ -81,7 +81,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
             laws += [checked_law(scene, law, dimension, path) for law, dimension, path in row.laws]
         rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows), len(looks), len(bends)))
         numbers += [*(mechanism.origin if row.located else ()), *row.numbers]
-        looks += [_look(mechanism, numbering, gauges, *one) for one in row.reads]
+        looks += [_read_index(mechanism, numbering, gauges, *one) for one in row.reads]
         bends += row.bends
     counts = [list(kind_of.values()).count(kind) for kind in kinds]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
@@ -94,7 +94,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     return Loaded(tuple(loads), tables, bends, laws)
 
 
-def _look(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str, name: str) -> int:
+def _read_index(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str, name: str) -> int:
     """Return the number of the site, or of the gauge, that an expression reads."""
     scene = mechanism.scene
     if sort == "coordinate":

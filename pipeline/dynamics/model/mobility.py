@@ -17,12 +17,12 @@ from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
-from flexclear.pipeline.dynamics.model.assembly import settled
+from flexclear.pipeline.dynamics.model.assembly import with_starts
 from flexclear.pipeline.dynamics.model.closing import LEAST_GYRATION, close
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.rates import Rates, acting, motions, rates
+from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_axes
 
 #: nearby poses: displacements, in radians and fractions of the mechanism's size; how many are tried, and how many are
 #: enough; fraction of the displacement that must remain when the loops are closed
@@ -92,7 +92,7 @@ def analyse(model: Model) -> Mobility:
     if regular is not None:
         poses, singular = regular, _singular_start(model, here)
         here = rates(model, poses)
-    mobility = Mobility(model.nv, len(here.J), here.rank, _undetermined(model, here, poses), singular)
+    mobility = Mobility(model.nv, len(here.J), here.rank, _self_stressed(model, here, poses), singular)
     _refuse_locked(model, mobility, here)
     _refuse_contradiction(model, here)
     if here.rank < model.nv and model.mechanism.all_rigid:
@@ -118,7 +118,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         closed = close(model.mechanism, joints, _displaced(model, start, motion))
         if closed is None:
             continue
-        there = [link.start for link in settled(model.mechanism, closed).links]
+        there = [link.start for link in with_starts(model.mechanism, closed).links]
         away = _distance(start, there, model.length) > LEFT * NEARBY[k % 2]
         (left if away else stayed).append((rates(model, there).rank, there))
         evidence += away
@@ -156,17 +156,17 @@ def _displaced(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> 
     return moved
 
 
-def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> frozenset[str]:
+def _self_stressed(model: Model, here: Rates, poses: Sequence[Placement]) -> frozenset[str]:
     """Return the joints that carry part of a self-stress: reactions in balance with each other, without any load."""
     if here.rank == len(here.J):
         return frozenset()
     mechanism, L = model.mechanism, model.length
-    stresses = here.stresses / np.max(np.abs(here.stresses), axis=1, keepdims=True)
-    carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
+    self_stresses = here.self_stresses / np.max(np.abs(here.self_stresses), axis=1, keepdims=True)
+    carried = np.zeros((len(mechanism.links), 6, len(self_stresses)))  # wrench that a link takes from its closures
     joints, row = set[str](), 0
     for closure in model.closures:
-        stress = stresses[:, row : row + len(closure.rows)]
-        for acts in acting(closure, poses, L):
+        stress = self_stresses[:, row : row + len(closure.rows)]
+        for acts in row_axes(closure, poses, L):
             wrench = acts.wrenches(L).T @ stress.T
             carried[acts.a.link] -= wrench
             carried[acts.b.link] += wrench
@@ -202,7 +202,7 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
 
 def _refuse_contradiction(model: Model, here: Rates) -> None:
     """Raise InputError for moving drives that the loops couple: their laws would have to agree."""
-    drives = [name for name, tied in zip(model.drives, here.tied, strict=True) if tied]
+    drives = [name for name, tied in zip(model.drives, here.dependent_drives, strict=True) if tied]
     moving = [name for name in drives if moves(model, name)]
     if not moving:
         return

@@ -82,7 +82,7 @@ class Model:
         return {name: rows[name] for name, load in self.scene.forces().items() if isinstance(load, kinds)}
 
 
-def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:
+def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NO_LAWS) -> Model:
     """Assemble a mechanism, number it and fill its tables.
 
     given: laws that replace the scene's: of prescribed coordinates by name, and of loads along joints as ``load.NAME``.
@@ -95,7 +95,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
 def filled(
     mechanism: Mechanism,
     numbering: Numbering,
-    given: Mapping[str, Pieces] = laws.NONE,
+    given: Mapping[str, Pieces] = laws.NO_LAWS,
     like: Model | None = None,
 ) -> Model:
     """Return the model of an assembled mechanism; `given` as in `tabulate`.
@@ -105,7 +105,7 @@ def filled(
     normals = contacting.resolve(mechanism)
     closing: list[Closure | Coupling] = [*mechanism.closures, *couplings(mechanism)]
     looped, ordered = wiring.closures(numbering, closing) if like is None else ({}, like.closures)
-    touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
+    site_pairs = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
     gauges = Gauges()
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
@@ -116,7 +116,7 @@ def filled(
     books = _books(slots)
     tables = {
         m.LINK_NUMBERS: [_link_numbers(*one) for one in zip(mechanism.links, _borne(mechanism), strict=True)],
-        **contacting.fill(numbering, parts, normals, touching, gauges, slots["bristles"]),
+        **contacting.fill(numbering, parts, normals, site_pairs, gauges, slots["bristles"]),
         **laws.fill([*in_tree, *loaded.laws]),
         **loaded.tables,
         m.LOADS: _booked(mechanism, loaded, books),

@@ -77,7 +77,7 @@ def assemblies(
     )
 
 
-def chosen(
+def ambiguity(
     mechanism: Mechanism, joints: Sequence[Constraint], candidates: Sequence[Assembly], starts: Sequence[Given]
 ) -> str:
     """Return a sentence that lists several assemblies between which the scene does not choose; else an empty text."""

@@ -106,7 +106,7 @@ def unused_frames(mechanism: Mechanism) -> list[str]:
     return [name for name in mechanism.frames if name not in written]
 
 
-def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
+def missing_joints(mechanism: Mechanism) -> list[tuple[str, str, str]]:
     """Return unused frames at one point of two unconnected bodies, where a joint may be missing: body, text, remedy."""
     parts = (*mechanism.scene.joint.values(), *mechanism.scene.load.values())
     connected = {frozenset(_links(mechanism, part.between)) for part in parts if hasattr(part, "between")}

@@ -92,12 +92,12 @@ class Rates:
         return self.column[:nv, None] * self.decomposed[2][self.rank :].T
 
     @property
-    def stresses(self) -> np.ndarray:
+    def self_stresses(self) -> np.ndarray:
         """Left null space of J: multipliers in balance without loads (self-stresses), shape (rows - rank, rows)."""
         return self.decomposed[0][:, self.rank :].T * self.row
 
     @property
-    def tied(self) -> np.ndarray:
+    def dependent_drives(self) -> np.ndarray:
         """True for each driven coordinate in a dependence among driven coordinates alone; shape (drives,)."""
         left = self.decomposed[0][:, self.rank :].T @ self.known
         return np.asarray(np.max(np.abs(left), axis=0, initial=0.0) > ZERO_SINGULAR_VALUE)
@@ -110,7 +110,7 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
     first = 0
     for closure in model.closures:
-        for acts in acting(closure, poses, L):
+        for acts in row_axes(closure, poses, L):
             mine, factor = slice(first, first + len(acts.factor)), acts.factor
             route = uncommon(closure_route(numbering, numbering.site(acts.a), numbering.site(acts.b)))
             for coordinate, column, sign in route:
@@ -127,7 +127,7 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     return Rates(J[:, : model.nv], J[:, model.nv :], by_row, by_column)
 
 
-class Acting(NamedTuple):
+class RowAxes(NamedTuple):
     """Rows of a closure between two sites a and b: each a rotation about a direction, or a displacement along one.
 
     directions: unit vector of each row where the loop is closed, (rows, 3).  turning: True for rotations, (rows,).
@@ -148,19 +148,19 @@ class Acting(NamedTuple):
         return self.factor[:, None] * np.hstack([moment, length * along])
 
 
-def acting(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[Acting]:
+def row_axes(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[RowAxes]:
     """Return the rows of a closure, in radians or the mechanism's size, for each pair of sites that it acts on."""
     frames = [(poses[a.link].of(a.place), poses[b.link].of(b.place)) for a, b in closure.ends]
     if isinstance(closure, Coupling):
         unit = 1.0 if closure.second.coordinate.turning else length
         sides = zip(closure.ends, closure.parts, frames, strict=True)
         return [
-            Acting(*ends, side.along(poses)[None], np.array([side.coordinate.turning]), np.array([factor / unit]), B.p)
+            RowAxes(*ends, side.along(poses)[None], np.array([side.coordinate.turning]), np.array([factor / unit]), B.p)
             for ends, (side, factor), (_, B) in sides
         ]
     demanded, (_, B) = demands(closure.edge.kind, *frames[0]), frames[0]
     directions = np.where(demanded.turning[:, None], demanded.wrenches[:, :3], demanded.wrenches[:, 3:])
-    return [Acting(*closure.ends[0], directions, demanded.turning, np.where(demanded.turning, 1.0, 1.0 / length), B.p)]
+    return [RowAxes(*closure.ends[0], directions, demanded.turning, np.where(demanded.turning, 1.0, 1.0 / length), B.p)]
 
 
 def motions(model: Model, poses: Sequence[Placement]) -> Motions:

@@ -139,7 +139,7 @@ def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     return full
 
 
-def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
+def selected_indices(model: Model, h: np.ndarray) -> np.ndarray:
     """Return the index of each selected row among all rows, the order of residuals and their rates."""
     spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in model.arrays.table(m.CLOSURES, h))
     return np.array([k for span in spans for k in span], dtype=np.int64)

@@ -13,7 +13,7 @@ from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
-from flexclear.pipeline.dynamics.model.assembly import assembled, settled
+from flexclear.pipeline.dynamics.model.assembly import assembled, with_starts
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
@@ -82,7 +82,7 @@ def _open(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with each body without a pose put where one joint has it; loops may stay open."""
     starts, placed = given_coordinates(mechanism.scene), given_start.given_links(mechanism)
     joints = constraints(mechanism, starts=starts)
-    return settled(mechanism, guess(mechanism, joints, placed, targets(joints, starts)[1]))
+    return with_starts(mechanism, guess(mechanism, joints, placed, targets(joints, starts)[1]))
 
 
 def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> list[Gap]:

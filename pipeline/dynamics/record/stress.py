@@ -23,7 +23,7 @@ from flexclear.pipeline.core.numerics.rotations import components, first_largest
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.equations.observation import Series, Variables
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import Acting, Wrench, joint_wrenches, on_frames, path_wrenches
+from flexclear.pipeline.dynamics.record.wrenches import FrameWrench, Wrench, joint_wrenches, on_frames, path_wrenches
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -163,9 +163,9 @@ def motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, n
     return Motion(a, omega, alpha, state.q, state.u, state.du), moment, force
 
 
-def _loads(motions: Motions, name: str) -> list[Acting]:
+def _loads(motions: Motions, name: str) -> list[FrameWrench]:
     """Return wrenches on a body by joints, paths and loads: frame, moment about kernels' origin, force; world axes."""
-    model, seen, acting = motions.model, motions.seen, list[Acting]()
+    model, seen, acting = motions.model, motions.seen, list[FrameWrench]()
     for joint, (n, f) in joint_wrenches(motions).items():
         between = model.scene.joint[joint].between
         about_origin = n + np.cross(motions.positions([between[1]])[:, 0], f)

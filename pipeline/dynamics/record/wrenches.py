@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
-Acting = tuple[str, np.ndarray, np.ndarray]  #: frame on which a wrench acts, and the wrench
+FrameWrench = tuple[str, np.ndarray, np.ndarray]  #: frame on which a wrench acts, and the wrench
 
 
 def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> dict[str, Wrench]:
@@ -47,16 +47,16 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     return moments, forces
 
 
-def path_wrenches(model: Model, seen: Observed) -> list[Acting]:
+def path_wrenches(model: Model, seen: Observed) -> list[FrameWrench]:
     """Return for each frame that a drive moves along a path: its name, moment about the kernels' origin, force."""
     tree, drives = _tree(model, seen), model.scene.drive
     paths = {f"drive.{name}": drive.frame for name, drive in drives.items() if isinstance(drive, PathDrive)}
     return [(frame, *tree[edge]) for edge, frame in paths.items() if edge in tree]
 
 
-def on_frames(model: Model, seen: Observed, body: str) -> list[Acting]:
+def on_frames(model: Model, seen: Observed, body: str) -> list[FrameWrench]:
     """Return the wrenches on a body from loads and effects, without joints and paths."""
-    on_each: list[Acting] = []
+    on_each: list[FrameWrench] = []
     if model.loads:
         from flexclear.pipeline.dynamics.record.loads import on_loaded_frames
 

@@ -34,7 +34,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import coordinate_of
-from flexclear.pipeline.dynamics.model.laws import NONE
+from flexclear.pipeline.dynamics.model.laws import NO_LAWS
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
@@ -71,7 +71,7 @@ def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def _started(
-    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, laws: Mapping[str, Pieces] = NONE
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, laws: Mapping[str, Pieces] = NO_LAWS
 ) -> tuple[Engine, np.ndarray]:
     """Return an engine and its consistent start."""
     engine = prepare(tabulate(build(scene, bundles), laws), progress)

@@ -21,10 +21,11 @@ class Friction:
 
     traction: kernel (z, slip, f_n, p) -> (force, loss, stored, z_rate): force [N] on the ball against the sliding
     velocity `slip` [m/s] (vector in the tangent plane), lost power [W] >= 0, stored energy [J], and the rate of the
-    bristle deflection z [m] in the axes of slip (zeros for a law without memory). constants: its numbers in p, six at
-    most. stick_speed: sliding speed below which the law sticks [m/s], 0 for laws without sticking. kinks: two sliding
-    speeds [m/s] at which slope or curvature of the coefficient jumps, 0 for none; steps end there. bristle: the size of
-    z [m], or None for a law without memory.
+    bristle deflection z [m] in the axes of slip (zeros for a law without memory).
+    constants: its numbers in p, six at most.
+    stick_speed: sliding speed below which the law sticks [m/s], 0 for laws without sticking.
+    kinks: two sliding speeds [m/s] at which slope or curvature of the coefficient jumps, 0 for none; steps end there.
+    bristle: the size of z [m], or None for a law without memory.
     """
 
     traction: Callable

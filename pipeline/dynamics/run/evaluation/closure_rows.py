@@ -87,7 +87,7 @@ def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
 
 def row_units(model: Model, h: np.ndarray, length: float) -> np.ndarray:
     """Return the unit of each selected row: a length along an axis [m], 1 between two axes [-]."""
-    kinds = model.arrays.table(m.CLOSURE_ROWS, h)["kind"][selection.kept_places(model, h)]
+    kinds = model.arrays.table(m.CLOSURE_ROWS, h)["kind"][selection.selected_indices(model, h)]
     return np.where(kinds == 0, length, 1.0)
 
 

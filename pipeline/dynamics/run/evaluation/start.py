@@ -10,7 +10,7 @@ from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
-from flexclear.pipeline.dynamics.model.given_start import moved
+from flexclear.pipeline.dynamics.model.given_start import corrected_starts
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.plausibility import refuse_depth
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
@@ -66,7 +66,7 @@ def mends(engine: Engine, y: np.ndarray) -> list[str]:
     model = engine.model
     bent = initial.changed_positions(model, initial.start_state(model), y)
     speeds = initial.changed_velocities(model, frames, engine.table(m.SITE_FRAMES), y)
-    return [*moved(model.mechanism, now), *bent, *speeds]
+    return [*corrected_starts(model.mechanism, now), *bent, *speeds]
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -99,9 +99,9 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 def rates_at_speeds(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.ndarray:
     """Return the rates of a state at the start with other speeds, as nearly as drives and loops allow."""
-    moved = y.copy()
-    moved[engine.model.speeds] = speeds
-    return closure_rows.evaluate(engine, project(engine, moved), engine.start)
+    corrected_starts = y.copy()
+    corrected_starts[engine.model.speeds] = speeds
+    return closure_rows.evaluate(engine, project(engine, corrected_starts), engine.start)
 
 
 def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

@@ -155,7 +155,7 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     still[model.speeds] = 0.0
     engine.attempt(still, t)
     U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
-    pulled = engine.view(m.RESIDUAL_RATE)[selection.kept_places(model, engine.h)]
+    pulled = engine.view(m.RESIDUAL_RATE)[selection.selected_indices(model, engine.h)]
     pulled = pulled / closure_rows.row_units(model, engine.h, model.length)
     if values[-1] > END_OF_REACH * values[0]:
         return ""
