@@ -74,8 +74,8 @@ def _check(options: argparse.Namespace) -> None:
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
     others = {path for path in kernels if files.of_another_build(path)}
     damaged = [path for path in kernels if path not in others and not files.compiled(path)]
-    shown = maintenance.shown_faults(store, store.root)
-    faults = [*inventory.damaged, *shown, *(f"{path} is damaged" for path in damaged)]
+    in_results = maintenance.shown_faults(store, store.root)
+    faults = [*inventory.damaged, *in_results, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:LISTED_FAULTS]:
         print(shown(fault))
     if len(faults) > LISTED_FAULTS:
