@@ -74,7 +74,8 @@ def command(options: argparse.Namespace) -> None:
 def levels(scene: Scene, workplace: Workplace) -> str:
     """Return a table of the plans for three accuracies of all watched quantities.
 
-    Raises InputError for a scene without effects or watched quantities.
+    Raises InputError for a scene without effects or watched quantities, and the last refusal when no accuracy has a
+    plan.
     """
     from flexclear.pipeline.post.answers.plan import levels as shown
 
@@ -83,7 +84,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
         try:
             plans[level] = bring(asking(scene, level), workplace).made.dataset()
         except (InputError, FailedTasksError) as error:
-            if not variants.effects(scene):
+            if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
             plans[level] = str(error)
     return as_markdown(shown(plans))

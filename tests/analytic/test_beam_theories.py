@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.linalg
 
 from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.closed_form import Span
@@ -26,7 +25,6 @@ from tests.analytic.beam_models import (
     WORDS,
     build,
     frequencies,
-    held_system,
     order,
 )
 from tests.analytic.beam_solutions import PAPER_ROD, element_stiffness
@@ -139,19 +137,6 @@ def test_bending_converges_at_order_four_in_both_planes(ends: str, theory: str) 
         error = [frequencies(build(elements=n, theory=theory), plane, ends, 2) / exact - 1.0 for n in elements]
         # the coarsest mesh is not quite in the asymptotic range
         np.testing.assert_allclose(order(elements, np.array(error)), 4.0, atol=0.15)
-
-
-def test_condensing_the_unknowns_inside_a_timoshenko_cell_costs_two_orders() -> None:
-    """Statically condensed it is the element of interdependent interpolation: exact in statics only."""
-    exact = closed_form.bending(SPANS["timoshenko"], "fixed-fixed", 2)
-    elements, errors = [16, 32, 64], []
-    for n in elements:
-        K, M = held_system(build(elements=n, theory="timoshenko"), BENDING, "CC")
-        nodal = 2 * (n - 1)
-        shapes = np.vstack([np.eye(nodal), -np.linalg.solve(K[nodal:, nodal:], K[nodal:, :nodal])])
-        values = scipy.linalg.eigvalsh(shapes.T @ K @ shapes, shapes.T @ M @ shapes)
-        errors.append(np.sqrt(values[:2]) / (2.0 * np.pi) / exact - 1.0)
-    np.testing.assert_allclose(order(elements, np.array(errors)), 2.0, atol=0.1)
 
 
 def test_slender_timoshenko_rods_do_not_lock() -> None:

@@ -26,8 +26,7 @@ from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, engines
-from flexclear.pipeline.post.single_run.series import derive
-from tests.analytic.mechanism_runs import TREE, run
+from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table, frame, ground, joint, rigid, simulated
 from tests.properties.mechanisms import scene as written
 from tests.reference import contact_solutions as exact
@@ -154,19 +153,6 @@ def test_of_concurrent_members_the_first_that_fails_is_reported(monkeypatch: pyt
     with pytest.raises(SolverError, match="member 1"):
         cores.side_by_side(work, 4, lambda _: None)
     assert ended in ([], [2])  # it may not have begun
-
-
-def test_statistics_of_the_members_are_in_the_post_artifact() -> None:
-    post = derive(run("checks/bounce", (("time.end", END),)), members())
-    peaks = members().peak_force.sel(contact="contact").values
-    found = post.peak_force_quantile.sel(contact="contact").values
-    assert found == pytest.approx(np.quantile(peaks, post["quantile"].values), rel=1e-14)
-    assert (np.diff(found) > 0.0).all()
-    assert float(post.impact_count_mean.sel(contact="contact")) == 1.0
-    assert float(post.contact_time_share_mean.sel(contact="contact")) > 0.0
-    speed = members().velocity.sel(body="ball", axis="z").values
-    # rounding of means of speeds of some m/s
-    assert post.velocity_mean.sel(ensemble_body="ball", axis="z").values == pytest.approx(speed.mean(axis=0), abs=1e-12)
 
 
 def carried(**path: Any) -> Scene:

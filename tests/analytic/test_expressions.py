@@ -369,26 +369,6 @@ def test_a_drive_is_switched_to_an_expression_with_a_kink() -> None:
     require_balanced(run, 4.0)
 
 
-def test_a_brake_on_a_wheel_that_an_expression_of_time_drives_slips() -> None:
-    """2 N m sin 6 t, held from 0.2 s on until that is 1.8 N m."""
-    push = {"type": "joint-expression", "joint": "axle", "force": "a * sin(w * t)"}
-    load = {"push": push | {"values": {"a": "2 N m", "w": "6 rad/s"}}}
-    event = {
-        "hold": {"at": "0.15 s", "lock": "joint.axle"},
-        "slip": {"at": "hold.force < -1.8 N m", "release": "event.hold"},
-    }
-    run = wheel(event, load=load)
-    t = np.arcsin(0.9) / 6.0
-    assert float(event_of(run, "slip").event_time) == pytest.approx(t, abs=1e-11)
-
-    def angle(at: float) -> float:
-        return 4.0 * (at / 6.0 - np.sin(6.0 * at) / 36.0)
-
-    after = angle(1.0) - angle(t) - 4.0 / 6.0 * (1.0 - np.cos(6.0 * t)) * (1.0 - t)
-    assert run.joint_position.values[-1, 0] == pytest.approx(angle(0.15) + after, abs=1e-11)
-    require_balanced(run, 1.0)
-
-
 def test_a_load_that_reads_a_joint_goes_with_it() -> None:
     """The force on the rim, -k times the angle, ceases with the axle: the wheel flies on evenly."""
     force = {"type": "point-expression", "frame": "wheel.rim", "values": {"k": "2 N/rad"}}

@@ -192,3 +192,18 @@ def test_errors_of_a_ball_that_slides_down_a_slope_follow_the_tolerance(rtol: fl
     known = from_kink_to_kink(rate, lambda v: v - kinks, np.array([SPEED]), dataset.time.values)[0]
     assert speeds.min() < COULOMB["v_static"]
     assert np.abs(speeds - known).max() < 2.0 * rtol * SPEED
+
+
+def test_a_slider_crank_with_friction_in_every_joint_moves_as_derived_in_other_coordinates() -> None:
+    dataset = run("checks/rubbing_slider_crank")
+    known = released()
+    # the run is good to 1e-9 or better; friction changes the angle by half a radian
+    angle = dataset["joint_position"].sel(coordinate="O").values
+    assert angle - angle[0] == pytest.approx(known.angle - known.angle[0], abs=1e-6)
+    assert dataset["joint_velocity"].sel(coordinate="P").values == pytest.approx(known.speed, abs=1e-5)
+    for k, name in enumerate("OABP"):
+        load = dataset["joint_bearing_load"].sel(rubbing=name).values
+        assert load == pytest.approx(known.loads[k], rel=1e-4, abs=1e-4)
+    assert dataset.dissipated.values[-1] == pytest.approx(known.lost, rel=1e-6)
+    assert known.lost > 0.1
+    assert "friction of O, A, B, P follows reactions" in dataset.attrs["warnings"]

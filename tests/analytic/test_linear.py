@@ -96,15 +96,6 @@ def test_a_clamped_rod_sags_and_vibrates_as_a_cantilever(tmp_path: Path) -> None
     assert np.sort(found.frequency.values)[:6] == pytest.approx(known, rel=1e-6)
 
 
-def test_unit_modal_mass_and_tip_shape_of_the_first_bending_vibration() -> None:
-    """The tip of a cantilever moves by 2/sqrt(mass) in every bending mode of Euler and Bernoulli."""
-    found = frequencies("checks/clamped_rod")
-    tip = found.frame_translation.sel(frame="rod.top", part="real").isel(vibration=0)
-    mass = 2740.0 * np.pi * 1e-4 * 0.24
-    # rotary inertia of the rod takes (r pi / 2 L)^2, some 1e-3
-    assert np.linalg.norm(tip.values) * np.sqrt(mass) == pytest.approx(2.0, rel=3e-3)
-
-
 @pytest.mark.parametrize(
     "damping",
     [0.02, {"alpha": 30.0, "beta": 1e-6}, {"ratios": [0.01 * (k + 1) for k in range(13)]}],

@@ -285,29 +285,16 @@ def test_clearance_joints_keep_the_ledger_the_loops_and_the_laws(scene: str, cou
     assert (np.diff(dataset.event_time.values) >= 0.0).all()
 
 
-def test_legs_that_mirror_each_other_hit_at_the_same_time() -> None:
-    """Legs 1 and 2 are driven alike; their first closings are simultaneous, and both are found."""
-    dataset = run(ALL)
-    closings = np.flatnonzero(dataset.event_kind.values == "closing")
-    names = dataset.event_contact.values[closings[:2]]
-    assert sorted(names) == ["A1", "A2"]
-    # mirror images in rounding, and each located to 1e-13 of the clearance at 0.2 m/s
-    assert np.diff(dataset.event_time.values[closings[:2]]) == pytest.approx([0.0], abs=1e-12)
-    approach = dataset.event_approach_speed.values[closings[:2]]
-    assert approach[0] == pytest.approx(approach[1], rel=1e-9)
-
-
 # The flexible rod, against sums over mass points, and its own rigid limit --------------------------------------------
 
 
-def at(dataset: xr.Dataset, time: np.ndarray) -> xr.Dataset:
-    """The dataset at some of its output times."""
-    return dataset.sel(time=time, method="nearest", tolerance=1e-9)
+#: a part of the stroke, with some impacts
+BRIEFLY = (("time.end", 0.04),)
 
 
 def test_clearance_first_impacts_are_those_of_the_second_derivation() -> None:
     """Errors grow a thousandfold in a few impacts without damping; the first two are sharp."""
-    known, found = second_derivation("far_csj_cb"), impacts(run("sps4/variants/first_far_csj_cb"))
+    known, found = second_derivation("far_csj_cb"), impacts(run("sps4/variants/first_far_csj_cb", BRIEFLY))
     first = int(np.sum(known["impact_start"] < 0.0095))
     assert first == 2
     # in flight the modes ring at up to 27 kHz, which the default tolerance follows to some 1e-7 m/s
@@ -319,26 +306,25 @@ def test_clearance_first_impacts_are_those_of_the_second_derivation() -> None:
 
 def test_fixed_fixed_modes_leave_the_mechanism_ideal_in_pose_and_velocity() -> None:
     """Both joints sit on end nodes, which these modes do not move."""
-    ideal = run("sps4/ideal").sel(body="platform")
-    fixed = at(run("sps4/far_fixed"), ideal.time.values).sel(body="platform")
+    ideal = run("sps4/ideal", BRIEFLY).sel(body="platform")
+    fixed = run("sps4/far_fixed", BRIEFLY).sel(body="platform").sel(time=ideal.time, method="nearest", tolerance=1e-9)
     assert np.abs(ideal.position.values - fixed.position.values).max() <= 1e-10
     assert np.abs(ideal["quaternion"].values - fixed["quaternion"].values).max() <= 1e-10
     assert np.abs(ideal.velocity.values - fixed.velocity.values).max() <= 1e-10
 
 
-@pytest.mark.parametrize("scene", ["far_free", "far_fixed", "far_cb"])
-def test_ideal_joints_energy_ledger_closes(scene: str) -> None:
-    dataset = run(f"sps4/{scene}")
-    assert np.abs(dataset.energy_error).max() <= 1e-7 * dataset.kinetic.max()
+@pytest.mark.parametrize(
+    "scene, near",
+    [(f"far_{basis}", 1e-7) for basis in ("free", "fixed", "cb")]
+    + [(f"far_csj_{basis}", 1e-6) for basis in ("free", "fixed", "cb")],
+)
+def test_energy_ledger_of_a_flexible_rod_closes(scene: str, near: float) -> None:
+    dataset = run(f"sps4/{scene}", BRIEFLY)
+    assert np.abs(dataset.energy_error).max() <= near * dataset.kinetic.max()
     assert dataset.constraint_error.max() <= 1e-10
-
-
-@pytest.mark.parametrize("scene", ["far_csj_free", "far_csj_fixed", "far_csj_cb"])
-def test_clearance_energy_ledger_closes(scene: str) -> None:
-    dataset = run(f"sps4/{scene}")
-    assert np.abs(dataset.energy_error).max() <= 1e-6 * dataset.kinetic.max()
-    assert dataset.constraint_error.max() <= 1e-10
-    assert dataset.contact_friction_power.max() <= 0.0
+    if "csj" in scene:
+        assert len(impacts(dataset)["start"]) > 3
+        assert dataset.contact_friction_power.max() <= 0.0
 
 
 def rigid_swing(time: np.ndarray) -> np.ndarray:
@@ -366,7 +352,7 @@ def test_swinging_rod_does_not_depend_on_the_reference_condition(tmp_path: Path)
     """Complete bases under two conditions describe one rod, here one of four elements."""
     mesh = tmp_path / "rod.toml"
     mesh.write_text((TREE / "meshes/actuated_rod.toml").read_text().replace("elements = 12", "elements = 4"))
-    short = (("time.end", "5 ms"), ("body.rod.mesh", str(mesh)), ("body.rod.modes.count", 24))
+    short = (("time.end", "2 ms"), ("body.rod.mesh", str(mesh)), ("body.rod.modes.count", 24))
     held = run("checks/swinging_rod", short)
     free = run(
         "checks/swinging_rod",

@@ -38,15 +38,15 @@ from flexclear.pipeline.dynamics.kernels import INTERPRETED
 FUNCTIONS: dict[str, tuple[str, int | None]] = {
     "advance": ("integrator", None),
     "prescribe": ("laws of time", m.PRESCRIBE),
-    "project": ("closing of the loops", m.PROJECT),
-    "retract": ("retractions", m.RETRACT),
-    "observe": ("recorded quantities", None),
+    "project": ("projection onto loop closures", m.PROJECT),
+    "retract": ("retraction of positions", m.RETRACT),
+    "observe": ("outputs", None),
     "evaluate": ("equations of motion", m.EVALUATE),
-    "describe": ("recorded quantities", m.DESCRIBE),
-    DESCRIBED: ("recorded quantities of this mechanism alone", None),
-    WHOLE: ("equations of motion of this mechanism alone", None),
-    SPECIALISED: ("equations of motion of this mechanism alone", None),
-    "resolve": ("integrator's events", m.RESOLVE),
+    "describe": ("outputs", m.DESCRIBE),
+    DESCRIBED: ("specialised outputs", None),
+    WHOLE: ("specialised equations of motion", None),
+    SPECIALISED: ("specialised equations of motion", None),
+    "resolve": ("location of events", m.RESOLVE),
 }
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
@@ -180,7 +180,7 @@ def _bring(folder: Path, files: Mapping[str, Path], tell: Callable[[str], None],
 def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
     seconds = time.monotonic() - began
     so_far = f", {seconds:.0f} s so far" if seconds >= 1.0 else ""
-    tell(f"compiling for this kind of mechanism (once; later runs fetch it from disk): {what}{so_far}")
+    tell(f"compiling {what} (first run of a mechanism of this kind only){so_far}")
 
 
 def _file(folder: Path, name: str, source: str) -> Path:

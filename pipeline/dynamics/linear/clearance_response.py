@@ -39,7 +39,7 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import (
-    Acting,
+    FrameWrench,
     Wrench,
     joint_wrenches,
     on_frames,
@@ -205,9 +205,9 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
     return np.asarray(forces)
 
 
-def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[Acting]:
+def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
     """What acts on a body at its frames: joints, paths, loads; moments about the kernels' origin."""
-    model, acting = motions.model, list[Acting]()
+    model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
         moment, force = joints[joint]
         second = motions.positions([model.scene.joint[joint].between[1]])[:, 0]

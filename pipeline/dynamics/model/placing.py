@@ -71,7 +71,8 @@ def assemblies(
     return sorted(
         distinct,
         key=lambda one: (
-            _distance(mechanism, joints, one.coordinates, hints),
+            # as near to the hints as another one but for rounding: that of the first guess decides
+            round(_distance(mechanism, joints, one.coordinates, hints) / SAME_ASSEMBLY),
             _distance(mechanism, joints, one.coordinates, aim),
         ),
     )
