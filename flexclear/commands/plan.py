@@ -14,7 +14,7 @@ from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.scene.variants import lessened
+from flexclear.pipeline.core.scene.variants import pruned
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.post.plotting.table import as_html, as_markdown
 from flexclear.stages import effect_plan, watched_quantities
@@ -184,7 +184,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """Apply a plan to a scene: replace and remove parts, set solver and watched quantities."""
     decided = json.loads(plan.attrs["planned"])
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
-    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
+    fewer = pruned(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
     watch = [q.name for q in scene.watched() if q.is_there(owners)]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}

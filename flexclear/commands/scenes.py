@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import export
-from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts import maintenance
 from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
@@ -130,7 +130,7 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     )
     if not files:
         raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
-    changed = upkeep.shown_faults(Store(results_root()), folder)
+    changed = maintenance.shown_faults(Store(results_root()), folder)
     if changed:
         raise ResourceError(f"{changed[0]}: flexclear run {name}")
     if _of_another_run(folder):

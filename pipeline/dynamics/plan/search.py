@@ -22,7 +22,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, lessened, uncoupled
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, pruned, uncoupled
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
@@ -67,7 +67,7 @@ def plan(
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
     uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
     plain = edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
-    bare = lessened(plain, uncoupled_parts)
+    bare = pruned(plain, uncoupled_parts)
     mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
     pilots = Pilots(bare, mine, less, filled, quantities, progress)
     _ = pilots.extent  # refuses a scene that cannot be built, before anything is run
