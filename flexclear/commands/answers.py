@@ -45,7 +45,7 @@ IDEAL = "clearance and flexibility"
 
 
 @dataclass(frozen=True)
-class Said:
+class ShownAnswer:
     """An answer as a page shows it: heading, text, file name of its picture with a caption, and a table as HTML."""
 
     heading: str
@@ -55,7 +55,7 @@ class Said:
     table: str = ""
 
 
-def said(name: str, answer: Made, scene: Scene) -> Said:
+def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     """Return heading, text, picture and table of the answer called accuracy, stability or matters."""
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
@@ -63,18 +63,18 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
     data = answer.dataset()
     if name == "accuracy":
         caption = "Error against processor time; the star is this scene"
-        return Said("What accuracy costs", sentences(data), "accuracy.png", caption)
+        return ShownAnswer("What accuracy costs", sentences(data), "accuracy.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
         caption = "Errors of energy and loops over time, and their limits"
         table = prose(("check", *columns), rows)
-        return Said("Is it stable", data.attrs["answer"], "stability.png", caption, table)
+        return ShownAnswer("Is it stable", data.attrs["answer"], "stability.png", caption, table)
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
     caption = "Change of each quantity without the effect; thin lines: what of it may be chance"
     text, table = matters.sentence(data, requested), scenes.tables(answer, "matters.md")
-    return Said("Which effects matter", text, "matters.png", caption, table)
+    return ShownAnswer("Which effects matter", text, "matters.png", caption, table)
 
 
 def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
@@ -93,7 +93,7 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool
         answer = getattr(Answers(scene, workplace, given, questions=1), name)
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
-    words = said(name, answer, scene)
+    words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
     return answered(answer.dataset(), words.text, picture, words.table)
 
@@ -214,8 +214,8 @@ class _Comparison:
             pairs |= dict.fromkeys(waiting, members)
             full = self.points["", members]
             waiting = [n for n in waiting if undecided(Pair(full, self.points[n, members], members), self.chosen)]
-        alone = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
-        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
+        repeated = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
+        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if repeated else IDEAL}
         without = {name: self._variant(name) for name in ("", *names)}
         left = [words[name] for name in self._gone if name not in names and words[name]]
         return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left)
@@ -229,11 +229,11 @@ class _Comparison:
     @cached_property
     def _gone(self) -> Mapping[str, frozenset[str]]:
         """Return the effects that go with each one: first all clearances and flexible bodies, then single effects."""
-        alone = {e.name: self._closed({e.name}) for e in self.effects}
+        single = {e.name: self._closed({e.name}) for e in self.effects}
         ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
         both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
         order = sorted(self.effects, key=lambda effect: effect.kind not in (CLEARANCE, FLEXIBILITY))
-        return both | {effect.name: alone[effect.name] for effect in order}
+        return both | {effect.name: single[effect.name] for effect in order}
 
     def _closed(self, names: set[str]) -> frozenset[str]:
         """Return the names of effects, and those of effects that exist only within them."""

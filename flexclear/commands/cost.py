@@ -90,10 +90,10 @@ def command(options: argparse.Namespace) -> None:
     if options.json:
         print(as_json({name: made.dataset() for name, made in studies.items()}))
     if options.page is not None:
-        said = f" --peer {options.peer.as_posix()}" if options.peer else ""
-        said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
-        said += f" --budget {options.budget}{' --models' if options.models else ''}"
-        write_page(studies, options.page, said)
+        shown_options = f" --peer {options.peer.as_posix()}" if options.peer else ""
+        shown_options += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        shown_options += f" --budget {options.budget}{' --models' if options.models else ''}"
+        write_page(studies, options.page, shown_options)
 
 
 @dataclass
@@ -152,8 +152,8 @@ class Study:
         if self.models and scene.flexible():
             bundles = scenes.bundles(scene, self.workplace, jobs=None).values()
             more += cost_design.models(scene, self.setting, max(float(one["frequency"].max()) for one in bundles))
-        there = {design.key for design in (*self.points, *self.undone)}
-        more = [design for design in more if design.key not in there]
+        known = {design.key for design in (*self.points, *self.undone)}
+        more = [design for design in more if design.key not in known]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
         self._complete = True
 
@@ -315,8 +315,8 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
 
     shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem in FIGURES}
     shown = {stem: path for stem, path in shown.items() if f"{stem}.png" in made.record.files}
-    said = advice(made.dataset(), tables(made))
-    page = Studied(name, said, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
+    paragraph = advice(made.dataset(), tables(made))
+    page = Studied(name, paragraph, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
     return page, {path: f"{stem}.png" for stem, path in shown.items()}
 
 
@@ -329,8 +329,8 @@ def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> No
 
     sections, files = list[Studied](), dict[str, bytes]()
     for name, made in studies.items():
-        said, pictures = figures_and_tables(name, made, page.stem)
-        sections.append(said)
+        section, pictures = figures_and_tables(name, made, page.stem)
+        sections.append(section)
         files |= {Path(path).name: made.read(file) for path, file in pictures.items()}
     scenes.write_page(page, markdown(tuple(sections), f"{page.as_posix()}{options}"), files)
 

@@ -145,8 +145,8 @@ def text(linear: xr.Dataset) -> str:
     columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "decay_rate", "dominant")]
     for number, hertz, damping, rate, name, part in zip(*columns, fraction, strict=True):
         # an overdamped motion has two rates and no frequency: two rows of one motion
-        alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
-        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")
+        note = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
+        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){note}")
     return "\n".join(lines) + "\n"
 
 

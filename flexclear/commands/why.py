@@ -33,10 +33,10 @@ def command(options: argparse.Namespace) -> None:
 
 def elsewhere(label: str, record: Record | None) -> list[str]:
     """Return a note on a fresh result that other instructions than this process's computed: rounding differs."""
-    there = record.computed_by if record is not None else {}
-    here = instruction_set() if there else {}
-    names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-    changes = ", ".join(f"{name} {there.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
+    stored = record.computed_by if record is not None else {}
+    here = instruction_set() if stored else {}
+    names = [name for name in {**stored, **here} if stored.get(name) != here.get(name)]
+    changes = ", ".join(f"{name} {stored.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
     return [f"{label} was computed by other instructions, its numbers differ by rounding: {changes}"] if names else []
 
 

@@ -107,14 +107,14 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
     """Return a sentence for each quantity, as HTML, on its change by clearance and flexibility."""
     if IDEAL not in result["effect"].values:
         return []
-    one, said = result.sel(effect=IDEAL), []
+    one, sentences = result.sel(effect=IDEAL), []
     for k, name in enumerate(str(q) for q in result["quantity"].values):
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
             unit, members = str(result["unit"].values[k]), int(one["members"])
             text = in_words(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
-            said.append(f"<b>{html.escape(name)}</b>: {text}.")
-    return said
+            sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return sentences
 
 
 def in_words(
@@ -166,7 +166,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     if requested:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
         levels = [("The requested accuracy", asked)]
-    said, before, calm = list[str](), list[str](), list[str]()
+    sentences, before, calm = list[str](), list[str](), list[str]()
     for name, limits in levels:
         now, perhaps = _called_for(single, limits)
         new = [effect for effect in now if effect not in before]
@@ -174,14 +174,14 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         open_ = f" (not decided: {listed(unsure)})" if unsure else ""
         if new or unsure:
             none = "no more for certain" if before else "none for certain"
-            said.append(f"{name} calls {'also ' if before and new else ''}for {listed(new or [none])}{open_}.")
+            sentences.append(f"{name} calls {'also ' if before and new else ''}for {listed(new or [none])}{open_}.")
         else:
             calm.append(name)
         before += new
     more = "no more" if before else "none"
-    said += [f"{name} calls for {more}." for name in calm[:1]]
-    said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
-    return " ".join(said + undone)
+    sentences += [f"{name} calls for {more}." for name in calm[:1]]
+    sentences += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
+    return " ".join(sentences + undone)
 
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:

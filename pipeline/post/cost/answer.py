@@ -165,14 +165,14 @@ def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     choices = {target: cheapest(study, target) for target in TARGETS}
     had = {target: choice for target, choice in choices.items() if choice is not None}
     text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in had.items())
-    said = [
+    parts = [
         f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."
     ]
     if had:
-        said += [_digits(had)]
-    said += [_some(study, target) for target in TARGETS if target not in had]
-    said += [_horizon(study, tables), _limits(study)]
-    return " ".join(filter(None, said))
+        parts += [_digits(had)]
+    parts += [_some(study, target) for target in TARGETS if target not in had]
+    parts += [_horizon(study, tables), _limits(study)]
+    return " ".join(filter(None, parts))
 
 
 def _some(study: xr.Dataset, target: float) -> str:
@@ -338,15 +338,15 @@ def _notes(study: xr.Dataset) -> list[str]:
 
 def _confirmed(study: xr.Dataset) -> str:
     unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
-    said = f"Reference: {study.attrs['reference']}. "
+    reference = f"Reference: {study.attrs['reference']}. "
     if not by:
-        return f"{said}Not confirmed: no other run was made."
+        return f"{reference}Not confirmed: no other run was made."
     if np.isnan(unsure).any():
-        return f"{said}Not confirmed: {by} was refused."
+        return f"{reference}Not confirmed: {by} was refused."
     if np.isinf(unsure).any():
-        return f"{said}Not confirmed: {by} finds another number of impacts."
+        return f"{reference}Not confirmed: {by} finds another number of impacts."
     worst = str(study["quantity"].values[int(np.argmax(unsure))])
-    return f"{said}Confirmed by {by}, which differs by at most {unsure.max():.1e} ({worst})."
+    return f"{reference}Confirmed by {by}, which differs by at most {unsure.max():.1e} ({worst})."
 
 
 def _why_not(study: xr.Dataset) -> str:

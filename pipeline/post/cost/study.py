@@ -64,15 +64,15 @@ def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chos
     by other methods: its own error, which is not below the reference's, is part of their distance. Without another
     method, it is the best agreeing run by the same one. Raises SolverError where every run was refused.
     """
-    there = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
-    if not there:
+    accepted = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
+    if not accepted:
         reasons = "; ".join(dict.fromkeys(_reason(runs[p.key]) for p in points if "refused" in runs[p.key].attrs))
         raise SolverError(
             f"no run with chosen steps could be made, so that there is nothing to compare with: {reasons}"
         )
-    best = min(there, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
-    others = [p for p in there if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
-    others = others or [p for p in there if p is not best]
+    best = min(accepted, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
+    others = [p for p in accepted if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
+    others = others or [p for p in accepted if p is not best]
     until, reference = believed(points, runs), runs[best.key]
 
     def apart(point: Point) -> float:

@@ -194,12 +194,12 @@ def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
     return {"points": _floats(points), "triangles": _wholes(triangles), "color": mechanism.COLORS[0], "opacity": 1.0}
 
 
-def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
+def _camera(view: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
     """Return eye, focus, upward direction, and the reach of the scene across and upright over its distance."""
-    position, focus = eye(seen, cloud, ASPECT)
-    local = (cloud - position) @ axes_of(seen, position, focus)
+    position, focus = eye(view, cloud, ASPECT)
+    local = (cloud - position) @ axes_of(view, position, focus)
     reach = np.abs(local[:, :2] / local[:, 2:]).max(axis=0) / zoom
-    return {"eye": position.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
+    return {"eye": position.tolist(), "focus": focus.tolist(), "up": view.up.tolist(), "reach": reach.tolist()}
 
 
 def _floats(values: np.ndarray) -> str:

@@ -50,7 +50,7 @@ class Missing:
     angle: float
 
     @property
-    def said(self) -> str:
+    def words(self) -> str:
         """Distance and angle in words, as in a picture."""
         distance = float(np.linalg.norm(self.end - self.start))
         turned = f"{np.degrees(self.angle):.3g}° off" if self.angle > 1e-7 else ""
@@ -104,13 +104,13 @@ def _still(body: mechanism.Flexible, opacity: float) -> mechanism.Part:
     )
 
 
-def page_view(seen: StartView) -> dict[str, Any]:
+def page_view(start: StartView) -> dict[str, Any]:
     """Return the pose with its names, for the viewer of a page."""
     labels = [
         {"text": mark.text, "detail": mark.detail, "at": mark.point.tolist(), "color": mark.color}
-        for mark in seen.marks
+        for mark in start.marks
     ]
-    return player.motion(seen.drawn) | {"labels": labels, "state": " · ".join(seen.notes)}
+    return player.motion(start.drawn) | {"labels": labels, "state": " · ".join(start.notes)}
 
 
 def _normal(text: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray | None:
@@ -176,7 +176,7 @@ def _marks(
     """Yield names, the most important ones first."""
     used, places = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
     for gap in gaps:
-        yield Mark(gap.joint, f"does not fit: {gap.said}", 0.5 * (gap.start + gap.end), GAP)
+        yield Mark(gap.joint, f"does not fit: {gap.words}", 0.5 * (gap.start + gap.end), GAP)
     for name, body in text.get("body", {}).items():
         if body["type"] != "ground":
             index = list(run["body"].values).index(name)
@@ -237,7 +237,7 @@ LINES, TOP, BOTTOM = (33.0, 17.0), 70.0, 90.0
 LETTERS = 56
 
 
-def picture(seen: StartView, title: str) -> np.ndarray:
+def picture(start: StartView, title: str) -> np.ndarray:
     """Draw the mechanism in the middle, its names in columns left and right; pixels, shape (height, width, 3)."""
     from flexclear.pipeline.post.render import film
 
@@ -245,16 +245,16 @@ def picture(seen: StartView, title: str) -> np.ndarray:
     canvas = style.canvas(SIZE)
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    axes.imshow(film.still(seen.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
+    axes.imshow(film.still(start.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
     with style.style():
-        points = project(seen.drawn, np.array([mark.point for mark in seen.marks]).reshape(-1, 3), SIZE, MARGIN)
-        shown = _columns(axes, seen.marks, points)
+        points = project(start.drawn, np.array([mark.point for mark in start.marks]).reshape(-1, 3), SIZE, MARGIN)
+        shown = _columns(axes, start.marks, points)
         axes.text(20, 26, title, fontsize=13, fontweight="bold", color=style.INK, va="center", parse_math=False)
-        left_out = [] if shown == len(seen.marks) else [f"{shown} of {len(seen.marks)} names; the page has all"]
-        notes = " · ".join([*seen.notes, *left_out])
+        left_out = [] if shown == len(start.marks) else [f"{shown} of {len(start.marks)} names; the page has all"]
+        notes = " · ".join([*start.notes, *left_out])
         axes.text(20, 49, notes, fontsize=9.5, color=style.SOFT, va="center", parse_math=False)
-        _directions(axes, seen.drawn, seen.gravity)
-        ruler(axes, seen.drawn, SIZE, MARGIN)
+        _directions(axes, start.drawn, start.gravity)
+        ruler(axes, start.drawn, SIZE, MARGIN)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
     return style.pixels(canvas)
