@@ -171,5 +171,5 @@ def _pose(linear: xr.Dataset) -> list[str]:
     names = [str(name) for name in linear["drive"].values]
     position, each = linear["drive_position"], linear.coords.get("drive_position_units")
     units = [str(position.attrs.get("units", ""))] * len(names) if each is None else [str(unit) for unit in each.values]
-    places = zip(names, position.values, units, strict=True)
-    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in places)]
+    columns = zip(names, position.values, units, strict=True)
+    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in columns)]

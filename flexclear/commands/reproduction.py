@@ -94,9 +94,9 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         differences += [
             f"the run is {'the same to the last bit' if digest == facts['run'] else 'not the same to the last bit'}"
         ]
-    now = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
-    then = {**facts["libraries"], "python": facts["python"]}
-    differences += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
+    here = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
+    recorded = {**facts["libraries"], "python": facts["python"]}
+    differences += [f"{k} is {here[k]} here, {v} there" for k, v in sorted(recorded.items()) if here.get(k, v) != v]
     ending = [text.strip().splitlines()[-REPORTED:] for text in (log, output)]
     differences += [
         f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines

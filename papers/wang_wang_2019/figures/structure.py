@@ -137,11 +137,11 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
         axes.plot(*foot[:2], "s", color="#3b4754", ms=7)
         axes.plot(*top[:2], "o", color=CSJ.color if f"A{k}" == JOINT else "#3b4754", ms=8)
         up = 1.0 if foot[1] > 0.0 else -1.0
-        for point, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
+        for point, name, side in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
             text = f"{name}\n({point[0]:.1f}, {point[1]:.1f})"
             axes.annotate(
-                text, (point[0], point[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
-                va="bottom" if way > 0.0 else "top", fontsize=8.2,
+                text, (point[0], point[1]), (0.0, 8.0 * side), textcoords="offset points", ha="center",
+                va="bottom" if side > 0.0 else "top", fontsize=8.2,
             )  # fmt: skip
     axes.plot(0.0, 0.0, "o", color="#3b4754", ms=8)
     axes.annotate("C, Z", (0.0, 0.0), (8.0, 0.0), textcoords="offset points", va="center", fontsize=8.2)
@@ -215,9 +215,9 @@ def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], rows: tuple[float, .
     return drawn
 
 
-def _arrow(axes: Axes, first: Text, second: Text, way: str) -> None:
+def _arrow(axes: Axes, first: Text, second: Text, form: str) -> None:
     """Draw an arrow from the rim of a box to that of another."""
-    look = {"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3, "connectionstyle": way, "shrinkA": 2, "shrinkB": 2}
+    look = {"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3, "connectionstyle": form, "shrinkA": 2, "shrinkB": 2}
     patches = {"patchA": first.get_bbox_patch(), "patchB": second.get_bbox_patch()}
     axes.annotate("", second.get_position(), first.get_position(), arrowprops=look | patches)
 
@@ -270,10 +270,10 @@ def _shape(axes: Axes, camera: View, bundle: xr.Dataset, mode: int) -> tuple[flo
     shell(axes, camera, rings, size / max(float(size.max()), 1e-300), zorder=2)
     corner = ghost.reshape(-1, 3).min(axis=0) + np.array([0.0, 0.0, -0.055])
     triad(axes, camera, corner, 0.03, ("x", "y", "z"))
-    places = camera.project(np.concatenate([ghost.reshape(-1, 3), rings.reshape(-1, 3), corner[None] - 0.008]))
+    paper = camera.project(np.concatenate([ghost.reshape(-1, 3), rings.reshape(-1, 3), corner[None] - 0.008]))
     axes.set_aspect("equal")
     axes.set_axis_off()
-    return factor, np.array([places.min(axis=0), places.max(axis=0)])
+    return factor, np.array([paper.min(axis=0), paper.max(axis=0)])
 
 
 def _figure(title: str, heading: str, condition: str, printed: tuple[float, ...]) -> Figure:

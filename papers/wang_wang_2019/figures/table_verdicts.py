@@ -229,8 +229,8 @@ def _enlarged(data: Data) -> Outcome:
 def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
     """Judge whether costs over the ideal model's are the paper's, at each setting of Table 10."""
     tests, words = [], []
-    for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
-        costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
+    for setting, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
+        costs = {m: ratios(data["sps4:timing"], setting).get(m.scene, np.nan) for m in models}
         tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
         texts_by_model = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
         words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in texts_by_model.items()))

@@ -197,18 +197,18 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
                 values = dataset[kind].values[:, k]
-                place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
+                rows = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-                panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
+                panel.barh(rows, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 if f"{kind}_uncertainty" in dataset:
                     uncertainty = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
                     below = np.minimum(uncertainty, WHISKER * shown)
                     drawn = np.isfinite(shown) & (uncertainty > 0.0)
                     ends = [below[drawn], uncertainty[drawn]]
                     panel.errorbar(
-                        shown[drawn], place[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
+                        shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                     )
-                for y, value in zip(place, values, strict=True):
+                for y, value in zip(rows, values, strict=True):
                     text = "none" if value == 0.0 else "not examined" if np.isnan(value) else "not comparable"
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)

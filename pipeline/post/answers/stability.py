@@ -113,8 +113,8 @@ def _agreement(study: xr.Dataset) -> list[Check]:
 
 
 def _rejected(run: xr.Dataset) -> Check:
-    steps, again = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
-    fraction = again / max(steps + again, 1.0)
+    steps, rejected = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
+    fraction = rejected / max(steps + rejected, 1.0)
     remedy = "another integrator, or a tighter tolerance"
     return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
-from flexclear.pipeline.post.cost.study import Point, believed, relative
+from flexclear.pipeline.post.cost.study import Point, comparable_until, relative
 from flexclear.pipeline.post.plotting.style import INK, files, grid, heading, style
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -124,7 +124,7 @@ def causes_of(
     asis = next((runs[p.key] for p in accepted if p.group == "sampling" and p.key == "as it is"), None)
     reference = next(runs[p.key] for p in accepted if p.group == "reference")
     growth = 0.0 if asis is None else float(asis.attrs.get("growth", 0.0))
-    until = believed(accepted, runs)
+    until = comparable_until(accepted, runs)
     size = quantities.scale(reference, quantity)
 
     def between(a: xr.Dataset | None, b: xr.Dataset | None) -> float:

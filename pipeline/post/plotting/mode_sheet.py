@@ -63,8 +63,8 @@ def _pixels(figure: Figure) -> np.ndarray:
 def _sheet(body: str, bundle: xr.Dataset, camera: View, fraction: float) -> Figure:
     count = bundle.sizes["mode"]
     rest, _ = surface(bundle, np.zeros(count))
-    places = camera.project(rest)
-    span = np.ptp(places, axis=0)
+    projected = camera.project(rest)
+    span = np.ptp(projected, axis=0)
     ratio = float(np.clip((span[1] + 2.2 * FRACTION * span.max()) / (span[0] + 0.1 * span.max()), 0.25, 1.6))
     width = 11.0
     figure, axes = style.panels(count, COLUMNS, width, 1.1, 0.35 + ratio * width / COLUMNS * 0.92)

@@ -176,8 +176,8 @@ def mechanism(
     flexible = tuple(
         _flexible(run, name, bundle, looks, stressed=stressed) for name, bundle in bundles.items() if name in at.bodies
     )
-    places = run.frame_position.values if at.frames else run.position.values
-    shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
+    positions = run.frame_position.values if at.frames else run.position.values
+    shown = np.concatenate([positions.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
     parts = (*_bodies(at, looks, size), *_joints(at, size))
     chosen_view = view(run, at.given, looks.direction, looks.up)

@@ -32,8 +32,8 @@ def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     tracks: dict[tuple[int | None, int | None], int] = {}
     meshes = []
     for part in drawn.parts:
-        place = (part.owner, part.frame)
-        track = -1 if part.owner is None else tracks.setdefault(place, len(tracks))
+        key = (part.owner, part.frame)
+        track = -1 if part.owner is None else tracks.setdefault(key, len(tracks))
         meshes.append(_still(part.surface, part.color, part.opacity) | {"track": track})
     for body in drawn.flexible:
         track = tracks.setdefault((body.index, None), len(tracks))

@@ -150,8 +150,8 @@ def _turning(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     """Return a round arrow about the axis, in the sense in which the joint's coordinate grows."""
     angle = np.linspace(0.2, 1.5 * np.pi, 40)[:, None]
     ring = where + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
-    way = ring[-1] - ring[-2]
-    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], way, size)])
+    direction = ring[-1] - ring[-2]
+    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], direction, size)])
 
 
 def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
@@ -161,9 +161,9 @@ def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _head(end, axes[:, 2], size)])
 
 
-def _head(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
+def _head(base: np.ndarray, direction: np.ndarray, size: float) -> Surface:
     """Return the head of an arrow."""
-    return surfaces.cone(base, base + 12.0 * THIN * size * way / np.linalg.norm(way), 5.0 * THIN * size)
+    return surfaces.cone(base, base + 12.0 * THIN * size * direction / np.linalg.norm(direction), 5.0 * THIN * size)
 
 
 def _marks(
@@ -174,7 +174,7 @@ def _marks(
     gaps: Sequence[Missing],
 ) -> Iterator[Mark]:
     """Yield names, the most important ones first."""
-    used, places = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
+    used, positions = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
     for gap in gaps:
         yield Mark(gap.joint, f"does not fit: {gap.words}", 0.5 * (gap.start + gap.end), GAP)
     for name, body in text.get("body", {}).items():
@@ -184,8 +184,8 @@ def _marks(
     for name, joint in text.get("joint", {}).items():
         used |= set(joint["between"])
         clear = joint.get("clearance")
-        played = f" {in_unit(clear, 'm')}" if clear else ""
-        detail = f"{joint['type']}{played}: {' – '.join(joint['between'])}"
+        clearance = f" {in_unit(clear, 'm')}" if clear else ""
+        detail = f"{joint['type']}{clearance}: {' – '.join(joint['between'])}"
         yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
     for name, drive in text.get("drive", {}).items():
         if "joint" in drive:
@@ -193,14 +193,14 @@ def _marks(
             where = joints[drive["joint"]][0]
             yield Mark(name, f"drives {which}: {drive['law']['type']}", where, DRIVE)
         else:
-            yield Mark(name, f"drives {drive['frame']}", places[drive["frame"]], DRIVE)
+            yield Mark(name, f"drives {drive['frame']}", positions[drive["frame"]], DRIVE)
             used.add(drive["frame"])
     for name, load in text.get("load", {}).items():
         at = load.get("between", [load["frame"]] if "frame" in load else [])
         if at:
             used |= set(at)
-            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([places[f] for f in at], axis=0), LOAD)
-    for name, where in places.items():
+            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([positions[f] for f in at], axis=0), LOAD)
+    for name, where in positions.items():
         if name not in used:
             yield Mark(name, "frame", where, FRAME)
 
@@ -311,13 +311,13 @@ def heights(requested: np.ndarray, line: float, top: float, bottom: float) -> np
 def _directions(axes: style.Axes, drawn: Mechanism, gravity: np.ndarray) -> None:
     """Draw the world's axes and gravity, as projected in the picture."""
     middle = drawn.cloud.mean(axis=0)
-    ways = [(np.eye(3)[k], "xyz"[k], style.SOFT) for k in range(3)]
+    directions = [(np.eye(3)[k], "xyz"[k], style.SOFT) for k in range(3)]
     size = float(np.linalg.norm(gravity))
     if size > 0.0:
-        ways.append((gravity / size, f"gravity {size:.4g} m/s²", LOAD))
-    for way, text, color in ways:
+        directions.append((gravity / size, f"gravity {size:.4g} m/s²", LOAD))
+    for direction, text, color in directions:
         origin = np.array([70.0, SIZE[1] - 75.0]) + (np.array([95.0, -20.0]) if color == LOAD else 0.0)
-        ends = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * way]), SIZE, MARGIN)
+        ends = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * direction]), SIZE, MARGIN)
         unit = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * drawn.view.up]), SIZE, MARGIN)
         arrow = 46.0 * (ends[1] - ends[0]) / float(np.linalg.norm(unit[1] - unit[0]))
         tip, beyond = origin + arrow, 11.0 / max(float(np.linalg.norm(arrow)), 11.0)
