@@ -40,7 +40,7 @@ def still(drawn: mechanism.Mechanism, step: int, size: tuple[int, int] = (1200, 
     """Draw the mechanism at an output, shape (height, width, 3); margin: empty space at both sides [pixels]."""
     scene = plotter(size)
     actors = _build(scene, drawn)
-    _place(drawn, actors, step, glow=False)
+    _place(drawn, actors, step, impact=False)
     look(scene, drawn, margin)
     result = image(scene)
     scene.close()
