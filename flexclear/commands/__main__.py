@@ -29,25 +29,25 @@ CLOSED_PIPE = 141
 GARBAGE = 200_000
 #: verb -> its help. The module of the same name has `arguments(parser)` and `command(options)`
 COMMANDS = {
-    "new": "a commented scene of one's own to start from",
-    "show": "the start pose with all names, in seconds; nothing is run",
-    "check": "every mistake of scenes and recipes at once; nothing is run",
-    "run": "bring scenes up to date",
-    "why": "for each stage: fresh, or why it would run again",
-    "sweep": "many points of one scene: a dataset and a figure",
-    "cost": "what accuracy costs: errors against cost, and where they come from",
-    "render": "pictures, film and interactive page of scenes",
-    "compare": "scenes next to each other or their ideal mechanisms: differences, errors, events, costs",
-    "plan": "which effects, modes and tolerance the requested accuracy calls for",
-    "effects": "what each part does to each quantity, alone and in pairs",
-    "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
-    "frequencies": "equilibrium in a pose, and natural frequencies there",
-    "report": "the page of scenes; without scenes, all figures and tables of the paper",
-    "schema": "JSON schema of scene files",
-    "cite": "sources of the methods and data that a scene uses",
-    "completion": "completion for bash and zsh",
-    "cache": "stored results: size, check, explain, prune",
-    "doctor": "is all here that is needed, and does it compute; one file to repeat a failure",
+    "new": "write a commented scene to start from",
+    "show": "draw the start pose with all names, in seconds, without a simulation",
+    "check": "report all errors of scenes, recipes and sweeps, without a simulation",
+    "run": "simulate scenes, unless their results are up to date",
+    "why": "say for each stage whether it is up to date, or why it would run again",
+    "sweep": "vary parameters of a scene, with one dataset and a figure of all points",
+    "cost": "study error against cost, and the causes of errors",
+    "render": "make pictures, films and interactive pages of scenes",
+    "compare": "compare scenes with each other or with their ideal mechanisms",
+    "plan": "select the effects, modes and tolerance that the requested accuracy needs",
+    "effects": "measure how each part changes each quantity, alone and in pairs",
+    "sections": "classify a repeated motion as periodic, quasi-periodic or chaotic",
+    "frequencies": "compute an equilibrium and its natural frequencies",
+    "report": "write the page of scenes; without scenes, all figures and tables of the paper",
+    "schema": "print a JSON schema of scenes, recipes or sweeps",
+    "cite": "list the sources of the methods and data that a scene uses",
+    "completion": "print the completion script for bash or zsh",
+    "cache": "manage stored results: size, check, explain, prune",
+    "doctor": "check the installation by a run with a known answer; write one file that repeats a failure",
 }
 
 
@@ -123,7 +123,7 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
     if arguments:
         require_command(arguments[0])
     top = Parser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
-    top.add_argument("--version", action="version", version=f"flexclear {version()}", help="say the version")
+    top.add_argument("--version", action="version", version=f"flexclear {version()}", help="print the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     asked = [verb for verb in COMMANDS if verb in arguments[:1]]
     for verb in asked or COMMANDS:  # all verbs only where their list is printed

@@ -18,8 +18,8 @@ from flexclear.stages.workplace import open_workplace
 ACTIONS = {
     "size": "stored bytes by stage",
     "check": "read everything and compare it with its digest; exit code 4 when something is damaged",
-    "explain": "what an artifact was made from",
-    "prune": "remove what is damaged and what nothing shows any more",
+    "explain": "print the facts from which an artifact was computed",
+    "prune": "remove damaged artifacts, and those that no scene shows any more",
 }
 #: days that artifacts which nothing shows stay stored: a return to an earlier value costs nothing in that time
 DAYS = 30.0

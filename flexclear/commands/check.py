@@ -51,7 +51,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
     )
     parser.add_argument(
-        "--show", action="store_true", help="also write the start pose of each scene, and what does not fit there"
+        "--show", action="store_true", help="also draw the start pose of each scene, with gaps where joints do not fit"
     )
     add_options(parser, "set", "json", "said")
 
@@ -297,7 +297,7 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
     from flexclear.pipeline.dynamics.model.plausibility import (
-        forgotten,
+        missing_joints,
         refuse_missed,
         refuse_overlap,
         unused_frames,
@@ -315,7 +315,7 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
 
         mechanism = assembled(mechanism)
         refuse_missed(mechanism)
-    for body, text, remedy in forgotten(mechanism):
+    for body, text, remedy in missing_joints(mechanism):
         findings.warnings.append(scenes.placed(InputError(f"[body.{body}]", text, remedy), whole.path))
     unused = unused_frames(mechanism)
     if unused:

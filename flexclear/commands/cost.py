@@ -59,12 +59,12 @@ FIGURES = {
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
-    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
-    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the studies as a page")
+    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="also draw these runs of another program")
     parser.add_argument(
-        "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
+        "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these methods (default: all)"
     )
-    parser.add_argument("--models", action="store_true", help="also other meshes, mode sets and beam theories")
+    parser.add_argument("--models", action="store_true", help="also study meshes, mode sets and beam theories")
 
 
 def command(options: argparse.Namespace) -> None:

@@ -92,18 +92,16 @@ class UnwellError(FlexclearError):
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     either = parser.add_mutually_exclusive_group()
-    either.add_argument(
-        "--bundle", metavar="SCENE", help="run a scene and write all that is needed to repeat it into one file"
-    )
-    either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="run what such a file holds")
+    either.add_argument("--bundle", metavar="SCENE", help="run a scene, and write all that repeats it into one file")
+    either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="repeat the run in such a file")
     either.add_argument(
         "--compile",
         nargs="*",
         metavar="SCENE",
-        help="compile now what runs of these scenes call, without running them; without names what most scenes call",
+        help="compile the functions of these scenes without a run; without names those of most scenes",
     )
     add_options(parser, "set")
-    parser.add_argument("--out", type=Path, metavar="FILE.zip", help="where --bundle writes")
+    parser.add_argument("--out", type=Path, metavar="FILE.zip", help="file that --bundle writes")
 
 
 def command(options: argparse.Namespace) -> None:

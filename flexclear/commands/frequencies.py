@@ -32,18 +32,20 @@ PICTURES = (".png", ".svg")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
-    parser.add_argument("--at", metavar="TIME", help="time whose drive positions are held, e.g. 0.09 or '90 ms'")
+    parser.add_argument(
+        "--at", metavar="TIME", help="hold the drives at their positions at this time, such as 0.09 or '90 ms'"
+    )
     parser.add_argument(
         "--moving",
         action="store_true",
-        help="vibrations about steady motion: drives keep their speed instead of being held",
+        help="vibrations about steady motion: drives have their speed instead of being held",
     )
     parser.add_argument(
         "--speeds",
         metavar="FIRST:LAST:STEP",
         help="Campbell diagram: vibrations about steady motion at these speeds of the drive, e.g. 0:500rpm:50",
     )
-    parser.add_argument("--drive", metavar="NAME", help="with --speeds: the drive, where several move")
+    parser.add_argument("--drive", metavar="NAME", help="with --speeds: the drive, if there are several")
     parser.add_argument(
         "--out",
         type=Path,

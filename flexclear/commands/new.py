@@ -24,7 +24,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     message = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
     parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=message)
     parser.add_argument(
-        "folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help="where; default: the current folder"
+        "folder",
+        nargs="?",
+        type=Path,
+        default=Path(),
+        metavar="FOLDER",
+        help="folder to write to (default: the current one)",
     )
 
 

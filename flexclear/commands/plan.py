@@ -36,9 +36,9 @@ LEVELS = ("10 %", "1 %", "0.1 %")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
-    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
+    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="also write the planned scene here (one scene)")
     parser.add_argument(
-        "--verify", action="store_true", help="run the full scene and say what the plan's true error is"
+        "--verify", action="store_true", help="also run the full scene, and report the plan's true error"
     )
 
 
@@ -74,7 +74,8 @@ def command(options: argparse.Namespace) -> None:
 def levels(scene: Scene, workplace: Workplace) -> str:
     """Return a table of the plans for three accuracies of all watched quantities.
 
-    Raises InputError for a scene without effects or watched quantities.
+    Raises InputError for a scene without effects or watched quantities, and the last refusal when no accuracy has a
+    plan.
     """
     from flexclear.pipeline.post.answers.plan import levels as shown
 
@@ -83,7 +84,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
         try:
             plans[level] = bring(with_accuracy(scene, level), workplace).made.dataset()
         except (InputError, FailedTasksError) as error:
-            if not variants.effects(scene):
+            if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
             plans[level] = str(error)
     return as_markdown(shown(plans))

@@ -29,7 +29,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="picture (png), film (gif, mp4), page to turn (html), or for other programs: gltf, pvd (ParaView); "
         "default: what suits",
     )
-    parser.add_argument("--at", metavar="TIME", help="of vibrations: time whose drive positions are held, e.g. '90 ms'")
+    parser.add_argument(
+        "--at", metavar="TIME", help="for vibrations: hold the drives at their positions at this time, such as '90 ms'"
+    )
 
 
 def command(options: argparse.Namespace) -> None:

@@ -81,17 +81,15 @@ PROVENANCE = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="scenes of the report; without any, the paper's")
     parser.add_argument(
-        "scenes", nargs="*", metavar="SCENE", help="the report of these scenes; without any, that of the paper"
-    )
-    parser.add_argument(
-        "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
+        "--folder", action="store_true", help="write a folder with the page and its pictures, not one file"
     )
     parser.add_argument(
         "--answers",
         choices=("all", "none"),
         default="all",
-        help="none leaves those out that take further runs (default all)",
+        help="none omits the answers that need further runs (default all)",
     )
     add_options(parser, "usual", "budget", "json")
 

@@ -35,13 +35,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"write the run here: {export.KNOWN}",
+        help=f"write the run to this file: {export.KNOWN}",
     )
+    parser.add_argument("--planned", action="store_true", help="run the scene that `flexclear plan` selects")
     parser.add_argument(
-        "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
-    )
-    parser.add_argument(
-        "--verify", action="store_true", help="with --planned: run the full scene, report the true error"
+        "--verify", action="store_true", help="with --planned: also run the full scene, and report the true error"
     )
 
 

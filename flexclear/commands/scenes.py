@@ -207,7 +207,8 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
             workplace.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
         verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
         if verdict != "met":
-            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is stored"
+            asked = "[accuracy]" if requested else "accuracy by default"
+            text = f"{graph.scene.name} {asked}: {verdict}; the run is stored"
             if requested is None or requested.allow_missed:
                 workplace.monitor.say(text)
             else:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
-    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="also write the verdicts as a page")
 
 
 def command(options: argparse.Namespace) -> None:
