@@ -27,7 +27,7 @@ IDEAL = "clearance and flexibility"
 SLIGHT = 0.01
 #: accuracies for which the answer names the effects, where the scene requests none
 LEVELS = (0.1, 0.01, 0.001)
-OF_WHAT = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
+PERCENTAGES = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
 #: number of members from which on Student's t does not change
 MANY = 1000
 #: changes above this multiple of the quantity's size are not given in per cent
@@ -182,7 +182,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     more = "no more" if named else "none"
     sentences += [f"{name} calls for {more}." for name in unchanged[:1]]
     sentences += [f"So does {name[0].lower()}{name[1:]}." for name in unchanged[1:]]
-    sentences += [] if requested else [OF_WHAT]
+    sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + undone)
 
 
