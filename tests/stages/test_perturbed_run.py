@@ -72,7 +72,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
     scene = check(root, "clearance_slider_crank")
     expected = alone(scene, monkeypatch)
     assert float(expected.horizon) < 0.5 * scene.time.end
-    hear, enough = Pair._hear, Pair._enough
+    hear, enough = Pair._store_rows, Pair._enough
 
     def late_run(self: Pair, rows: np.ndarray) -> bool:
         time.sleep(3e-3)  # the twin takes a tenth of that between two looks
@@ -83,7 +83,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
         return enough(self, twin, alive)
 
     if ahead == "twin":
-        monkeypatch.setattr(Pair, "_hear", late_run)
+        monkeypatch.setattr(Pair, "_store_rows", late_run)
     if ahead == "run":
         monkeypatch.setattr(Pair, "_enough", late_twin)
     assert dynamics.simulate(scene, {}, silent).identical(expected)

@@ -66,7 +66,7 @@ def recorded(run: Run) -> LabelledArrays:
     return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
 
 
-def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray) -> LabelledArrays:
+def variables_for(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray) -> LabelledArrays:
     """Return the run variables from which these quantities are computed (`core.artifacts.quantities.series`).
 
     terms: terms of quantities, no expressions.  time: of the rows [s].
@@ -85,7 +85,7 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
 
 def series(scene: Scene, motions: Motions, requested: Collection[Quantity], time: np.ndarray) -> dict[str, np.ndarray]:
     """Return quantities over time, (rows, components), by name; time: of the rows [s]."""
-    arrays = chosen(scene, motions, {term for one in requested for term in one.terms()}, time)
+    arrays = variables_for(scene, motions, {term for one in requested for term in one.terms()}, time)
     return {one.name: quantities.series(arrays, one) for one in requested}
 
 

@@ -118,7 +118,7 @@ class Runner:
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other, judges and judges.run)
             with self._looking:
-                rows.append(_kept(scene, last, trajectory, self.recorded))
+                rows.append(_recorded_values(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         return rows, count
 
@@ -188,7 +188,7 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
+def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
