@@ -35,6 +35,8 @@ CASES = {
     "sps4/variants/first": (np.zeros(3), sps4.platform(sps4.FIRST)),
 }
 LAYOUTS = {"sps4/variants/first": sps4.FIRST}
+#: a part of the stroke, with some impacts
+BRIEFLY = (("time.end", 0.04),)
 LEGS = range(1, 5)
 every_case = pytest.mark.parametrize("scene", CASES)
 
@@ -260,7 +262,7 @@ def test_error_against_ideal_falls_with_the_clearance_and_cost_stays_bounded() -
 @pytest.mark.parametrize("floor", ["1e-9 m/s", "1e-7 m/s"])
 def test_mechanism_does_not_see_the_rate_floor_over_three_decades(floor: str) -> None:
     """1e-9 to 1e-6 m/s, where the slowest impact of the run has some 1e-3."""
-    same, known = run(SCENE, (("joint.A1.floor", floor),)), run(SCENE)
+    same, known = run(SCENE, (("joint.A1.floor", floor), *BRIEFLY)), run(SCENE, BRIEFLY)
     assert impacts(same)["start"] == pytest.approx(impacts(known)["start"], abs=1e-12)
     assert impacts(same)["approach"] == pytest.approx(impacts(known)["approach"], rel=1e-9)
 
@@ -286,10 +288,6 @@ def test_clearance_joints_keep_the_ledger_the_loops_and_the_laws(scene: str, cou
 
 
 # The flexible rod, against sums over mass points, and its own rigid limit --------------------------------------------
-
-
-#: a part of the stroke, with some impacts
-BRIEFLY = (("time.end", 0.04),)
 
 
 def test_clearance_first_impacts_are_those_of_the_second_derivation() -> None:

@@ -201,20 +201,6 @@ def test_a_beam_spun_up_lags_and_recovers_as_assumed_modes_say(case: str) -> Non
 
 
 @pytest.mark.parametrize("case", SCENES)
-def test_the_spun_beam_ends_stretched_by_its_centrifugal_force(case: str) -> None:
-    """Steady stretch tan(k L)/k - L with k^2 = rho A omega^2 / (E A): the mean about which it vibrates."""
-    speed = float(case.split()[0])
-    k = np.sqrt(1.2 / 2.8e7) * speed
-    found = spun(case)
-    along, across = tip(found)
-    late = found.time.values >= 15.0
-    # the residual bending vibration b shortens it: by 1.2 b^2 / (2 L) in the first mode, if that is modelled
-    shortened = 0.6 * np.mean(across[late] ** 2) / LENGTH if "stiffening" in case else 0.0
-    stretch = np.tan(k * LENGTH) / k - LENGTH
-    assert np.mean(along[late]) == pytest.approx(stretch - shortened, rel=1e-3)
-
-
-@pytest.mark.parametrize("case", SCENES)
 def test_energy_and_work_of_the_spin_up_agree(case: str) -> None:
     """A shortening that were not Lagrangian would show at 1e-4.
 
