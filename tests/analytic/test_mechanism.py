@@ -20,8 +20,7 @@ from tests.analytic.mechanism_runs import (
 )
 from tests.reference import sps4
 from tests.reference.clearance_simulation import simulate
-from tests.reference.ideal_motion import UP, Motion, ideal
-from tests.reference.inverse_dynamics import Reactions, reactions
+from tests.reference.ideal_motion import UP, Motion, Reactions, ideal, reactions
 
 DOWN = np.array([0.0, 0.0, -9.81])
 #: height of the plate's centre of mass above the joint centres in the stacked variant [m]

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.reference.contact_solutions import modified_coulomb
-from tests.reference.loose_bodies import SIZE, LooseBodies, cross
-from tests.reference.scene_text import Array, Frame, read, si
+from tests.reference.loose_bodies import SIZE, Array, Frame, LooseBodies, cross, read, si
 
 #: factor a of F = K d^n (1 + a d'/d'0) for a coefficient of restitution c
 FACTORS: dict[str, Callable[[float], float]] = {
