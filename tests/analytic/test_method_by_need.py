@@ -80,10 +80,16 @@ def test_a_scene_without_solver_and_accuracy_runs_at_the_default_tolerance_where
     )
 
 
-def test_where_that_is_dear_it_is_as_exact_as_a_thousandth_of_each_range(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def dear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is too dear is noticed early."""
     monkeypatch.setattr(progress_rate, "AFFORDABLE", 500)
     monkeypatch.setattr(progress_rate, "EARLIEST", 200)
     monkeypatch.setattr(trajectory, "SLICE", 200)
+
+
+@pytest.mark.usefixtures("dear")
+def test_where_that_is_dear_it_is_as_exact_as_a_thousandth_of_each_range() -> None:
     said: list[str] = []
     scene = load_scene(RINGING, {**SHORT, "solver.by_need": True})
     run = simulated(scene, said)
@@ -96,12 +102,8 @@ def test_where_that_is_dear_it_is_as_exact_as_a_thousandth_of_each_range(monkeyp
         assert error < 3e-3  # the default request, and the estimate's own doubt, as above
 
 
-def test_dear_points_and_members_have_the_tolerance_of_runs_that_none_is_compared_with(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(progress_rate, "AFFORDABLE", 500)
-    monkeypatch.setattr(progress_rate, "EARLIEST", 200)
-    monkeypatch.setattr(trajectory, "SLICE", 200)
+@pytest.mark.usefixtures("dear")
+def test_dear_points_and_members_have_the_tolerance_of_runs_that_none_is_compared_with() -> None:
     scene = load_scene(RIGID, {**SHORT, "solver.by_need": True})
     given = load_scene(RIGID, {**SHORT, "solver.integrator": "radau", "solver.rtol": progress_rate.UNVERIFIED})
     speed = recorded_quantities(scene.owners(), [parse("platform.velocity", scene.owners())])
