@@ -62,21 +62,23 @@ def study(uncertainty: float = 1e-8, horizon: float | None = None, **extra: xr.D
     return assemble(points, runs, [POSITION, TIMES]), points, runs
 
 
-def test_errors_are_relative_to_the_size_of_the_quantity():
-    found, *_ = study()
+@pytest.fixture(scope="module")
+def found() -> xr.Dataset:
+    return study()[0]
+
+
+def test_errors_are_relative_to_the_size_of_the_quantity(found: xr.Dataset):
     error = found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-6)
     assert float(error.sel(quantity="slider.position")) == pytest.approx(1e-5 / SIZE)
     assert float(error.sel(quantity="pin.impact_times")) == pytest.approx(1e-5 / 0.6)  # last impact at 0.6 s
 
 
-def test_costs_are_medians_with_their_spread():
-    found, *_ = study()
+def test_costs_are_medians_with_their_spread(found: xr.Dataset):
     assert float(found.cpu_seconds_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-3)) == 0.2
     assert float(found.cpu_spread_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-3)) == pytest.approx(0.2)
 
 
-def test_refused_points_are_gaps_with_their_reason():
-    found, *_ = study()
+def test_refused_points_are_gaps_with_their_reason(found: xr.Dataset):
     assert np.isnan(found.error_by_step.sel(fixed_integrator="rk4", step=1e-2)).all()
     assert "it blew up" in found.attrs["refused"]
     assert "take another" not in found.attrs["refused"]
@@ -125,8 +127,7 @@ def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheape
     assert chosen.evaluations > 1
 
 
-def test_the_cheapest_way_to_each_accuracy():
-    found, *_ = study()
+def test_the_cheapest_way_to_each_accuracy(found: xr.Dataset):
     assert answer.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
     assert answer.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
     assert answer.cheapest(found, 1e-12) is None
@@ -136,8 +137,7 @@ def test_the_cheapest_way_to_each_accuracy():
     assert "1.8e-07 at best" in rows[2][4]
 
 
-def test_each_quantity_has_a_price_of_its_own():
-    found, *_ = study()
+def test_each_quantity_has_a_price_of_its_own(found: xr.Dataset):
     rows = {row[0]: row for row in answer.by_quantity(found, "t").rows}
     # 1e-7 m of 2 m and 1e-7 s of 0.6 s, each with the reference's uncertainty of a tenth of it
     assert [rows[name][-1] for name in ("slider.position", "pin.impact_times")] == ["5.5e-08", "1.8e-07"]
@@ -268,8 +268,7 @@ def written(found: xr.Dataset, tables: tuple[str, ...] = (), pictures: Mapping[s
     return answer.markdown((said,), "docs/accuracy.md")
 
 
-def test_the_page_says_what_each_digit_costs():
-    found, *_ = study()
+def test_the_page_says_what_each_digit_costs(found: xr.Dataset):
     text = written(found, ("| a table |",), {"Error": "x/y.png"})
     assert "flexclear cost a/scene \\\n        --page docs/accuracy.md" in text
     assert "0.001 takes rk4, step 0.001 s (0.2 s)" in text
@@ -298,19 +297,13 @@ def test_the_page_says_how_far_it_holds_and_what_to_refine():
     assert "an ensemble, which the scene can ask for" in alone
 
 
-def test_figures_are_drawn():
-    found, *_ = study()
-    mark = work_precision.Mark("paper's choice", 0.5, {"slider.position": 1e-3})
-    assert set(work_precision.make("w", found, "t", (mark,))) == {"w.png", "w.svg"}
-
-
-def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size():
-    found, *_ = study()
+def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size(found: xr.Dataset):
     track = {"name": "peer", "note": "n", "seconds": [1.0, 2.0], "error": {"slider.position": [1e-3, 1e-4]}}
     (curve,) = work_precision.peers(found, [track])
     assert curve.error[:, 0] == pytest.approx([1e-3 / SIZE, 1e-4 / SIZE])
     assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
-    assert set(work_precision.make("w", found, "t", (), [curve])) == {"w.png", "w.svg"}
+    mark = work_precision.Mark("paper's choice", 0.5, {"slider.position": 1e-3})
+    assert set(work_precision.make("w", found, "t", (mark,), [curve])) == {"w.png", "w.svg"}
     assert answer.price_list(found, "t", ("said",)).notes[-1] == "said"
 
 
