@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import doctest
 import re
 from collections import defaultdict
+from importlib import import_module
 from pathlib import Path
 
 import grimp
@@ -120,7 +122,7 @@ def test_the_way_of_the_data_leads_through_modules_that_exist(root: Path) -> Non
     assert [name for name in names if not exists(root, name)] == []
 
 
-# Names --------------------------------------------------------------------------------------------------------------
+# Names -------------------------------------------------------------------------------------------------------------
 
 #: what stands in backticks and looks like a file or module of the project, but for names in angles and asterisks
 FILE = re.compile(r"[\w.*<>-]+(/[\w.*<>-]+)+/?|[\w*<>]+\.(py|md|toml|json|jsonl)")
@@ -205,3 +207,28 @@ def test_equations_and_the_functions_that_theory_names_name_each_other(root: Pat
                 found += 1
                 assert equations(numbers) <= equations(functions[name]), f"{path}: {name}"
     assert found == 13
+
+
+# Examples in docstrings do what they show -----------------------------------------------------------------------------
+
+
+ROOT = Path(__file__).parents[2]
+MODULES = [
+    "flexclear." + ".".join(path.relative_to(ROOT / "flexclear").with_suffix("").parts)
+    for folder in ("", "commands", "papers", "pipeline", "stages")
+    for path in sorted((ROOT / "flexclear" / folder).glob("**/*.py" if folder else "*.py"))
+    if ">>> " in path.read_text()
+]
+
+
+def test_what_is_called_from_python_has_examples() -> None:
+    assert "flexclear.public" in MODULES
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_show_what_happens(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    module = import_module(name)
+    failed, tried = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert tried > 0
+    assert failed == 0

@@ -151,9 +151,9 @@ def test_killed_work_goes_on_to_the_same_bits(
 @pytest.mark.parametrize(
     "of, part, calls",
     [
-        ("sections", "sections._Tape._motion", 9),
-        ("sections", "sections.conform", 1),
-        ("ensemble", "ensemble.conform", 1),
+        ("sections", "_Tape._motion", 9),
+        ("sections", "conform", 1),
+        ("ensemble", "conform", 1),
     ],
 )
 def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
