@@ -384,6 +384,7 @@ def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, fresh: 
         scene,
         {
             "drive.motor": {"joint": "main", "law": law},
+            "time.end": 1e-3,
             "accuracy": {"quantities": {"slider.position": {"absolute": 1e-3}}},
         },
     )
