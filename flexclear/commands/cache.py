@@ -1,4 +1,4 @@
-"""``flexclear cache``: how large the caches are, whether they are whole, what an artifact was made from; pruning."""
+"""``flexclear cache``: size and integrity of the caches, the inputs of an artifact, and pruning."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from flexclear.stages.workplace import open_workplace
 ACTIONS = {
     "size": "stored bytes by stage",
     "check": "read everything and compare it with its digest; exit code 4 when something is damaged",
-    "explain": "what an artifact was made from",
-    "prune": "remove what is damaged and what nothing shows any more",
+    "explain": "print the facts from which an artifact was computed",
+    "prune": "remove damaged artifacts, and those that no scene shows any more",
 }
-#: artifacts that nothing shows are stored for so many days: going back to an earlier value costs nothing then
+#: days that artifacts which nothing shows stay stored: a return to an earlier value costs nothing in that time
 DAYS = 30.0
-#: faults that `check` lists one by one
+#: number of faults that `check` prints
 LISTED_FAULTS = 20
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     for name, text in ACTIONS.items():
         below = actions.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
@@ -37,7 +37,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Do it."""
+    """Run the requested action."""
     {"size": _size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
 
 
@@ -57,7 +57,7 @@ def _size(options: argparse.Namespace) -> None:
 
 
 def _sizes(paths: Iterable[Path]) -> list[int]:
-    """Sizes of those that are files [bytes]; what others remove meanwhile, as locks, is none any more."""
+    """Return the sizes of those paths that are files [bytes]; files that other processes remove are skipped."""
     lines = []
     for path in paths:
         with suppress(FileNotFoundError):
@@ -70,7 +70,7 @@ def _sizes(paths: Iterable[Path]) -> list[int]:
 def _check(options: argparse.Namespace) -> None:
     store = open_workplace().store
     inventory = upkeep.inventory(store, whole=True)
-    # one without a sum has not been compiled yet, or is about to be
+    # a kernel without a checksum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
     others = {path for path in kernels if files.of_another_build(path)}
     damaged = [path for path in kernels if path not in others and not files.compiled(path)]

@@ -1,4 +1,4 @@
-"""``flexclear effects``: what each part of a scene does to each quantity, taken away and put in, alone and in pairs."""
+"""``flexclear effects``: effect size of each part of a scene on each quantity, by removal, alone and in pairs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scene_arguments(parser, "json")
     parser.add_argument(
         "--members",
@@ -34,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring the tables up to date, print them and say where they are."""
+    """Bring the tables up to date, print them and where their files are."""
     workplace = open_workplace(options)
     datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
@@ -50,9 +50,9 @@ def command(options: argparse.Namespace) -> None:
 
 
 def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.MEMBERS) -> Made:
-    """All variants, and their differences: the effect sizes over (effect, other, quantity), and the page of them.
+    """Run all variants; return effect sizes over (effect, other, quantity), and their page.
 
-    Raises InputError for a scene without effects, or that watches nothing.
+    Raises InputError for a scene without effects or watched quantities.
     """
     from flexclear.pipeline.post.answers.effect_sizes import variants as requested
 

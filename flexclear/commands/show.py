@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
 
 
@@ -50,7 +50,7 @@ def command(options: argparse.Namespace) -> int:
 
 
 def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
-    """Write picture and page, and print where they are; returns the files, and why the start is refused if it is."""
+    """Write picture and page, and print where they are; return the files, and the start's error or None."""
     with scenes.in_file(scene.path):
         seen, refused = viewed(scene)
     files = files_of(scene, seen, Path.cwd() if folder is None else folder, quiet=quiet)
@@ -63,7 +63,7 @@ def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> t
 
 @dataclass(frozen=True)
 class Start:
-    """What `flexclear.show` returns: the view, why the start is refused, and the page."""
+    """Result of `flexclear.show`: the view, the error that refuses the start, and the page."""
 
     view: StartView
     refused: InputError | None
@@ -71,17 +71,17 @@ class Start:
 
     @property
     def gaps(self) -> dict[str, str]:
-        """What joints miss, by name; empty where all fit."""
+        """Description of each joint's gap, by name; empty where all joints fit."""
         return {gap.joint: gap.said for gap in self.view.gaps}
 
     def _repr_html_(self) -> str:
-        """The page within a notebook, in a frame of its own so that its style stays there."""
+        """Return the page for a notebook, in a frame of its own so that its style stays there."""
         text = html.escape(self.page.decode(), quote=True)
         return f'<iframe srcdoc="{text}" width="100%" height="760" style="border:0"></iframe>'
 
 
 def start(scene: Scene, folder: Path | None = None) -> Start:
-    """The start pose of a scene; picture and page are written where a folder is given.  Raises InputError."""
+    """Return the start pose of a scene; write picture and page where a folder is given.  Raises InputError."""
     scenes.require_names(scene)
     with scenes.in_file(scene.path):
         seen, refused = viewed(scene)
@@ -91,7 +91,7 @@ def start(scene: Scene, folder: Path | None = None) -> Start:
 
 
 def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
-    """The start pose with its names, and why it is refused.  Raises InputError where there is none to be drawn."""
+    """Return the start pose with its names, and the error that refuses it.  Raises InputError if none can be drawn."""
     from flexclear.pipeline.dynamics.model.start_pose import start_pose
     from flexclear.pipeline.dynamics.run.run import placed
     from flexclear.pipeline.post.render.mechanism import Looks
@@ -136,7 +136,7 @@ def _page(scene: Scene, seen: StartView) -> bytes:
 
 
 def _body(recipe: Path) -> xr.Dataset:
-    """What is rigid of a mesh, and what is drawn of it."""
+    """Return rigid-body data and drawn surface of a mesh."""
     from flexclear.pipeline.structure.kinds import kind
     from flexclear.pipeline.structure.modes import bundle
 
@@ -145,14 +145,14 @@ def _body(recipe: Path) -> xr.Dataset:
 
 
 def _unplaced(scene: Scene) -> list[str]:
-    """Bodies that neither a pose nor a joint places, as in scenes that are only about a body's modes."""
+    """Return the bodies that neither a pose nor a joint places, as in scenes about a body's modes alone."""
     joined = {frame.partition(".")[0] for joint in scene.joint.values() for frame in joint.between}
     paths = {drive.frame.partition(".")[0] for drive in scene.drive.values() if hasattr(drive, "frame")}
     return [n for n, b in scene.body.items() if getattr(b, "pose", b) is None and n not in joined | paths]
 
 
 def _filled(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Scene:
-    """The scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
+    """Return the scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
 
     lone: bodies that are put at the origin.
     """

@@ -16,7 +16,7 @@ from flexclear.stages.workplace import open_workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
 
@@ -32,7 +32,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def elsewhere(label: str, record: Record | None) -> list[str]:
-    """Return what else a fresh result was computed by than this process would: its numbers differ by rounding."""
+    """Return a note on a fresh result that other instructions than this process's computed: rounding differs."""
     there = record.computed_by if record is not None else {}
     here = instruction_set() if there else {}
     names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
@@ -41,7 +41,7 @@ def elsewhere(label: str, record: Record | None) -> list[str]:
 
 
 def text(reasons: Mapping[str, Mapping[str, Sequence[str]]], others: Mapping[str, Sequence[str]]) -> str:
-    """For each scene its stages, why each would run again, and which others computed what is fresh."""
+    """Return for each scene its stages, why each would run again, and notes on results of other instructions."""
     lines = []
     for scene, stages in reasons.items():
         lines += [scene, *(f"  note: {shown(note)}" for note in others.get(scene, ()))]

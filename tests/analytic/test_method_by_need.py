@@ -139,16 +139,6 @@ def test_rigid_bodies_get_the_explicit_method() -> None:
     assert [scheme.integrator for scheme in schemes(scene)] == ["dop853", "radau"]
 
 
-def test_tighter_tolerances_give_smaller_errors_where_modes_ring() -> None:
-    errors = []
-    for rtol in (1e-4, 1e-6, 1e-8):
-        run = simulated(load_scene(RINGING, {**SHORT, "solver": {"integrator": "exponential", "rtol": rtol}}))
-        errors.append(float(np.abs(run.velocity - reference().velocity).sel(body="platform").max()))
-    # error per step by an estimate of fourth order, of a method of order 6: at least by 100^(4/5) per hundredth
-    assert errors[1] < errors[0] / 4.0
-    assert errors[2] < errors[1] / 4.0
-
-
 def known(**seen: tuple[float, float]) -> Suit:
     runs = {name: dict([run]) for name, run in seen.items()}
     return Suit(Rates(6e4, 20.0), 0.18, ("dop853", "exponential", "radau"), runs)
@@ -325,7 +315,7 @@ def refused_below(least: float, run: xr.Dataset) -> xr.Dataset:
 def test_a_run_that_none_can_be_compared_with_is_delivered_with_an_unknown_error() -> None:
     run = simulated(load_scene(TREE / "scenes/checks/pendulum.toml", {"solver.rtol": 1e-6}))
     delivered = refused_below(1e-5, run)
-    assert delivered.attrs["accuracy_verdict"].startswith("nobody knows")
+    assert delivered.attrs["accuracy_verdict"].startswith("not verified: ")
     assert delivered.position.identical(run.position)
     with pytest.raises(SolverError, match="used up"):
         refused_below(1.0, run)

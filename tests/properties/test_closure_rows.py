@@ -47,7 +47,7 @@ def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     J, S = (selection.dense(model, h, w[h[place] :][: h[m.JACOBIAN_SIZE]]) for place in (m.JACOBIAN, m.SPREAD))
     L = dense_factor(model.arrays.table(m.ENVELOPE), w[h[m.MASS] :])
     C = dense_factor(model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)], w[h[m.SCHUR] :])
-    bias = w[h[m.GAMMA] :][selection.kept_places(model, h)]
+    bias = w[h[m.GAMMA] :][selection.selected_indices(model, h)]
     accelerations = w[h[m.DU] :][: model.nv]
     assert np.abs(S @ L.T - J).max() < ROUNDING * np.abs(J).max()
     assert np.abs(C @ C.T - S @ S.T).max() < ROUNDING * np.abs(S @ S.T).max()

@@ -27,11 +27,11 @@ class Setting:
     guesses: list[Motion]
 
 
-def setting(contact: sps4.Contact | None = None, gravity: Array = WEIGHTLESS) -> Setting:
-    """The paper's mechanism in the first layout; another contact or gravity on demand."""
+def setting() -> Setting:
+    """The paper's mechanism in the first layout, without weight."""
     times = np.arange(0.0, 0.18 + GRID / 2, GRID)
     guesses = ideal(sps4.FIRST, times, np.where(times < 0.18, 1, -1))
-    return Setting(contact or sps4.Contact(), sps4.platform(sps4.FIRST), gravity, guesses)
+    return Setting(sps4.Contact(), sps4.platform(sps4.FIRST), WEIGHTLESS, guesses)
 
 
 def platform_motion(s: Setting, t: float, side: int, distance: float, rate: float) -> Motion:

@@ -49,7 +49,6 @@ class Result:
     state: Array
     platform: list[Motion]
     impacts: list[Impact]
-    evaluations: int
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,6 @@ class Stretch:
     state: Array
     event: bool
     states: OdeSolution
-    evaluations: int
 
 
 def advance(rhs: RightHandSide, t: float, y: Array, end: float, tol: Tolerance) -> Array:
@@ -107,8 +105,8 @@ def integrate(
 
             times[-1] = brentq(gap, before, solver.t, xtol=1e-17, rtol=1e-15)
             y = advance(rhs, before, y_before, times[-1], tol)
-            return Stretch(t, times[-1], y, True, OdeSolution(times, pieces), solver.nfev)
-    return Stretch(t, end, solver.y, False, OdeSolution(times, pieces), solver.nfev)
+            return Stretch(t, times[-1], y, True, OdeSolution(times, pieces))
+    return Stretch(t, end, solver.y, False, OdeSolution(times, pieces))
 
 
 def largest(f: Callable[[float], float], times: Array) -> float:
@@ -137,12 +135,10 @@ def simulate(m: Mechanism, until: float = 0.18, tol: Tolerance | None = None) ->
     y, t, latched = m.start, 0.0, None
     samples: list[tuple[float, Array]] = [(0.0, y)]
     impacts: list[Impact] = []
-    evaluations = 0
     while t < until:
         # right-hand values at 0, left-hand ones at 0.18 s; at 0.09 s only the jerk differs
         side = 1 if t < 0.09 else -1
         piece = integrate(m, t, y, min(until, 0.09 if t < 0.09 else 0.18), side, latched, tol)
-        evaluations += piece.evaluations
         grid = [k * GRID for k in range(int(t / GRID + 1e-6) + 1, int(piece.end / GRID + 1e-6) + 1)]
         samples += [(x, piece.states(x)) for x in grid]
         if latched is not None:
@@ -159,7 +155,7 @@ def simulate(m: Mechanism, until: float = 0.18, tol: Tolerance | None = None) ->
             latched = None
     time, state = np.array([x for x, _ in samples]), np.array([y for _, y in samples])
     platform = [m.platform(x, 1 if x < 0.18 else -1, y) for x, y in samples]
-    return Result(time, state, platform, impacts, evaluations)
+    return Result(time, state, platform, impacts)
 
 
 def table(result: Result, every: int = 10) -> dict[str, list[float]]:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from tests.reference.ideal_motion import exponential
+
 Array = np.ndarray
 UNITS = {
     "": 1.0, "m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "kg": 1.0, "g": 1e-3, "s": 1.0, "ms": 1e-3, "us": 1e-6,
@@ -48,19 +50,9 @@ def si(value: Any) -> Any:
     return float(value)
 
 
-def rotation(vector: Array) -> Array:
-    """Matrix of a rotation vector, by Rodrigues' formula."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K
-
-
 def pose(table: dict[str, Any]) -> tuple[Array, Array]:
     """Origin and axes (columns) of a frame."""
-    axes = rotation(si(table.get("rotation_vector", [0.0, 0.0, 0.0])))
+    axes = exponential(si(table.get("rotation_vector", [0.0, 0.0, 0.0])))
     if "axes" in table:
         x, z = (si(table["axes"][k]) / np.linalg.norm(si(table["axes"][k])) for k in "xz")
         axes = np.column_stack([x, np.cross(z, x), z])

@@ -405,3 +405,12 @@ def test_from_python_a_scene_without_a_requested_accuracy_is_planned_for_a_fract
     assert "must stay" in shown
     assert "<img src='data:image/png" in shown
     assert "met" in shown
+
+
+def test_where_no_accuracy_has_a_plan_the_command_ends_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def refused(*_: Any) -> None:
+        raise InputError("[accuracy] tip.position", "a relative accuracy of a quantity that never changes")
+
+    monkeypatch.setattr(plan, "bring", refused)
+    with pytest.raises(InputError, match="never changes"):
+        plan.levels(load_scene(write("slider-crank", tmp_path)[0]), open_workplace())

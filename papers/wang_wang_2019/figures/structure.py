@@ -1,4 +1,4 @@
-"""Figures 1, 3, 4 and 10: the mechanism, the mode shapes of its rod, and how its dynamics are computed."""
+"""Figures 1, 3, 4 and 10: the mechanism, the mode shapes of its rod, and the algorithm of its dynamics."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from flexclear.pipeline.post.single_run.series import parameters
 
 LEGS = (1, 2, 3, 4)
 TOWARDS, UP = np.array([0.75, -1.35, 0.55]), np.array([0.0, 0.0, 1.0])
-#: radii of the parts that Table 1 decodes into [m]
+#: radii of the parts that follow from Table 1 [m]
 CYLINDER, ROD, BALL = 0.02, 0.01, 0.02
-#: where the legs' names are next to the middle of their cylinders on the paper [m]
+#: offsets of the legs' names from the middle of their cylinders on the paper [m]
 LABELS = {1: (0.07, 0.0), 2: (-0.065, 0.0), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
 STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
 
@@ -35,7 +35,7 @@ STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
     "sps4/ideal:run",
 )
 def mechanism(data: Data) -> Drawing:
-    """The mechanism at its start, drawn to scale, and its joints seen from above."""
+    """Draw the mechanism at its start, to scale, and its joints seen from above."""
     run = data[f"{IDEAL.scene}:run"]
     points = {str(name): run.frame_position.values[0, k] for k, name in enumerate(run.frame.values)}
     figure, axes = style.grid(1, 2, (12.4, 7.4), width_ratios=[1.25, 1])
@@ -53,7 +53,7 @@ def mechanism(data: Data) -> Drawing:
 
 
 def plate(run: xr.Dataset) -> np.ndarray:
-    """Corners of the square plate that has the platform's inertia, platform axes, at the start, world [m], (5, 3).
+    """Return the corners of the square plate with the platform's inertia, at the start, world axes [m], shape (5, 3).
 
     Table 1's moments are those of a square plate 200 x 200 x 1 mm about its centre: m a^2/6 about the normal.
     """
@@ -70,14 +70,14 @@ def _mechanism(axes: Axes, seen: View, at: dict[str, np.ndarray], corners: np.nd
     nearest_last = sorted(LEGS, key=lambda k: float(seen.depth(at[f"ground.B{k}"])))
     for order, k in enumerate(nearest_last):
         _leg(axes, seen, at, k, 2.0 + order)
-    # the plate above all legs' upper ends
+    # the plate lies above all legs' upper ends
     _centre(axes, seen, at, 3.4)
     axes.fill(*seen.project(corners).T, facecolor=PLATE, edgecolor="#7a6236", alpha=0.82, lw=1.0, zorder=7)
     for k in LEGS:
         clear = f"A{k}" == JOINT
         _ball(axes, seen, at[f"platform.A{k}"], CSJ.color if clear else "#3b4754", 8.0)
         _name(axes, seen, at[f"platform.A{k}"], f"A{k}" + (" (clearance)" if clear else ""), (0.012, 0.024))
-        # B3 is behind leg 2, and its name next to that
+        # B3 is behind leg 2, so that its name is at that leg's side
         _name(axes, seen, at[f"ground.B{k}"], f"B{k}", (0.052, 0.0) if k == 3 else (0.018, -0.036))
     _ball(axes, seen, at["platform.C"], "#3b4754", 8.0)
     _name(axes, seen, at["platform.C"], "C", (0.012, 0.022))
@@ -109,7 +109,7 @@ def _leg(axes: Axes, seen: View, at: dict[str, np.ndarray], k: int, zorder: floa
 
 
 def _centre(axes: Axes, seen: View, at: dict[str, np.ndarray], zorder: float) -> None:
-    """Rod, stem and base cylinder of the central chain."""
+    """Draw rod, stem and base cylinder of the central chain."""
     shell(
         axes, seen, tube(at["ground.Z"] - [0, 0, 0.07], at["ground.Z"] + [0, 0, 0.13], 0.02), None, STEEL, zorder=zorder
     )
@@ -155,7 +155,7 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
     axes.set_aspect("equal")
 
 
-#: boxes of the three columns: text, and the paper's step that it is
+#: boxes of the three columns: text, and the step of the paper that it corresponds to
 STRUCTURE = (
     ("recipe → mesh of beam elements", ""),
     ("modes under a reference condition,\nstatic shapes", "1"),
@@ -173,13 +173,13 @@ LOOP = (
     ("closures beyond the tolerance?\nthen projected", "4"),
 )
 BLUE, GREEN, ORANGE = "#0072B2", "#009E73", "#E69F00"
-#: where the boxes of the three parts are, from above, as fractions of the height; (b) is below (a)
+#: positions of the boxes of the three parts, as fractions of the height; (b) is below (a)
 ROWS = ((0.92, 0.72, 0.52), (0.28, 0.08), (0.92, 0.71, 0.49, 0.27, 0.08))
 
 
 @drawn("Figure 10: how the dynamics are computed, next to the paper's steps 1 to 9", "sps4/far_csj_cb:run")
 def steps(data: Data) -> Drawing:
-    """The boxes, with the counts of the paper's full model."""
+    """Draw the boxes of the algorithm, with the counts of a run of the paper's full model."""
     attributes = data[f"{FAR_CSJ_CB.scene}:run"].attrs
     figure, axes = style.grid(1, 2, (9.0, 5.2))
     left, right = axes.flat
@@ -201,7 +201,7 @@ def steps(data: Data) -> Drawing:
 
 
 def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], rows: tuple[float, ...], color: str) -> list[Text]:
-    """Boxes below each other, joined by arrows."""
+    """Draw boxes below each other, joined by arrows, and return them."""
     drawn = []
     for (text, step), y in zip(boxes, rows, strict=True):
         box = {"boxstyle": "round,pad=0.45", "fc": "white", "ec": color, "lw": 1.5}
@@ -217,7 +217,7 @@ def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], rows: tuple[float, .
 
 
 def _arrow(axes: Axes, first: Text, second: Text, way: str) -> None:
-    """From the rim of a box to that of another."""
+    """Draw an arrow from the rim of a box to that of another."""
     look = {"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3, "connectionstyle": way, "shrinkA": 2, "shrinkB": 2}
     patches = {"patchA": first.get_bbox_patch(), "patchB": second.get_bbox_patch()}
     axes.annotate("", second.get_position(), first.get_position(), arrowprops=look | patches)
@@ -225,14 +225,14 @@ def _arrow(axes: Axes, first: Text, second: Text, way: str) -> None:
 
 #: drawn size of the largest displacement, as a fraction of the body's length
 FRACTION = 0.16
-#: of the pictures [m]
+#: margin of the pictures [m]
 MARGIN = 0.008
-#: the rod lies across the picture, seen from above and in front; both planes of bending are seen
+#: the rod lies across the picture, seen from above and in front, so that both planes of bending are visible
 ACROSS = np.array([-0.35, -1.0, 0.9])
 
 
 def _sheet(heading: str, bundle: xr.Dataset, printed: tuple[float, ...]) -> Drawing:
-    """The first four shapes; printed: the paper's frequencies [Hz]."""
+    """Draw the first four mode shapes; printed: the paper's frequencies [Hz]."""
     seen = view(ACROSS, UP)
     figure, axes = style.grid(2, 2, (10.6, 6.3))
     corners = []
@@ -246,7 +246,7 @@ def _sheet(heading: str, bundle: xr.Dataset, printed: tuple[float, ...]) -> Draw
             fontsize=8.0,
         )
     low, high = np.min(corners, axis=(0, 1)) - MARGIN, np.max(corners, axis=(0, 1)) + MARGIN
-    for panel in axes.flat:  # one scale for all of them
+    for panel in axes.flat:  # one scale for all panels
         panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), "viridis"), ax=axes, shrink=0.7, pad=0.01, aspect=30)
     bar.set_label("displacement, largest = 1")
@@ -258,7 +258,7 @@ def _sheet(heading: str, bundle: xr.Dataset, printed: tuple[float, ...]) -> Draw
 
 
 def _shape(axes: Axes, seen: View, bundle: xr.Dataset, mode: int) -> tuple[float, np.ndarray]:
-    """One shape over its undeformed ghost.
+    """Draw one mode shape over its undeformed ghost.
 
     Returns the factor of the drawn displacements [kg^0.5 m], and lower left and upper right corner of the picture [m].
     """
@@ -278,7 +278,7 @@ def _shape(axes: Axes, seen: View, bundle: xr.Dataset, mode: int) -> tuple[float
 
 
 def _figure(title: str, heading: str, condition: str, printed: tuple[float, ...]) -> Figure:
-    """The figure of a reference condition of the rod with a round section."""
+    """Build the figure of a reference condition of the rod with a round section."""
     needed = f"sps4/frequencies/{condition}_circle:bundle/rod"
     return Figure(title, (needed,), lambda data: _sheet(heading, data[needed], printed))
 

@@ -1,8 +1,7 @@
-"""The compiled functions of a mechanism, cached on disk across processes.
+"""Compiled functions of a mechanism, cached on disk across processes.
 
-Each is a generated file (`sources`) whose name is a digest of the sources of all kernels it can
-reach and of the versions of the compiler. The functions call each other by address (`calls`), so
-that mechanisms use common ones.
+Each is a generated file (`sources`) whose name is a digest of the sources of all kernels that it can reach and of the
+compiler's versions. The functions call each other by address (`calls`), so that mechanisms share them.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, 
 from flexclear.pipeline.dynamics.effects import DEEP, METHOD, Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
-#: of each function in words, and where the header keeps its address, if others call it; of straight code that depends
-#: on the rows solved for. In this order this process compiles, in the opposite one the second, so that they meet in the
-#: middle; what replaces straight code has most kernels in common, which each process compiles once
+#: of each function: description for progress, and the header's index of its address if others call it (specialised code
+#: has one per selection of closure rows). This process compiles in this order, the second one in the opposite order;
+#: the generic kernels that replace specialised code have most code in common, which each process compiles once
 FUNCTIONS: dict[str, tuple[str, int | None]] = {
     "advance": ("integrator", None),
     "prescribe": ("laws of time", m.PRESCRIBE),
@@ -55,7 +54,7 @@ _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": 
 
 @cache
 def function(name: str, address: int) -> Callable:
-    """A compiled function that Python calls, by its name and where it is; calls let other threads run."""
+    """Return the compiled function at an address for calls from Python; calls let other threads run."""
     if INTERPRETED:
         return interpreted[address]
     types = (_TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
@@ -64,7 +63,7 @@ def function(name: str, address: int) -> Callable:
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
-    """Where the entries of an array are, as C functions take it; TypeError for one that is not as they read it."""
+    """Return the address of an array's entries for C functions; raise TypeError for another type or memory layout."""
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"an array of {array.dtype}, {array.strides} bytes apart, instead of {kind.__name__} in a row")
     return array if INTERPRETED else array.ctypes.data
@@ -72,18 +71,18 @@ def place(array: np.ndarray, kind: type = np.float64) -> Any:
 
 @dataclass(frozen=True)
 class Entry:
-    """The compiled functions of a mechanism, by their addresses; h must have been given those."""
+    """Compiled functions of a mechanism, by their addresses, which `connect` must have written into h."""
 
     addresses: Mapping[str, int]
 
     def connect(self, h: np.ndarray) -> None:
-        """Write into the header where this process has put the functions that others call."""
+        """Write into the header the addresses of the functions that other compiled functions call."""
         for name, (_, where) in FUNCTIONS.items():
             if where is not None:
                 h[where] = self.addresses.get(name, 0)
 
     def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
-        """Slope of the state in Y at time t, into the first row of SLOPES."""
+        """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
         self._function("advance")(*_tables(h, f, w, n), t, repeat, *_record(_FLOATS, _TABLE, _TABLE))
 
     def advance(
@@ -99,8 +98,7 @@ class Entry:
     ) -> None:
         """Step to the end of the segment or of the budget.
 
-        by: what is to call the compiled function, given its address, and a word for each of its arguments but t and
-        repeat.
+        by: calls the compiled function instead, given its address and one word per argument except t and repeat.
         """
         tables, record = _tables(h, f, w, n), _record(outputs, rows, events)
         if by is None:
@@ -119,7 +117,7 @@ class Entry:
         tolerance: float,
         out: np.ndarray,
     ) -> None:
-        """Evaluate what is recorded of every row."""
+        """Evaluate the recorded quantities of every row."""
         given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
         self._function("observe")(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
 
@@ -138,9 +136,9 @@ def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple:
 def entry(
     parts: Parts, scheme: Scheme, tell: Callable[[str], None], equations: Mapping[str, str] = MappingProxyType({})
 ) -> Entry:
-    """The compiled functions for these parts; `tell` receives what has to be compiled.
+    """Return the compiled functions for these parts; `tell` receives a message for each function to compile.
 
-    equations: sources by name of straight code, or of kernels; these are compiled instead where there is none.
+    equations: sources by name of specialised code, or of generic kernels, which are compiled where the former has none.
     """
     meet(METHOD.format(scheme.integrator))
     if parts.articulated:
@@ -157,8 +155,10 @@ def entry(
 
 
 def straight(name: str, source: str, tell: Callable[[str], None]) -> int:
-    """Address of code for one wiring, whose name and source are of `sources`; 0 when there is none, UnsuitedError when
-    there is none of several lanes or with changes."""
+    """Return the address of specialised code for one topology; name and source: of `sources`; 0 when LLVM yields none.
+
+    Raises UnsuitedError when code for several lanes, or with tangents, is impossible.
+    """
     folder, began = writable(kernel_root(), tell), time.monotonic()
     path = _file(folder, name, source)
     _bring(folder, {name: path}, tell, began)
@@ -166,7 +166,7 @@ def straight(name: str, source: str, tell: Callable[[str], None]) -> int:
 
 
 def _bring(folder: Path, files: Mapping[str, Path], tell: Callable[[str], None], began: float) -> None:
-    """Load files by the names of their functions, from disk or compiled there."""
+    """Load the functions of files, from disk or after compiling them; files: by function name."""
     names = {path: name for name, path in files.items() if path.stem not in loaded}
     requested = sorted(names, key=lambda path: [*FUNCTIONS].index(names[path]))
     with disk_limits(folder):
@@ -184,7 +184,7 @@ def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
 
 
 def _file(folder: Path, name: str, source: str) -> Path:
-    """The generated file, there with exactly this text."""
+    """Return the path of the generated file, written unless it exists with exactly this text."""
     path = folder / f"flexclear_{name}_{digest(source)}.py"
     try:
         same = path.read_bytes() == source.encode()
@@ -197,7 +197,7 @@ def _file(folder: Path, name: str, source: str) -> Path:
 
 @cache
 def digest(source: str) -> str:
-    """Digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
+    """Return the digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
     total = hashlib.sha256(source.encode())
     total.update(f"{library_version('numba')} {library_version('llvmlite')} {sys.version_info[:2]}".encode())
     for name, source_digest in sorted(reach.reached(source).items()):

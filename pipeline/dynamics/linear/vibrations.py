@@ -1,7 +1,7 @@
-r"""Natural vibrations about an equilibrium, or about steady motion: :math:`\ddot z + D\dot z + Kz = 0`.
+r"""Natural vibrations about an equilibrium or a steady motion: :math:`\ddot z + D\dot z + Kz = 0`.
 
-Stiff contacts next to soft pendulums: a stiffness taken along mixed directions leaves rounding of the stiff ones in the
-soft. So it is taken twice, the second time along the vibrations that the first gave, and the eigenvalue problem is
+With stiff contacts next to soft pendulums, a stiffness along mixed directions leaves rounding of the stiff ones in the
+soft ones. It is therefore evaluated twice, the second time along the vibrations of the first, and the eigenproblem is
 solved in coordinates scaled by their own frequency.
 
 Source: Meirovitch, *Principles and Techniques of Vibrations*, ch. 4 (undamped), 6 and 11 (damped, gyroscopic).
@@ -17,15 +17,15 @@ import scipy.linalg
 from flexclear.pipeline.dynamics.linear.bench import Bench
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, damping, stiffness
 
-#: an eigenvalue of the stiffness within this many roundings of zero is zero
+#: an eigenvalue of the stiffness within this many rounding errors of zero is zero
 ZERO_EIGENVALUE = 10.0
-#: the same, as a fraction of the largest eigenvalue
+#: an eigenvalue below this fraction of the largest is zero
 NOTHING_BESIDE = 1e-13
 #: asymmetry below this fraction of the scaled stiffness is rounding
 ASYMMETRY = 1e-9
-#: a motion without stiffness is scaled by this fraction of the highest frequency
+#: scale of a motion without stiffness, as a fraction of the highest frequency
 LEAST_SCALE = 1e-6
-#: an eigenvalue with this fraction of imaginary part is real, it decays or grows without vibrating; likewise imaginary
+#: an eigenvalue with at most this fraction of imaginary part is real, without vibration; likewise imaginary
 REAL = 1e-12
 
 
@@ -34,7 +34,7 @@ class Vibrations:
     """Small motions exp(lambda t) w, ascending in frequency; pairs of complex lambda once, with Im > 0.
 
     value: lambda [1/s], complex, shape (n,).  shape: displacements w of the coordinates, complex, shape (nv, n), with
-    w^H M w = 1.  free: how many motions have no stiffness.  doubt: error of each lambda, estimated [1/s], shape (n,).
+    w^H M w = 1.  free: number of motions without stiffness.  doubt: estimated error of each lambda [1/s], shape (n,).
     """
 
     value: np.ndarray
@@ -44,19 +44,19 @@ class Vibrations:
 
     @property
     def growth(self) -> float:
-        """The largest rate at which a motion grows [1/s]; 0 where none does by more than its error."""
+        """Largest rate at which a motion grows [1/s]; 0 where no motion grows by more than its error."""
         return float(
             np.max(np.where(self.value.real > ZERO_EIGENVALUE * self.doubt, self.value.real, 0.0), initial=0.0)
         )
 
     @property
     def stable(self) -> bool:
-        """Whether no small motion grows exponentially."""
+        """True when no small motion grows exponentially."""
         return self.growth == 0.0
 
 
 def vibrations(bench: Bench, at: Tangent) -> Vibrations:
-    """All small motions about a pose in balance."""
+    """Compute all small motions about a pose in balance."""
     if not at.Z.shape[1]:
         return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0, np.zeros(0))
     first, error = stiffness(bench, at, at.Z)
@@ -78,7 +78,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
 
 
 def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Which motions have no stiffness as far as rounding shows."""
+    """Return True for motions without stiffness, within rounding."""
     own = np.abs(np.diag(K))
     return own <= np.maximum(ZERO_EIGENVALUE * error, NOTHING_BESIDE**2 * own.max())
 
@@ -89,21 +89,21 @@ def _scale(K: np.ndarray) -> np.ndarray:
 
 
 def _is_symmetric(K: np.ndarray, error: np.ndarray) -> bool:
-    """Whether K is symmetric within the errors of its columns: then the forces have a potential."""
+    """Return True when K is symmetric within the errors of its columns: then the forces have a potential."""
     doubt = ZERO_EIGENVALUE * (error[:, None] + error[None, :]) + ASYMMETRY * np.outer(_scale(K), _scale(K))
     return bool(np.all(np.abs(K - K.T) <= doubt))
 
 
 def _symmetric(K: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Of the two values of an entry that of the column with the smaller error."""
+    """Return K made symmetric: of the two values of an entry, that of the column with the smaller error."""
     better = np.where(error[:, None] < error[None, :], K.T, K)
     return np.triu(better) + np.triu(better, 1).T
 
 
 def _principal(K: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and axes of a symmetric stiffness; limp motions have the eigenvalue 0.
+    """Return eigenvalues and axes of a symmetric stiffness; `limp` motions have the eigenvalue 0.
 
-    A positive definite one goes by the singular values of its Cholesky factor, the frequencies themselves: rounding
+    For a positive definite one, the singular values of its Cholesky factor are the frequencies: rounding
     is then relative to the highest frequency, not to its square.
     """
     firm = ~limp
@@ -122,9 +122,9 @@ def _principal(K: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _damped(
     K: np.ndarray, D: np.ndarray, limp: np.ndarray, error: np.ndarray, rate_error: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair, and errors of lambda.
+    """Return eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair, and errors of lambda.
 
-    error, rate_error: of the columns of K and D.  An eigenvalue errs by |y^H| |dA| |x| / |y^H x| at most, to first
+    error, rate_error: of the columns of K and D.  The error of lambda is at most |y^H| |dA| |x| / |y^H x|, to first
     order, with its left and right vectors y and x (Golub & Van Loan (2013), Matrix Computations, sec. 7.2.2).
     """
     loose = limp & ~np.any(D, axis=0) & ~np.any(D, axis=1)
@@ -138,7 +138,7 @@ def _damped(
     wrong[n:] += np.concatenate([error[~loose] / scale, rate_error[~loose]])
     sizes = np.einsum("ik,ij,jk->k", np.abs(left), wrong, np.abs(vectors))
     doubt = sizes / np.maximum(np.abs(np.sum(left.conj() * vectors, axis=0)), np.finfo(float).tiny)
-    # displacements, not speeds: a creeping motion has none
+    # displacements, not speeds: a creeping motion has hardly any speed
     inner = vectors[:n] / scale[:, None]
     real = np.abs(value.imag) <= REAL * np.abs(value)
     lasting = np.abs(value.real) <= np.maximum(REAL * np.abs(value), doubt)

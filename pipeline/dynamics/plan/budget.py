@@ -1,4 +1,4 @@
-"""The budget of a plan: the error that is requested, what dropped effects have spent of it, and what was decided."""
+"""Error budget of a plan: the requested accuracy, the part that dropped effects use up, and the decisions."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE
 from flexclear.pipeline.dynamics.plan.screening_runs import Pilots
 
-#: fraction of the requested accuracy that dropped effects may use up together; the rest is for what is not estimated
+#: fraction of the requested accuracy that dropped effects may use up together; the rest is for errors without estimate
 BUDGET = 0.75
-#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a fraction of that
+#: uncertainty of the effect of rigid bodies' impacts on rates and forces where bodies are flexible, as a fraction
 OF_IMPACTS = 0.5
-#: what an influence measured with pilots' tolerance may be wrong by, as a fraction of it
+#: uncertainty of an effect size measured with the tolerance of screening runs, as a fraction of the effect size
 OF_PILOT = 0.15
-#: what the rest of the time may add to what a run over a part of it shows, as a fraction
+#: possible increase of an effect size over the rest of the time, when a run covers only a part, as a fraction
 WHOLE = 1.0
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown.
+    """Integration of the planned scene. level: of modes, None: all.  error: by quantity [SI], NaN where unknown.
 
-    ledger_tolerance: energy error beyond which the run is refused, where it is not the usual one.
-    evaluations, reference: that a run of all the time takes, and one by what it was compared with, where that is known.
+    ledger_tolerance: energy error beyond which the run is refused, where it differs from the default.
+    evaluations, reference: evaluations of a run over all the time, and of its reference run, where known.
     """
 
     integrator: str
@@ -40,13 +40,13 @@ class Chosen:
     reference: float = np.nan
 
 
-#: the planned run is that of the scene: its integrator and tolerance stay
+#: the planned run equals that of the scene: integrator and tolerance stay
 AS_IT_IS = Chosen("", 0.0, {})
 
 
 @dataclass
 class Search:
-    """The state of the decisions. used: of the budget, by quantity, as fractions of the requested accuracy."""
+    """State of the decisions. used: spent budget by quantity, as fractions of the requested accuracy."""
 
     pilots: Pilots
     requested: dict[str, float]
@@ -55,18 +55,18 @@ class Search:
 
     @property
     def gone(self) -> list[Effect]:
-        """What has been dropped."""
+        """Effects that have been dropped."""
         return [d.effect for d in self.decisions.values() if not d.kept]
 
     def fits(self, most: Mapping[str, float], budget: float = BUDGET) -> bool:
-        """Whether influences of at most this much fit into what is left of the budget, for all quantities."""
+        """Return True when effect sizes of at most `most` fit into the remaining budget, for all quantities."""
         return all(
             self.used.get(name, 0.0) + most.get(name, np.inf) / self.requested[name] <= budget
             for name in self.requested
         )
 
     def spend(self, most: Mapping[str, float]) -> None:
-        """Take influences out of the budget."""
+        """Subtract effect sizes from the budget."""
         for name in self.requested:
             self.used[name] = self.used.get(name, 0.0) + most[name] / self.requested[name]
 
@@ -79,15 +79,15 @@ class Search:
         estimate: Mapping[str, float] | None = None,
         uncertainty: Mapping[str, float] | None = None,
     ) -> None:
-        """Write down what becomes of an effect."""
+        """Record the decision about an effect."""
         self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
 
     def judge(
         self, effect: Effect, why: str, most: Mapping[str, float], seen: Mapping[str, Influence], besides: str = ""
     ) -> None:
-        """Record what short runs show of an effect, at most and as it was seen.
+        """Record what screening runs show of an effect: upper bound `most`, and effect sizes `seen`.
 
-        why: reason to drop it; empty where it stays, with `besides` before the reason of that.
+        why: reason to drop the effect; empty where it stays, for a reason that `besides` precedes.
         """
         difference = {name: influence.difference for name, influence in seen.items()}
         uncertainty = {name: influence.uncertainty for name, influence in seen.items()}
@@ -96,14 +96,14 @@ class Search:
 
 
 def most_of(seen: Mapping[str, Influence]) -> dict[str, float]:
-    """What influences may come to."""
+    """Return the upper bounds of effect sizes."""
     return {name: influence.most for name, influence in seen.items()}
 
 
 def with_doubt(
     search: Search, effect_sizes: Mapping[str, Influence], soft: bool, more: float = 0.0
 ) -> dict[str, Influence]:
-    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a fraction `more`."""
+    """Return effect sizes with uncertainties: of screening runs, of flexible bodies' impacts, a fraction `more`."""
     kinds = {q.name: q.kind for q in search.pilots.chosen}
     doubled = {}
     for name, i in effect_sizes.items():
@@ -113,7 +113,7 @@ def with_doubt(
 
 
 def too_much(most: Mapping[str, float], requested: Mapping[str, float]) -> str:
-    """Why an effect stays: what it may change most, in words."""
+    """Return the reason why an effect stays: its largest possible change, in words."""
     name = max(requested, key=lambda n: most[n] / requested[n])
     if not np.isfinite(most[name]):
         return f"without it {name} cannot be determined, or has other events"

@@ -1,7 +1,7 @@
-"""Decisions where joints stay loose: which bodies bend, with how many modes, by which method and at which tolerance.
+"""Plan decisions with clearance: bodies that bend, number of modes, method and tolerance.
 
-All of them are differences from one run of the whole mechanism at a loose tolerance, over as much of the time as it may
-take, and count by what exceeds chance.
+All are based on differences from one run of the whole mechanism at a loose tolerance, over as much time as it may
+take; only the part of a difference that exceeds chance counts.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS, OF_TIGHT, l
 from flexclear.pipeline.dynamics.plan.tolerance import TIGHTEST
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
-#: what is tried: next to impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
-#: looser than that of the pilots where these are tight
+#: method of the candidates: next to impacts steps are short at any order, so order 5; and their first tolerance, looser
+#: than that of the screening runs where these are tight
 QUICK, QUICK_RTOL = "dopri5", 1e-4
-#: what they are compared with: the pilots' method at so much tighter a tolerance, at most `TIGHTEST`
+#: reference of the candidates: the screening runs' method at a tolerance tighter by this factor, at least `TIGHTEST`
 TIGHTER = 1e-2
-#: of the largest energy error of a run, what one over a part of the time may have, as a fraction of that part
+#: energy error of a candidate over a part of the time: this fraction of a run's limit, times that part, at most
 OF_LEDGER = 0.25
-#: energy error that the planned run may have then: what it does to the requested quantities has been tested
+#: energy error that the planned run may then have: its effect on the requested quantities has been tested
 LEDGER = 5e-3
-#: levels of modes that leave more than this fraction of the variables save too little to be tried
+#: levels of modes that leave more than this fraction of the variables save too little to be tested
 WORTH = 0.85
-#: differences beyond so many budgets are not of the tolerance
+#: differences beyond this multiple of the budget are not due to the tolerance
 NEAR = 10.0
-#: evaluations times variables of all pilots beyond which nothing more is tried
+#: evaluations times variables of all screening runs beyond which no further candidate is tested
 MOST_WORK = 3e8
 
 
 def bent(search: Search, soft: Sequence[Effect]) -> None:
-    """Decide between flexible and rigid bodies in a mechanism that stays loose."""
+    """Decide between flexible and rigid bodies in a mechanism that keeps its clearance."""
     pilots, gone = search.pilots, search.gone
     for fraction in sorted({pilots.part(gone), pilots.whole(gone)}):
         there = pilots.must_run(gone, fraction)
@@ -55,12 +55,11 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
 
 
 def quickest(search: Search) -> Chosen:
-    """The cheapest way to integrate what is left of a scene with contacts; the pilots' method, tighter, where none is
-    shown to do.
+    """Return the cheapest verified integration of a scene with contacts; default: the screening runs' method, tighter.
 
-    All are compared with that at a tolerance that is TIGHTER than the pilots', over the whole time if that can be had:
-    impacts make small errors grow. The pilots' method at their own tolerance is none of them: of its members, single
-    ones lose a few per cent of the energy where stability bounds the steps.
+    All candidates are compared with that method at a tighter tolerance (TIGHTER), over the whole time if affordable:
+    impacts make small errors grow. The screening runs' method at its own tolerance is no candidate: single members
+    lose a few per cent of the energy where stability bounds the steps.
     """
     pilots, gone = search.pilots, search.gone
     loose = pilots.loose(pilots.variant(gone))
@@ -89,9 +88,9 @@ def quickest(search: Search) -> Chosen:
 
 
 def _errors(search: Search, tried: Point, there: Point, fraction: float) -> tuple[dict[str, float], bool]:
-    """What a way to integrate errs by over the whole time, by quantity, and whether it may.
+    """Return the error of an integration over the whole time, by quantity, and True when it fits into the budget.
 
-    What was seen, chance included, must fit into the budget, and with what the rest of the time may add, as well.
+    The observed difference with its uncertainty must fit, and so must the difference extrapolated to the whole time.
     """
     differences = search.pilots.same_starts(tried, there, search.requested)
     errors = {name: (1.0 + _more(fraction)) * i.difference for name, i in differences.items()}
@@ -99,7 +98,7 @@ def _errors(search: Search, tried: Point, there: Point, fraction: float) -> tupl
 
 
 def _by_modes(search: Search, most: Mapping[str, float], effect_sizes: Mapping[str, Influence]) -> bool:
-    """Whether a difference is rather due to the modes than to the tolerance: it is large, or members part anyway."""
+    """Return True when modes rather than tolerance cause a difference: it is large, or members diverge anyway."""
     return any(
         NEAR * BUDGET * requested < most[name] < np.inf or effect_sizes[name].uncertainty > requested
         for name, requested in search.requested.items()
@@ -107,20 +106,20 @@ def _by_modes(search: Search, most: Mapping[str, float], effect_sizes: Mapping[s
 
 
 def _more(fraction: float) -> float:
-    """What the rest of the time may add, as a fraction."""
+    """Return the possible increase over the rest of the time, as a fraction."""
     return 0.0 if fraction == 1.0 else WHOLE
 
 
 def _levels(search: Search) -> list[int]:
-    """Levels of fewer modes that may be tried."""
+    """Return the levels of fewer modes that may be tested."""
     pilots = search.pilots
     bending = pilots.variant(search.gone).flexible()
     return [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
 
 
 def _tried(search: Search, level: int | None, fraction: float, rtol: float, rival: Point) -> Point:
-    """A run of a level of modes at a tolerance, given up where it takes longer than another run of all modes, or
-    loses energy too fast."""
+    """Run a level of modes at a tolerance; the run stops where it takes longer than another run of all modes, or loses
+    energy too fast."""
     pilots = search.pilots
     saved = 1.0 if level is None else pilots.saved(level)
     limits: dict[str, Any] = {

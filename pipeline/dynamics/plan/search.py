@@ -1,10 +1,10 @@
-"""The decisions of a plan: the error that is requested is a budget, and what is dropped spends it.
+"""Decisions of a plan: the requested error is a budget, and each dropped effect spends a part of it.
 
 Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.clearance_response`),
-which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without,
-which are cheap;
-then, where clearance stays, a loose run of the whole scene to see whether flexible bodies change what it does.
-Effects that are not shown to be small stay.
+which cost one run of the ideal mechanism; then cheap runs of variants, rigid ones with clearance and flexible ones
+without;
+then, where clearance stays, a loose run of the whole scene, which shows whether flexible bodies change its motion.
+Effects stay unless a result shows that they are small.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, 
 from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 
-#: what bounds of clearances, which hold whatever happens, may use up of the budget
+#: fraction of the budget that bounds of clearances may use up; bounds hold under all circumstances
 BY_BOUND = 0.9
-#: by how much the first-order response of flexible bodies counts for more: it leaves out that the pose turns meanwhile,
-#: and that loads follow the vibration; next to runs it is 0.7 to 10 times what is true
+#: factor on the first-order response of flexible bodies, which neglects that the pose turns during a vibration and that
+#: loads follow the vibration; compared with runs the response is 0.7 to 10 times the true effect
 OF_RESPONSE = 2.0
 #: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
 SOFTER = 0.5
 #: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
-#: why parts go that the requested motion never feels
+#: reason to drop parts that do not affect the requested motion
 UNCOUPLED = "nothing couples it to the requested quantities"
 
 
@@ -55,13 +55,13 @@ def plan(
     filled: Callable[[Scene], Scene],
     progress: Progress,
 ) -> Plan:
-    """The decisions for a scene with `[accuracy]`.
+    """Return the decisions for a scene with `[accuracy]`.
 
-    bundles: reduced flexible bodies.  fewer: the same of fewer modes, of those that have a choice, levels with the
-    fewest first.  meshes: numbers of elements, and the bodies as reduced from twice as many.  filled: a variant
-    with the rigid bodies that recipes describe filled in.
-    Raises InputError where nothing is requested, or the motion itself is below it; SolverError where the scene, or what
-    is left of it, cannot be run.
+    bundles: reduced flexible bodies.  fewer: those with fewer modes, for bodies with a choice, levels with the
+    fewest first.  meshes: numbers of elements, and the bodies reduced from twice as many.  filled: fills a variant
+    with the rigid bodies that recipes describe.
+    Raises InputError where nothing is requested, or the motion is smaller than the request; SolverError where the
+    scene, or its planned variant, cannot be run.
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
@@ -70,7 +70,7 @@ def plan(
     bare = lessened(plain, uncoupled_parts)
     mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
     pilots = Pilots(bare, mine, less, filled, quantities, progress)
-    _ = pilots.extent  # a scene that cannot be built is refused before anything is run
+    _ = pilots.extent  # refuses a scene that cannot be built, before anything is run
     pilots.must_run((), BEGINNING, 0)
     loose, soft = ([effect for effect in pilots.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
     ideal = pilots.point([*loose, *soft], rtol=RTOL)
@@ -87,11 +87,11 @@ def plan(
 def _requested(
     scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]
 ) -> dict[str, float]:
-    """What is requested by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with
-    rigid bodies, half of it where bodies are flexible.
+    """Return the requested accuracy by quantity [SI]; relative ones refer to the size in the ideal mechanism. For
+    quantities of contacts the size is that with rigid bodies, half of it where bodies are flexible.
 
     rigid: runs the scene with clearance and rigid bodies.
-    Raises InputError where a quantity never changes, or everything requested is above what the quantities do;
+    Raises InputError where a quantity never changes, or all requested errors exceed the quantities' sizes;
     SolverError where the mechanism with rigid bodies cannot be run.
     """
     accuracies, sizes = {}, {}
@@ -127,14 +127,14 @@ def _requested(
 
 
 def _rigid(search: Search, gone: Sequence[Effect]) -> Run:
-    """The run of the ideal mechanism."""
+    """Run the ideal mechanism."""
     run = integrate(search.pilots.variant(gone), {}, silent)
     search.pilots.evaluations += int(run.trajectory.counters["evaluations"])
     return run
 
 
 def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
-    """Which joints stay loose: by bounds where only the pose is requested, else by runs of rigid bodies."""
+    """Decide which joints keep their clearance: by bounds if only poses are requested, else by runs of rigid bodies."""
     asked = {t.owner for q in search.pilots.chosen for t in q.terms() if KINDS[t.kind].owner in OF_CLEARANCE}
     for effect in loose:
         if effect.owner in asked:
@@ -167,9 +167,9 @@ def _in_turn(
     why: str,
     shaken: bool,
 ) -> None:
-    """Drop effects one after the other, as long as what they change together fits into the budget.
+    """Drop effects one after the other, as long as their joint effect size fits into the budget.
 
-    others: that no run has.  reach: bounds by effect, where there are some.  shaken: as `soft` of `with_doubt`.
+    others: effects that no run has.  reach: bounds by effect, where known.  shaken: see `soft` of `with_doubt`.
     """
     pilots, dropped, left = search.pilots, list[Effect](), dict[str, float]()
     there = pilots.point(others)
@@ -187,9 +187,9 @@ def _in_turn(
 
 
 def _interactions(search: Search, soft: Sequence[Effect]) -> None:
-    """Clearances that rigid bodies may do without stay where flexible ones, shaken by impacts, may not.
+    """Keep clearances that rigid bodies can do without but flexible bodies, excited by impacts, cannot.
 
-    Rates and forces only: vibrations that impacts excite are small in positions and large in these.
+    This concerns rates and forces only: vibrations after impacts are small in positions and large in rates and forces.
     """
     pilots = search.pilots
     dropped = [e for e in search.gone if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
@@ -207,12 +207,12 @@ def _interactions(search: Search, soft: Sequence[Effect]) -> None:
 
 
 def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
-    """The sum by quantity, infinite where one of them does not say."""
+    """Return the sum by quantity, infinite where a part lacks the quantity."""
     return {name: sum(part.get(name, np.inf) for part in parts) for name in requested}
 
 
 def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effect], rigid: Run | None) -> None:
-    """Which bodies stay flexible."""
+    """Decide which bodies stay flexible."""
     if not soft:
         return
     if any(search.decisions[e.name].kept for e in loose):
@@ -237,12 +237,12 @@ def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effec
 
 
 def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
-    """A first-order response with what it may be wrong by."""
+    """Return a first-order response with its uncertainty."""
     return {name: OF_RESPONSE * value for name, value in influence.items()}
 
 
 def _vibrating(estimated: Response) -> str:
-    """The first vibration of the assembled mechanism, and how large loads of the motion make the first they excite."""
+    """Describe the mechanism's first vibration, and the amplification of the first one that the loads excite."""
     first = f"the mechanism's first frequency is {estimated.first:.3g} Hz"
     if np.isnan(estimated.excited):
         return f"{first}, and the loads of the ideal motion excite no vibration"
@@ -256,9 +256,9 @@ def _vibrating(estimated: Response) -> str:
 
 
 def _confirm(search: Search, soft: Sequence[Effect]) -> None:
-    """Clearances that go next to bodies that stay flexible: one run of all shows whether the estimate holds.
+    """Test dropped clearances together with bodies that stay flexible, by one run of the whole scene.
 
-    Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
+    Bounds hold along the motion of rigid bodies, and flexible bodies may move differently.
     """
     pilots = search.pilots
     dropped = [effect for effect in search.gone if effect.kind == CLEARANCE]
@@ -274,7 +274,7 @@ def _confirm(search: Search, soft: Sequence[Effect]) -> None:
 
 
 def _others(search: Search) -> None:
-    """Gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows that they do little."""
+    """Decide on gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows a small effect."""
     every = {effect.name: effect for effect in search.pilots.every}
     others = [effect for effect in every.values() if effect.kind not in (CLEARANCE, FLEXIBILITY)]
     remaining = {d.effect.name: d.effect.kind for d in search.decisions.values() if d.kept}
@@ -294,7 +294,7 @@ def _others(search: Search) -> None:
         seen = search.pilots.between(lost, there)
         most = most_of(seen)
         small = search.fits(most)
-        free = effect.kind in FREE or bool(effect.within)  # friction of a contact goes along with it
+        free = effect.kind in FREE or bool(effect.within)  # friction is dropped together with its contact
         if small and free and not search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)):
             search.judge(effect, "", most, seen, "it costs no time, and ")
             continue
@@ -304,7 +304,7 @@ def _others(search: Search) -> None:
 
 
 def _chosen(search: Search) -> Chosen:
-    """Numbers of modes, integrator and tolerance of what is left."""
+    """Choose number of modes, integrator and tolerance for the remaining effects."""
     pilots, gone = search.pilots, search.gone
     scene = pilots.variant(gone)
     if scene.contacts() or scene.stop:
@@ -321,7 +321,7 @@ def _chosen(search: Search) -> Chosen:
 
 
 def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
-    """The finite elements of bodies that stay flexible, judged by what their flexibility does."""
+    """Return the finite elements that flexible bodies need, judged by the effect of their flexibility."""
     scene, numbers = search.pilots.scene, {}
     for body, (given, finer) in meshes.items():
         decision = search.decisions.get(f"body.{body}.modes")

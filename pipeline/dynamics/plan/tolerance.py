@@ -1,5 +1,5 @@
-"""The integrator and the tolerance of a planned run: the loosest whose error is a small fraction of the requested
-accuracy, and no dearer ones than the scene names itself."""
+"""Integrator and tolerance of a planned run: the loosest tolerance whose error is a small fraction of the requested
+accuracy, and no more expensive than the scene's own method."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from flexclear.pipeline.dynamics.plan.screening_runs import (
 )
 from flexclear.pipeline.dynamics.run.progress_rate import AFFORDABLE, UNVERIFIED
 
-#: fraction of the requested accuracy that the integration may err by
+#: fraction of the requested accuracy that the integration error may take
 FRACTION = 0.15
-#: tolerances that are tried, loosest first, down to that of the reference
+#: tolerances to test, loosest first, down to that of the reference
 TRIED = (1e-4, 1e-5, 1e-6)
 STIFF_TRIED = (1e-3, 1e-4)
 TIGHT = 1e-8
-#: by so much a planned run must be cheaper than the scene as it is
+#: factor by which a planned run must be cheaper than the scene as it is
 CHEAPER = 1.2
-#: tightest tolerance of references, and how many times the evaluations the scene's own one may call for at most: a
-#: thousandth of the tolerance 2.4 times, by the method's order 8
+#: tightest tolerance of references, and their largest cost as a multiple of the evaluations at the scene's own
+#: tolerance: a thousandth of the tolerance costs 2.4 times as much, by the method's order 8
 TIGHTEST, AT_MOST = 1e-10, 4.0
 
 
 def smooth(pilots: Pilots, gone: Sequence[Effect], requested: Mapping[str, float], level: int | None) -> Chosen:
-    """Integrator and tolerance of the scene without what is gone, where that has no contacts.
+    """Choose integrator and tolerance for the scene without its dropped effects, where it has no contacts.
 
-    level: of modes of its flexible bodies; None: all.
+    level: of modes of its flexible bodies; None: all modes.
     """
     if not pilots.variant(gone).flexible():
         return _loosest(pilots, gone, requested, DEFAULT, TRIED, RTOL, level)
@@ -48,22 +48,22 @@ def smooth(pilots: Pilots, gone: Sequence[Effect], requested: Mapping[str, float
     unknown, own = dict.fromkeys(requested, np.nan), own_method(pilots.scene)
     if own is None:
         return Chosen(DEFAULT, TIGHT, unknown, level)
-    # nothing was shown to do, and what the full scene itself is run with does for it
+    # no candidate was accurate enough, so use the method of the full scene
     integrator, rtol = own
     return Chosen(integrator, max(rtol, TIGHT) if integrator == DEFAULT else rtol, unknown, level)
 
 
 def own_method(scene: Scene) -> tuple[str, float] | None:
-    """The integrator and the tolerance that a scene names itself; None where it leaves them open or steps are fixed."""
+    """Return integrator and tolerance that the scene names; None where it leaves them open or steps are fixed."""
     if scene.by_need() or scene.solver.step is not None:
         return None
     return scene.solver.integrator, scene.solver.rtol
 
 
 def no_dearer(search: Search, chosen: Chosen) -> Chosen:
-    """What was chosen; instead the scene's own method, where that takes fewer evaluations and does as well.
+    """Return the choice, or the scene's own method where that takes fewer evaluations at sufficient accuracy.
 
-    Both integrate what is left of the scene, over the part of the time that pilots with contacts are run for.
+    Both integrate the scene without dropped effects, over the part of the time that screening runs with contacts cover.
     """
     pilots, gone, own = search.pilots, search.gone, own_method(search.pilots.scene)
     if own is None or chosen == AS_IT_IS or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
@@ -72,7 +72,7 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
     loose = bool(bare.contacts() or bare.stop)
     fraction = pilots.part(gone) if loose else 1.0
     there = pilots.point(gone, level=chosen.level, fraction=fraction, integrator=chosen.integrator, rtol=chosen.rtol)
-    # no more of each member than the other one took
+    # no more evaluations of each member than the other run took
     most = {} if there.refused else {"evaluations": there.evaluations // (MEMBERS if loose else 1) + 1}
     mine = pilots.point(gone, level=chosen.level, fraction=fraction, integrator=own[0], rtol=own[1], **most)
     if mine.refused or (not there.refused and mine.evaluations >= there.evaluations):
@@ -86,7 +86,7 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
 
 
 def as_it_is(search: Search, chosen: Chosen) -> bool:
-    """Whether no planned run with contacts was shown to do, or none that is predicted to be cheaper by CHEAPER.
+    """Return True when no planned run with contacts is accurate enough, or none is cheaper by the factor CHEAPER.
 
     Both are run over a part of the time; their costs are evaluations times variables.
     """
@@ -129,7 +129,7 @@ def _loosest(
     reference: float,
     level: int | None,
 ) -> Chosen:
-    """The loosest of the tolerances that is good enough next to the reference, which represents itself."""
+    """Return the loosest of the tolerances that agrees with the reference, or the reference itself."""
     there = pilots.point(gone, level=level, integrator=integrator, rtol=reference)
     error = dict.fromkeys(requested, np.nan)
     tried = [rtol for rtol in tried if rtol > reference]
@@ -140,6 +140,6 @@ def _loosest(
             return Chosen(integrator, rtol, error, level)
     if not tried:
         return Chosen(integrator, reference, error, level)
-    # errors fall at least as the tolerance to the power 1/2
+    # errors decrease at least with the square root of the tolerance
     fall = float(np.sqrt(reference / tried[-1]))
     return Chosen(integrator, reference, {name: fall * value for name, value in error.items()}, level)

@@ -1,4 +1,4 @@
-"""What a report says first: what clearance and flexibility do, in sentences that the numbers make."""
+"""Sentences at the top of a report: effects of clearance and flexibility, in numbers."""
 
 from __future__ import annotations
 
@@ -27,12 +27,11 @@ def answer(
     changes: Sequence[str] = (),
     members: float | None = None,
 ) -> str:
-    """A list of sentences, as HTML.
+    """Return a list of sentences, as HTML.
 
-    compared: of `overview.comparison`, the ideal counterpart first and the scene last; None where there is none.
-    run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.answers.matters` on what
-    differs from the ideal mechanism, which replace those that two runs alone allow.  members: horizon of the scene's
-    ensemble [s], None where there is none.
+    compared: of `overview.comparison`, the ideal counterpart first and the scene last; or None. run: schema RUN of the
+    scene.  doubts: warnings of the run.  changes: sentences of `post.answers.matters` on the differences from the ideal
+    mechanism; they replace those from two runs alone.  members: horizon of the scene's ensemble [s], or None.
     """
     said = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
@@ -48,7 +47,7 @@ def answer(
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
-    """A sentence for each quantity: the difference from the ideal mechanism, next to the errors of both runs."""
+    """Return a sentence for each quantity: its difference from the ideal mechanism, and the errors of both runs."""
     first, last, said = compared.isel(run=0), compared.isel(run=-1), []
     for j, name in enumerate(str(q) for q in compared["quantity"].values):
         difference, error = float(last["difference"][j]), float(first["error"][j]) + float(last["error"][j])
@@ -63,7 +62,7 @@ def _effects(compared: xr.Dataset) -> list[str]:
 
 
 def _impacts(run: xr.Dataset) -> list[str]:
-    """A sentence for each contact of the scene, ends of stops among them."""
+    """Return a sentence for each contact of the scene, ends of stops included."""
     sentences = []
     for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
         unit = quantities.unit(run, Quantity(name, "peak_force"))
@@ -97,7 +96,7 @@ def _trust(run: xr.Dataset) -> list[str]:
 
 
 def effects(scene: Mapping[str, Any]) -> dict[str, str]:
-    """Which effects a scene (its parameters) has, by name, in words; those that it has not say so."""
+    """Return a scene's effects by name, in words, from its parameters; absent ones are named as absent."""
     body, joint = scene.get("body", {}), scene.get("joint", {})
     load = scene.get("load", {})
     flexible = [n for n, b in body.items() if b["type"] == "flexible"]
@@ -124,7 +123,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
 
 
 def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:
-    """Assumptions in the order of what hangs on them: of joints with clearance and flexible bodies first."""
+    """Sort assumptions by influence: those on joints with clearance and flexible bodies come first."""
     scene = {} if run is None else parameters(run)
     loose = {n for n, j in scene.get("joint", {}).items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"}
     flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}

@@ -1,4 +1,4 @@
-"""What accuracy costs, in words: a paragraph on one scene, and the page that says what to choose for several."""
+"""Cost of accuracy in words: a paragraph on one scene, and a page with advice on several scenes."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from flexclear.pipeline.post.overview.curves import size_of
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
 
-#: a setting that is as accurate as the scene's own is named where it costs less than this fraction
+#: a setting as accurate as the scene's own is named where it costs less than this fraction
 CHEAPER = 0.7
 
 
 def sentences(study: xr.Dataset) -> str:
-    """In words; study: of `stages.cost_study`."""
+    """Return the answer in words; study: of `stages.cost_study`."""
     return " ".join(filter(None, (_own(study), _digit(study), _looser(study), _cause(study), *undone(study))))
 
 
 def _worst(study: xr.Dataset) -> tuple[str, float]:
-    """What the largest error is a fraction of, in words, and that error."""
+    """Return quantity and size that the largest error refers to, in words, and that error."""
     errors = study["own_error"].values
     k = int(np.argmax(errors))
     return f"{size_of(str(study['unit'].values[k]))} of {study['quantity'].values[k]}", float(errors[k])
@@ -49,7 +49,7 @@ def _own(study: xr.Dataset) -> str:
 
 
 def _digit(study: xr.Dataset) -> str:
-    """What one more digit costs."""
+    """Return a sentence on the cost of one more digit."""
     _, error = _worst(study)
     better = cheapest(study, 0.1 * error) if np.isfinite(error) else None
     if better is None:
@@ -58,7 +58,7 @@ def _digit(study: xr.Dataset) -> str:
 
 
 def _looser(study: xr.Dataset) -> str:
-    """Whether another setting is as accurate for less."""
+    """Return a sentence on a setting that is as accurate for less, or nothing."""
     _, error = _worst(study)
     same = cheapest(study, error) if np.isfinite(error) else None
     if same is None or same.seconds > CHEAPER * study.attrs["own_seconds"]:
@@ -67,7 +67,7 @@ def _looser(study: xr.Dataset) -> str:
 
 
 def _cause(study: xr.Dataset) -> str:
-    """Which cause limits the error, of those that were looked at, for the quantity that has the largest one."""
+    """Return a sentence on the largest known cause of error, by the largest error of any quantity."""
     if "error_by_cause" not in study:
         return ""
     largest = study["error_by_cause"].max("quantity")
@@ -85,7 +85,7 @@ def _cause(study: xr.Dataset) -> str:
 
 
 def undone(study: xr.Dataset) -> list[str]:
-    """Which runs were left undone, and why, a sentence for each reason."""
+    """Return a sentence for each reason why runs were skipped."""
     reasons = {
         "undone": "Not run within the budget",
         "given_up": "Not run, since their method used up its evaluations at a tolerance no tighter",
@@ -94,7 +94,7 @@ def undone(study: xr.Dataset) -> list[str]:
 
 
 def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``: the largest error of any quantity against processor time, this scene as a star."""
+    """Draw ``<name>.png`` and ``.svg``: largest error of any quantity against processor time; a star: this scene."""
     by_method: dict[str, list[Choice]] = {}
     for choice in choices(study):
         by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
@@ -136,7 +136,7 @@ not.
 
 @dataclass(frozen=True, slots=True)
 class Studied:
-    """What the page says of a scene: `advice`, its tables (Markdown), its pictures by title, relative to the page."""
+    """Section of the page on a scene: `advice`, tables (Markdown), pictures by title, relative to the page."""
 
     scene: str
     advice: str
@@ -145,13 +145,13 @@ class Studied:
 
 
 def markdown(scenes: tuple[Studied, ...], page: str) -> str:
-    """The whole page."""
+    """Return the whole page."""
     names = " ".join(s.scene for s in scenes)
     return "\n".join([INTRODUCTION.format(scenes=names, page=page), sections(scenes)])
 
 
 def sections(scenes: tuple[Studied, ...]) -> str:
-    """What to choose for each scene, and then each with its pictures and tables."""
+    """Return the advice on each scene, and then each scene's pictures and tables."""
     parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
     for s in scenes:
         parts.append(f"\n## {s.scene}\n")
@@ -161,7 +161,7 @@ def sections(scenes: tuple[Studied, ...]) -> str:
 
 
 def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """One paragraph: the cheapest way to each accuracy, what a digit costs, how far it holds, what limits the scene."""
+    """Return one paragraph: cheapest way to each accuracy, cost of a digit, horizon, and limits of the scene."""
     choices = {target: cheapest(study, target) for target in TARGETS}
     had = {target: choice for target, choice in choices.items() if choice is not None}
     text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in had.items())
@@ -176,7 +176,7 @@ def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
 
 
 def _some(study: xr.Dataset, target: float) -> str:
-    """For which quantities an accuracy can be had that cannot be had for all."""
+    """Return a sentence on the quantities that reach an accuracy which not all reach."""
     names = [str(name) for name in study["quantity"].values]
     able = [name for name in names if cheapest(study.sel(quantity=[name]), target) is not None]
     unable = ", ".join(name for name in names if name not in able)
@@ -192,7 +192,7 @@ def _digits(had: Mapping[float, Choice]) -> str:
 
 
 def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """What is to be done where a run cannot be predicted to its end."""
+    """Return advice for a run that cannot be predicted to its end."""
     horizon, end = study.attrs["horizon"], study.attrs["end"]
     if horizon == "none" or horizon >= end:
         return ""
@@ -203,7 +203,7 @@ def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
 
 
 def _limits(study: xr.Dataset) -> str:
-    """What to refine in the scene as it is: the causes that dominate, each with its quantities."""
+    """Return advice on refinement of the scene: the dominant causes, each with its quantities."""
     if "error_by_cause" not in study:
         return ""
     by_cause: dict[str, list[str]] = {}
@@ -217,15 +217,15 @@ def _limits(study: xr.Dataset) -> str:
 
 
 TARGETS = (1e-3, 1e-6, 1e-9)
-#: a best error of so many times the reference's uncertainty, which it contains, is rounding
+#: a best error within this multiple of the reference's uncertainty, which it contains, is rounding
 ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
 
 
 def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Table:
-    """'for 1e-3 / 1e-6 / 1e-9 you need ... and it takes ...', the worst of all quantities counting.
+    """Tabulate settings, cost and error for 1e-3, 1e-6 and 1e-9, by the worst of all quantities.
 
-    notes: what else is to be said.
+    notes: further notes of the table.
     """
     rows = []
     for target in TARGETS:
@@ -242,7 +242,7 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
 
 
 def by_quantity(study: xr.Dataset, title: str) -> Table:
-    """The same for each quantity by itself, where the worst of all does not decide."""
+    """Tabulate settings and costs for the same accuracies for each quantity by itself."""
     rows = []
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
@@ -255,7 +255,7 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
 
 
 def _absent(study: xr.Dataset) -> str:
-    """What is said of an accuracy that no run of a study has."""
+    """Return the words for an accuracy that no run of a study has."""
     return "cannot be had" if study.attrs.get("complete", 1) else "not reached yet"
 
 
@@ -263,7 +263,7 @@ def _absent(study: xr.Dataset) -> str:
 class Choice:
     """One way to integrate: its name, cost, largest relative error and the quantity that has it.
 
-    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be determined.
+    error: distance from the reference plus the reference's uncertainty: never below what can be determined.
     """
 
     name: str
@@ -273,16 +273,16 @@ class Choice:
     worst: str
 
 
-#: times within this factor are alike: of a second run they differ by some per cent
+#: times within this factor are alike: times of repeated runs differ by some per cent
 AS_FAST = 1.1
-#: where no run of a study can be compared
+#: substitute where no run of a study can be compared
 NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
 
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
-    """The choice with the least processor time whose largest error is at most `target`; None if there is none.
+    """Return the choice with the least processor time whose largest error is at most `target`; None without one.
 
-    Of those whose times differ by no more than times of one run do (AS_FAST) the one with the fewest evaluations.
+    Among choices with nearly the same time (AS_FAST) the one with the fewest evaluations is returned.
     """
     good = [choice for choice in choices(study) if choice.error <= target]
     least = min((choice.seconds for choice in good), default=np.nan)
@@ -291,7 +291,7 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 
 def choices(study: xr.Dataset) -> list[Choice]:
-    """All ways to integrate whose error is known."""
+    """Return all ways to integrate whose error is known."""
     choices = []
     unsure = study["reference_uncertainty"].fillna(0.0)
     for group, method, setting, mine in methods(study):
@@ -350,7 +350,7 @@ def _confirmed(study: xr.Dataset) -> str:
 
 
 def _why_not(study: xr.Dataset) -> str:
-    """Whether the settings that were tried end too early, or rounding decides."""
+    """Return why an accuracy cannot be had: the tried settings end too early, or rounding decides."""
     unsure = study["reference_uncertainty"].fillna(0.0)
     best = min(choices(study), key=lambda c: c.error, default=NOTHING)
     if np.isinf(unsure).any():

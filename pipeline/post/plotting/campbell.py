@@ -1,4 +1,4 @@
-"""A Campbell diagram: frequencies over the speed of a drive, as a table in words and as a picture."""
+"""Campbell diagram: frequencies over the speed of a drive, as a table and as a picture."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import xarray as xr
 
 from flexclear.pipeline.post.plotting import style
 
-#: branches in the table: more are those of short waves, far above the speeds
+#: branches in the table: further ones are those of short waves, far above the speeds
 MOST = 8
 COLORS = {"forward": "#1f6f8b", "backward": "#c05a2b", "": "#6b6b6b"}
 
 
 def text(data: xr.Dataset) -> str:
-    """The table (schema CAMPBELL): a row per speed, a column per branch, whirls in fixed axes; then critical speeds."""
+    """Format rows per speed, columns per branch, whirls in fixed axes, and critical speeds (schema CAMPBELL)."""
     shown = data.isel(branch=slice(0, MOST))
     seen, names = _seen(shown), [str(name) or "no whirl" for name in shown["whirl"].values]
     lines = [
@@ -34,7 +34,7 @@ def text(data: xr.Dataset) -> str:
 
 
 def files(name: str, data: xr.Dataset) -> dict[str, bytes]:
-    """``<name>.png`` and ``<name>.svg``: whirls in fixed axes by magnitude, other vibrations, and the speed itself."""
+    """Draw ``<name>.png`` and ``.svg``: magnitudes of whirls in fixed axes, other vibrations, and the speed itself."""
     with style.style():
         figure, axes = style.grid(1, 1, (7.0, 4.6))
         panel, speed = axes[0, 0], data["speed"].values
@@ -55,6 +55,6 @@ def files(name: str, data: xr.Dataset) -> dict[str, bytes]:
 
 
 def _seen(data: xr.Dataset) -> np.ndarray:
-    """Frequencies [Hz] as fixed axes show them: of whirls theirs, else those of the turning axes; (speed, branch)."""
+    """Return frequencies [Hz] in fixed axes for whirls, else in the rotating axes; shape (speed, branch)."""
     whirls = data["whirl"].values != ""
     return np.where(whirls[None, :], data["whirl_frequency"].values, data["frequency"].values)

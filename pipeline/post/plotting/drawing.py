@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from flexclear.pipeline.post.plotting.style import INK
 from flexclear.pipeline.post.shapes.body_shape import circle
 
-#: direction of the light, seen by the observer: from above his left shoulder
+#: direction to the light in the observer's axes: from above the left shoulder
 LIGHT = np.array([-0.35, 0.65, 0.68])
 AMBIENT = 0.45
 
@@ -26,16 +26,16 @@ class View:
     axes: np.ndarray
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Places on the paper of points (..., 3), shape (..., 2)."""
+        """Return the positions on the paper of points (..., 3), shape (..., 2)."""
         return points @ self.axes[:2].T
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """How near points are to the observer, shape (...)."""
+        """Return the coordinate of points towards the observer, shape (...)."""
         return points @ self.axes[2]
 
 
 def view(towards: np.ndarray, up: np.ndarray) -> View:
-    """The view of an observer in direction `towards`; `up` is upwards on the paper."""
+    """Return the view of an observer in direction `towards`; `up` is upwards on the paper."""
     towards_eye = towards / np.linalg.norm(towards)
     right = np.cross(up, towards_eye)
     right /= np.linalg.norm(right)
@@ -45,7 +45,7 @@ def view(towards: np.ndarray, up: np.ndarray) -> View:
 def shell(
     axes: Axes, seen: View, rings: np.ndarray, values: np.ndarray | None, color: str = "#9aa5b1", **look: Any
 ) -> None:
-    """A closed tube of rings (ring, around, 3), the last point of each its first.
+    """Draw a closed tube of rings (ring, around, 3), whose first and last points coincide.
 
     values: one per ring in [0, 1], drawn as colours; without them the tube has one colour.
     """
@@ -66,10 +66,10 @@ def skin(
     closed: bool = False,
     **look: Any,
 ) -> None:
-    """Faces (m, corners) between points (n, 3), the near ones before the far ones.
+    """Draw faces (m, corners) between points (n, 3), the near ones over the far ones.
 
-    values: one per point in [0, 1], drawn as colours.  closed: whether all faces run round the same way, so that those
-    behind are left out; else either side of a face may be the outer one.
+    values: one per point in [0, 1], drawn as colours.  closed: True when all faces have the same orientation, so that
+    those at the back are left out; else either side of a face may be the outer one.
     """
     corners = points[faces]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])
@@ -89,13 +89,13 @@ def skin(
 
 
 def tube(start: np.ndarray, end: np.ndarray, radius: float, around: int = 24) -> np.ndarray:
-    """Rings of a straight round bar with flat ends, for `shell`, shape (4, around + 1, 3)."""
+    """Return the rings of a straight round bar with flat ends, for `shell`, shape (4, around + 1, 3)."""
     ring = radius * circle(end - start, around)
     return np.stack([start + 0.0 * ring, start + ring, end + ring, end + 0.0 * ring])
 
 
 def triad(axes: Axes, seen: View, origin: np.ndarray, length: float, names: tuple[str, str, str]) -> None:
-    """The three axes of a frame as arrows with names."""
+    """Draw the three axes of a frame as arrows with names."""
     start = seen.project(origin)
     for direction, name in zip(np.eye(3), names, strict=True):
         end = seen.project(origin + length * direction)

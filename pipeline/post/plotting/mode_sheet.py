@@ -1,4 +1,4 @@
-"""All modes of a body on one sheet: shape, frequency, exaggeration; as a picture, or moving."""
+"""All modes of a body on one sheet: shape, frequency, exaggeration; as a picture or a film."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
 from flexclear.pipeline.post.shapes.body_shape import AROUND, faces, hertz, is_rod, scale_to, surface
 
-#: modes next to each other, and drawn size of the largest displacement as a fraction of the body's length
+#: number of modes in a row, and drawn size of the largest displacement as a fraction of the body's length
 COLUMNS, FRACTION = 3, 0.14
-#: of the points around a rod every so many are drawn: a sheet shows its modes small
+#: stride of the drawn points around a rod: a sheet shows its modes small
 EVERY = 2
 #: pictures of one vibration in a film
 FRAMES = 16
 
 
 def files(name: str, body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> dict[str, bytes]:
-    """``<name>.png`` and ``<name>.svg`` of all modes of a body (schema BUNDLE), seen from a direction."""
+    """Draw ``<name>.png`` and ``<name>.svg`` of all modes of a body (schema BUNDLE), seen from a direction."""
     with style.style():
         return style.files(name, _sheet(body, bundle, view(towards, up), 1.0))
 
 
 def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> Iterator[np.ndarray]:
-    """One vibration of all modes, pictures of shape (height, width, 3)."""
+    """Yield pictures of one vibration of all modes, shape (height, width, 3)."""
     with style.style():
         seen = view(towards, up)
-        drawn: dict[float, np.ndarray] = {}  # on the way back bodies look as on the way out
+        drawn: dict[float, np.ndarray] = {}  # both halves of a swing look alike
         for phase in np.linspace(0.0, 2.0 * np.pi, FRAMES, endpoint=False):
             fraction = round(float(np.sin(phase)), 6)
             if fraction not in drawn:
@@ -44,19 +44,19 @@ def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -
 
 
 def range_text(bundle: xr.Dataset) -> str:
-    """Which modes these are, in words."""
+    """Return the number and kind of the modes, in words."""
     kind = str(bundle.attrs.get("reference", ""))
     return f"{bundle.sizes['mode']} modes{f', {kind}' if kind else ''}"
 
 
 def _pixels(figure: Figure) -> np.ndarray:
-    """A figure as a picture, and closed."""
+    """Return a figure as pixels, and close it."""
     figure.set_dpi(80)
     drawn = FigureCanvasAgg(figure)
     drawn.draw()
     plt.close(figure)
     pixels = style.pixels(drawn)
-    # films want even numbers of pixels
+    # films need even numbers of pixels
     return pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2]
 
 
@@ -89,7 +89,7 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     points, size = surface(bundle, q, fraction * factor)
     moved = size if size.max() > 1e-9 * np.ptp(rest) else np.linalg.norm(points - rest, axis=1)
     full, sizes = surface(bundle, q, factor)
-    # of its centre line, or of its skin where that rests
+    # by its centre line, or by its skin where that line rests
     skin_moves = sizes.max() <= 1e-9 * np.ptp(rest)
     largest = float(np.linalg.norm(full - rest, axis=1).max()) if skin_moves else max(float(sizes.max()), 1e-300)
     index = faces(bundle)
