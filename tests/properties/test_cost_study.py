@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,19 +48,20 @@ def run(error: float, *, seconds=(0.2, 0.1, 0.3), evaluations=100, impacts=3, ho
     return xr.Dataset(data, coordinates, attributes)
 
 
-def study(uncertainty: float = 1e-8, horizon: float | None = None, **extra: xr.Dataset):
-    """dop853 at three tolerances, rk4 at two steps of which one is refused."""
+REFUSED = xr.Dataset(attrs={"refused": "it blew up; take another"})
+
+
+def study(uncertainty: float = 1e-8, horizon: float | None = None, **changed: xr.Dataset):
+    """dop853 at three tolerances, rk4 at two steps of which one is refused; some runs changed."""
     points = [Point("best", "reference", {}), Point("other", "confirmation", {})]
     runs = {"best": run(0.0, horizon=horizon), "other": run(uncertainty)}
     for k, (rtol, error) in enumerate(((1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-7))):
         points.append(Point(f"d{k}", "tolerance", {"adaptive_integrator": "dop853", "rtol": rtol}))
         runs[f"d{k}"] = run(error, evaluations=100 * (k + 1))
-    for step, made in (
-        (1e-3, run(1e-4, evaluations=50)),
-        (1e-2, xr.Dataset(attrs={"refused": "it blew up; take another"})),
-    ):
-        points.append(Point(f"r{step}", "step", {"fixed_integrator": "rk4", "step": step}))
-        runs[f"r{step}"] = made
+    for name, step, made in (("fine", 1e-3, run(1e-4, evaluations=50)), ("coarse", 1e-2, REFUSED)):
+        points.append(Point(name, "step", {"fixed_integrator": "rk4", "step": step}))
+        runs[name] = made
+    runs |= changed
     return assemble(points, runs, [POSITION, TIMES]), points, runs
 
 
@@ -102,28 +104,22 @@ def test_errors_beyond_the_horizon_do_not_count():
 
 def test_the_horizon_of_the_confirmation_counts_too():
     """An impact that only one of both has, beyond what the confirmation can predict, is no uncertainty."""
-    _, points, runs = study(horizon=0.7)
-    runs["other"] = run(1e-8, impacts=2)
-    assert np.isinf(assemble(points, runs, [TIMES]).reference_uncertainty).all()
-    runs["other"] = run(1e-8, impacts=2, horizon=0.5)
-    found = assemble(points, runs, [TIMES])
-    assert found.attrs["horizon"] == 0.5
-    assert float(found.reference_uncertainty[0]) < 1e-7
+    later, *_ = study(horizon=0.7, other=run(1e-8, impacts=2))
+    sooner, *_ = study(horizon=0.7, other=run(1e-8, impacts=2, horizon=0.5))
+    assert np.isinf(later.reference_uncertainty.sel(quantity=TIMES.name))
+    assert sooner.attrs["horizon"] == 0.5
+    assert float(sooner.reference_uncertainty.sel(quantity=TIMES.name)) < 1e-7
 
 
 def test_a_reference_that_is_not_confirmed_is_drawn_as_one():
-    _, points, runs = study()
-    runs["other"] = run(1e-8, impacts=2)
-    found = assemble(points, runs, [POSITION, TIMES])
+    found, *_ = study(other=run(1e-8, impacts=2))
     assert set(work_precision.make("w", found, "t")) == {"w.png", "w.svg"}
 
 
 def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheapest():
-    _, points, runs = study()
-    runs["d2"] = run(0.0, impacts=2, evaluations=1)
-    again = assemble(points, runs, [POSITION, TIMES])
-    assert np.isinf(again.error_by_tolerance.sel(rtol=1e-9, quantity="pin.impact_times")).all()
-    chosen = answer.cheapest(again, 1e-3)
+    found, *_ = study(d2=run(0.0, impacts=2, evaluations=1))
+    assert np.isinf(found.error_by_tolerance.sel(rtol=1e-9, quantity="pin.impact_times")).all()
+    chosen = answer.cheapest(found, 1e-3)
     assert chosen is not None
     assert chosen.evaluations > 1
 
@@ -152,30 +148,28 @@ def test_an_error_below_the_references_uncertainty_is_not_claimed():
 
 
 def test_a_study_of_which_every_run_is_refused_says_so():
-    _, points, runs = study()
-    refused = {p.key: xr.Dataset(attrs={"refused": "no"}) for p in points if p.group not in ("reference",)}
-    table = answer.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t")
+    found, *_ = study(**dict.fromkeys(("other", "d0", "d1", "d2", "fine", "coarse"), REFUSED))
+    table = answer.price_list(found, "t")
     assert all(row[1] == "cannot be had" for row in table.rows)
     assert any("Not confirmed: other was refused" in note for note in table.notes)
     assert any("every run is refused" in note for note in table.notes)
 
 
 def test_a_study_without_its_reference_is_refused_with_the_reason():
-    _, points, runs = study()
-    runs["best"] = xr.Dataset(attrs={"refused": "it blew up"})
     with pytest.raises(SolverError, match=r"reference \(best\) is refused: it blew up"):
-        assemble(points, runs, [POSITION])
+        study(best=REFUSED)
 
 
-def test_what_cannot_be_had_is_explained():
-    rounded, *_ = study(uncertainty=1e-7)
-    assert any("rounding errors" in note for note in answer.price_list(rounded, "t").notes)
-    coarse, *_ = study(uncertainty=1e-12)
-    assert any("best setting that was tried reaches" in note for note in answer.price_list(coarse, "t").notes)
-    _, points, runs = study()
-    runs["other"] = run(0.0, impacts=2)
-    other = answer.price_list(assemble(points, runs, [POSITION, TIMES]), "t")
-    assert any("do not agree on the number of impacts" in note for note in other.notes)
+@pytest.mark.parametrize(
+    "made, words",
+    [
+        ({"uncertainty": 1e-7}, "rounding errors"),
+        ({"uncertainty": 1e-12}, "best setting that was tried reaches"),
+        ({"other": run(0.0, impacts=2)}, "do not agree on the number of impacts"),
+    ],
+)
+def test_what_cannot_be_had_is_explained(made: dict[str, Any], words: str):
+    assert any(words in note for note in answer.price_list(study(**made)[0], "t").notes)
 
 
 def test_a_scene_that_is_refused_as_it_is_has_no_causes():
@@ -235,11 +229,10 @@ def test_causes_come_from_pairs_that_differ_in_one_thing():
     assert located == pytest.approx(1e-12 * 1e-3 / 0.5 / 0.6)  # share of the clearance, over speed, over the span
 
 
-def test_the_least_time_decides_and_evaluations_only_where_times_are_alike():
-    _, points, runs = study()
-    assert answer.cheapest(assemble(points, runs, [POSITION, TIMES]), 1e-3).name == "rk4, step 0.001 s"
-    runs["r0.001"] = run(1e-4, evaluations=50, seconds=(0.3, 0.3, 0.3))  # of dop853: 200 in 0.2 s
-    assert answer.cheapest(assemble(points, runs, [POSITION, TIMES]), 1e-3).name == "dop853, rtol 1e-06"
+def test_the_least_time_decides_and_evaluations_only_where_times_are_alike(found: xr.Dataset):
+    assert answer.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
+    slow, *_ = study(fine=run(1e-4, evaluations=50, seconds=(0.3, 0.3, 0.3)))  # of dop853: 200 in 0.2 s
+    assert answer.cheapest(slow, 1e-3).name == "dop853, rtol 1e-06"
 
 
 def test_a_cause_that_changes_the_number_of_impacts_dominates():
