@@ -127,10 +127,17 @@ def test_a_second_process_that_fails_is_not_missed(
     assert results(files) == [10, 11, 12]
 
 
-def test_a_machine_that_starts_no_process_does_without(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "executable", str(files[0].parent / "not there"))
-    with compiler_process.second_process(files) as process:
+def test_one_file_one_core_or_no_process_to_be_had_need_no_second_process(
+    files: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with compiler_process.second_process(files[:1]) as process:
         assert process is None
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "executable", str(files[0].parent / "not there"))
+        with compiler_process.second_process(files) as process:
+            assert process is None
+    monkeypatch.setattr(cores, "cores", lambda: 1)
+    assert not compiler_process.requested()
 
 
 def test_an_interrupt_ends_the_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,13 +168,6 @@ def test_there_is_one_second_process_for_a_folder(files: list[Path], monkeypatch
         assert second is None
     with compiler_process.second_process(files) as third:
         assert third is not None
-
-
-def test_one_file_and_one_core_need_no_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    with compiler_process.second_process(files[:1]) as process:
-        assert process is None
-    monkeypatch.setattr(cores, "cores", lambda: 1)
-    assert not compiler_process.requested()
 
 
 def test_workers_have_no_second_process() -> None:
