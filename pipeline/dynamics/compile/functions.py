@@ -49,7 +49,6 @@ FUNCTIONS: dict[str, tuple[str, int | None]] = {
     SPECIALISED: ("equations of motion of this mechanism alone", None),
     "resolve": ("integrator's events", m.RESOLVE),
 }
-_FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
 
 
@@ -72,7 +71,7 @@ def place(array: np.ndarray, kind: type = np.float64) -> Any:
 
 @dataclass(frozen=True)
 class Entry:
-    """The compiled functions of a mechanism, by their addresses; h must have been given those."""
+    """The compiled functions of a mechanism, by their addresses."""
 
     addresses: Mapping[str, int]
 
@@ -81,58 +80,6 @@ class Entry:
         for name, (_, where) in FUNCTIONS.items():
             if where is not None:
                 h[where] = self.addresses.get(name, 0)
-
-    def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
-        """Slope of the state in Y at time t, into the first row of SLOPES."""
-        self._function("advance")(*_tables(h, f, w, n), t, repeat, *_record(_FLOATS, _TABLE, _TABLE))
-
-    def advance(
-        self,
-        h: np.ndarray,
-        f: np.ndarray,
-        w: np.ndarray,
-        n: np.ndarray,
-        outputs: np.ndarray,
-        rows: np.ndarray,
-        events: np.ndarray,
-        by: Callable[[int, list[int]], None] | None = None,
-    ) -> None:
-        """Step to the end of the segment or of the budget.
-
-        by: what is to call the compiled function, given its address, and a word for each of its arguments but t and
-        repeat.
-        """
-        tables, record = _tables(h, f, w, n), _record(outputs, rows, events)
-        if by is None:
-            self._function("advance")(*tables, 0, -1, *record)
-        else:
-            by(self.addresses["advance"], [*tables, *record])
-
-    def observe(
-        self,
-        h: np.ndarray,
-        f: np.ndarray,
-        w: np.ndarray,
-        n: np.ndarray,
-        rows: np.ndarray,
-        pieces: np.ndarray,
-        tolerance: float,
-        out: np.ndarray,
-    ) -> None:
-        """Evaluate what is recorded of every row."""
-        given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
-        self._function("observe")(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
-
-    def _function(self, name: str) -> Callable:
-        return function(name, self.addresses[name])
-
-
-def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
-    return place(h, np.int64), place(f), place(w), place(n, np.int64)
-
-
-def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple:
-    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
 
 
 def entry(
