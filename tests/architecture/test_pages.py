@@ -238,7 +238,28 @@ def test_examples_show_what_happens(name: str, monkeypatch: pytest.MonkeyPatch) 
 # First sentences of docstrings ----------------------------------------------------------------------------------------
 
 #: first words of fragments that only a reader of the code understands: "Whether it is.", "Of each row, by name."
-FRAGMENTS = set("As By From How In Its Itself Meanwhile Of That Those What When Where Whether Which Why With".split())
+FRAGMENTS = set(
+    [
+        "As",
+        "By",
+        "From",
+        "How",
+        "In",
+        "Its",
+        "Itself",
+        "Meanwhile",
+        "Of",
+        "That",
+        "Those",
+        "What",
+        "When",
+        "Where",
+        "Whether",
+        "Which",
+        "Why",
+        "With",
+    ]
+)
 
 
 def _functions(path: Path) -> Iterator[tuple[str, str]]:

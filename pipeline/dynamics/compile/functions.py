@@ -48,7 +48,6 @@ FUNCTIONS: dict[str, tuple[str, int | None]] = {
     SPECIALISED: ("specialised equations of motion", None),
     "resolve": ("location of events", m.RESOLVE),
 }
-_FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
 
 
@@ -80,57 +79,6 @@ class Entry:
         for name, (_, where) in FUNCTIONS.items():
             if where is not None:
                 h[where] = self.addresses.get(name, 0)
-
-    def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
-        """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
-        self._function("advance")(*_tables(h, f, w, n), t, repeat, *_record(_FLOATS, _TABLE, _TABLE))
-
-    def advance(
-        self,
-        h: np.ndarray,
-        f: np.ndarray,
-        w: np.ndarray,
-        n: np.ndarray,
-        outputs: np.ndarray,
-        rows: np.ndarray,
-        events: np.ndarray,
-        by: Callable[[int, list[int]], None] | None = None,
-    ) -> None:
-        """Step to the end of the segment or of the budget.
-
-        by: calls the compiled function instead, given its address and one word per argument except t and repeat.
-        """
-        tables, record = _tables(h, f, w, n), _record(outputs, rows, events)
-        if by is None:
-            self._function("advance")(*tables, 0, -1, *record)
-        else:
-            by(self.addresses["advance"], [*tables, *record])
-
-    def observe(
-        self,
-        h: np.ndarray,
-        f: np.ndarray,
-        w: np.ndarray,
-        n: np.ndarray,
-        rows: np.ndarray,
-        pieces: np.ndarray,
-        tolerance: float,
-        out: np.ndarray,
-    ) -> None:
-        """Evaluate the recorded quantities of every row."""
-        given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
-        self._function("observe")(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
-
-    def _function(self, name: str) -> Callable:
-        return function(name, self.addresses[name])
-
-
-def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
-    return place(h, np.int64), place(f), place(w), place(n, np.int64)
-
-
-def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple:
-    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
 
 
 def entry(

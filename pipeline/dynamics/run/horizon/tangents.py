@@ -212,7 +212,7 @@ class _Jumps:
     def _evaluate(self, engine: Engine, t: float) -> np.ndarray:
         """Return rates of the state with its changes, by the code that steps use."""
         generic, engine.h[m.EVALUATE] = int(engine.h[m.EVALUATE]), engine.h[m.RATES]
-        engine.entry.evaluate(engine.h, engine.model.arrays.f, engine.w, engine.n, t)
+        engine.evaluate(t)
         engine.h[m.EVALUATE] = generic
         return engine.slope.copy()
 
