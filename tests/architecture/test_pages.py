@@ -238,28 +238,8 @@ def test_examples_show_what_happens(name: str, monkeypatch: pytest.MonkeyPatch) 
 # First sentences of docstrings ----------------------------------------------------------------------------------------
 
 #: first words of fragments that only a reader of the code understands: "Whether it is.", "Of each row, by name."
-FRAGMENTS = set(
-    [
-        "As",
-        "By",
-        "From",
-        "How",
-        "In",
-        "Its",
-        "Itself",
-        "Meanwhile",
-        "Of",
-        "That",
-        "Those",
-        "What",
-        "When",
-        "Where",
-        "Whether",
-        "Which",
-        "Why",
-        "With",
-    ]
-)
+FRAGMENTS = {"Of", "By", "As", "In", "From", "With", "Its", "Those", "That", "Meanwhile"}
+FRAGMENTS |= {"What", "Whether", "Which", "Where", "When", "Why", "How", "Itself"}
 
 
 def _functions(path: Path) -> Iterator[tuple[str, str]]:
