@@ -206,7 +206,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
 
 
 def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
-    """What acts on a body at its frames: joints, paths, loads; moments about the kernels' origin."""
+    """Return the wrenches of joints, paths and loads on a body's frames; moments about the kernels' origin."""
     model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
         moment, force = joints[joint]
