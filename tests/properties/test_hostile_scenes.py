@@ -54,6 +54,9 @@ HOSTILE: dict[str, tuple[str, ...]] = {
     BASE.replace("crank.A", "crankA"): ("[joint.A.between.1]", "body.FRAME"),
     BASE.replace("mass = 1.0", "mass = 1e300"): ("[body.crank.mass]", "beyond what can be computed with"),
     BASE.replace("[0.1, 0.1, 0.1]", "[[0.1], [0.1, 1], 0.1]"): ("[body.crank.inertia]", "3x3 matrix"),
+    BASE
+    + "view.watch = ['A.position']\n[body.rod]\ntype = 'flexible'\nmesh = 'rod.toml'\n"
+    + "modes = { reference = 'free-free', count = 1000000000000 }": ("[body.rod.modes.count", "less than or equal to"),
     BASE + '[body."../up"]\ntype = "ground"': ("[body.../up]", "is no name"),
     BASE + "[joint.B]\nbetween = 5": ("[joint.B.type]",),
     BASE + "[load.f]\ntype = 'point-force'\nframe = 'crank.P'\nforce = 5": ("[load.f.force]", "expected a list"),
