@@ -17,7 +17,7 @@ def mass_factor(engine: Engine) -> np.ndarray:
 
 
 def _from_envelope(engine: Engine) -> np.ndarray:
-    """Return the factor in the envelope; with articulated inertias only the diagonal blocks of modes and coordinates."""
+    """Return the factor in the envelope; with articulated inertias only the blocks of modes and coordinates."""
     L, entries = np.zeros((engine.model.nv,) * 2), engine.view(m.MASS)
     for i, (first, origin) in enumerate(engine.model.arrays.table(m.ENVELOPE)):
         L[i, first : i + 1] = entries[origin + first : origin + i + 1]
