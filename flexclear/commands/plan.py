@@ -82,7 +82,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     plans: dict[str, xr.Dataset | str] = {}
     for level in LEVELS:
         try:
-            plans[level] = bring(asking(scene, level), workplace).made.dataset()
+            plans[level] = bring(with_accuracy(scene, level), workplace).made.dataset()
         except (InputError, FailedTasksError) as error:
             if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
@@ -90,7 +90,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     return as_markdown(shown(plans))
 
 
-def asking(scene: Scene, level: str) -> Scene:
+def with_accuracy(scene: Scene, level: str) -> Scene:
     """Return the scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
     chosen = {quantity.name: level for quantity in scene.watched()}
     if not chosen:
@@ -110,7 +110,7 @@ def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene
     from flexclear.pipeline.post.answers.plan import verified, words
 
     workplace = open_workplace()
-    planned = bring(scene if scene.accuracy is not None else asking(scene, level), workplace)
+    planned = bring(scene if scene.accuracy is not None else with_accuracy(scene, level), workplace)
     result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))

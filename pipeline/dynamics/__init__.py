@@ -75,7 +75,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
     if not scene.by_need():
         return of(accuracy.deliver(scene, compared, progress))
-    suit = way(scene, "method selection")
+    method_costs = way(scene, "method selection")
     if requested:
-        return of(accuracy.deliver(scene, compared, progress, suit(scene, bundles)))
-    return of(accuracy.by_default(scene, compared, progress, lambda edited: suit(edited, bundles)))
+        return of(accuracy.deliver(scene, compared, progress, method_costs(scene, bundles)))
+    return of(accuracy.by_default(scene, compared, progress, lambda edited: method_costs(edited, bundles)))

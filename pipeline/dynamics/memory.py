@@ -232,12 +232,12 @@ DRIVES = wiring("book")  # index in the ledger of each drive's work
 LINK_NUMBERS = numbers("mass com:3 inertia:6 borne reaching")
 SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
 FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3")
-FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
+FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness, damping (n); stiffening 2 (n n)
 MOMENT_VALUES = numbers("value")
 BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
-PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
+PORT_DATA = numbers("value")  # per port, r moving shapes: translation (3r), rotation (3r); with stiffening (r r)
 #: radius: of the inner surface; stiffness, exponent, damping: of the normal law (`contact.law.Numbers`); shape: further
 #: numbers of its kind of surfaces; length: size of the mechanism that it belongs to
 CONTACT_NUMBERS = numbers("clearance radius floor stick_speed stiffness exponent damping friction_law:6 shape:2 length")

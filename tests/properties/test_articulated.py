@@ -75,6 +75,7 @@ BENT: dict[str, Table] = {
     "held shapes": bending((MANY, MANY), ("spherical",), UP_AND_DOWN),
     "rigid rods between": bending((None, ONE, None, None, FREE, None), ("revolute", "spherical"), UP_AND_DOWN),
     "branches": bending((FREE, None, ONE, BOTH, FREE, None, NONE), ("spherical",), UP_AND_DOWN, children=2),
+    "fork": bending((FREE, ONE, BOTH), ("spherical",), UP_AND_DOWN, children=2),
     "floating": bending((FREE, ONE), ("free", "fixed")),
     "driven": bending((FREE, ONE, None, NONE), ("revolute",), UP_AND_DOWN, driven=(0, 2)),
     "stiffened": bending((ONE, FREE, ONE), ("revolute",), UP_AND_DOWN, stiffening=True),
@@ -214,7 +215,7 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
     return M.astype(float)
 
 
-@pytest.mark.parametrize("name", ["chain of three kinds", "branches", "driven", "stiffened", "loop"])
+@pytest.mark.parametrize("name", ["chain of three kinds", "fork", "driven", "stiffened", "loop"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_flexible_bodies_have_the_mass_that_their_energy_says(name: str) -> None:
     """And accelerations of a dense solve by it, with the closures' rows."""

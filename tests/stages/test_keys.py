@@ -58,17 +58,10 @@ def _sorted(tree: object) -> str:
     return repr(tree)
 
 
-def test_order_of_keys_does_not_matter():
+def test_parameters_as_text_keep_every_digit_and_no_order():
+    """The next float up is another parameter. A nan or a date in a recipe is for its check to refuse, in words."""
     assert sorted(flatten({"a": 1, "b": {"c": 2.5}})) == sorted(flatten({"b": {"c": 2.5}, "a": 1}))
-
-
-def test_floats_keep_every_digit():
-    """The next float up is another parameter."""
     assert flatten(0.1) != flatten(0.1 + 2**-56)
-
-
-def test_what_json_cannot_express_is_text():
-    """A nan or a date in a recipe is for the recipe's check to refuse, in words."""
     assert flatten({"a": float("nan"), "b": datetime.date(2019, 3, 10)}) == [("a", "NaN"), ("b", '"2019-03-10"')]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.commands import scenes, show
+from flexclear.commands import check, scenes, show
 from flexclear.commands.check import examined
 from flexclear.commands.export import as_json
 from flexclear.commands.new import KINDS, TEMPLATES, write
@@ -54,6 +54,29 @@ def test_all_typical_mistakes_are_in_the_table():
     assert set(REPORTED) == set(MISTAKES)
 
 
+@pytest.fixture(scope="module")
+def made() -> dict[str, list[check.Body]]:
+    """Meshes by the texts of their recipes: to make one takes longer than all else that is looked at."""
+    return {}
+
+
+@pytest.fixture
+def meshed_once(made: dict[str, list[check.Body]], monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = check._meshed
+
+    def known(path: Path, seen: check.Findings) -> list[check.Body]:
+        text = path.read_text()
+        if text not in made:
+            found = list(mesh(path, seen))
+            if seen.warnings or "file" in text:
+                return found
+            made[text] = found
+        return made[text]
+
+    monkeypatch.setattr(check, "_meshed", known)
+
+
+@pytest.mark.usefixtures("meshed_once")
 @pytest.mark.parametrize("name", MISTAKES)
 def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, command: Command):
     file, old, new = MISTAKES[name]
@@ -80,6 +103,7 @@ def validators():
     return found
 
 
+@pytest.mark.usefixtures("meshed_once")
 @pytest.mark.parametrize("path", [*SCENES, *RECIPES, *sorted(TEMPLATES.rglob("*.toml"))], ids=lambda path: path.stem)
 def test_nothing_that_the_project_ships_is_doubted(path: Path, validators):
     """No scene, recipe or template has an error or a plausibility warning, and the schema accepts each of them."""

@@ -63,9 +63,9 @@ def measure(
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    begun, alone = process_time(), brief or not engine.model.contacts
-    last, trajectory, switched, perturbed = _followed(engine, start, progress, other, alone)
-    first = (process_time() - begun,) if alone else ()
+    begun, single = process_time(), brief or not engine.model.contacts
+    last, trajectory, switched, perturbed = _followed(engine, start, progress, other, single)
+    first = (process_time() - begun,) if single else ()
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
@@ -77,10 +77,10 @@ def measure(
 
 
 def _followed(
-    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine], alone: bool
+    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine], single: bool
 ) -> tuple[Engine, Trajectory, str, PerturbedRun | None]:
-    """Return the run and, unless `alone`, the perturbed run, which follows so that it does not slow the run down."""
-    if alone:
+    """Return the run and, unless `single`, the perturbed run, which follows so that it does not slow the run down."""
+    if single:
         return *follow(engine, start, progress, other), None
     from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
 

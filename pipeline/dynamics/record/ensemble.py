@@ -65,7 +65,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     requested = scene.ensemble or Ensemble()
     require_scatter(scene, "[ensemble]")
     engine, other = engines(scene, bundles, progress)
-    names = kept_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
+    names = recorded_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     select_rows(engine, start, engine.start)
     jacobian = offset_jacobian(engine, start)
@@ -78,7 +78,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, place: Place | None) -> Member:
+    def run_member(k: int, alive: Progress, place: Place | None) -> Member:
         """Run a member with an engine of its own, so that the result does not depend on previous members."""
         mine = another(engine)
         mine.straight.place = place
@@ -95,7 +95,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if stored is not None and (earlier := stored.find(name)) is not None:
             return earlier
         with places.place() if places else nullcontext() as place:
-            made = alone(k, alive, place)
+            made = run_member(k, alive, place)
         if stored is not None:
             stored.store(name, lambda: made)
         return made
@@ -156,7 +156,7 @@ def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np
         yield (offsets * (requested.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
 
 
-def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
+def recorded_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
     """Return the bodies to record: those requested, else those with contacts, or all where none has contacts."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
     if requested is None:

@@ -34,7 +34,7 @@ from flexclear.pipeline.dynamics.run.run import engine_of
 #: oscillate about the limit: the product of rate and step at which error control settles
 STEP_EVALUATIONS, STABILITY_REACH = 12.0, 5.0
 #: cost of an evaluation with the algebra of its method, in evaluations of the default method
-DEARER = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
+RELATIVE_COST = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
 #: evaluations of the default method in a scene with contacts, limited by the modes, relative to what stability needs:
 #: the method starts again at each contact, with stricter steps (measured: 1.45 and more)
 CONTACT_FACTOR = 1.5
@@ -53,7 +53,7 @@ BETWEEN_CONTACTS, WORTH_COMPILING = 3e6, 1e6
 UNKNOWN, AT = 20_000.0, 1e-4
 #: cost ratio to another method above which a method is given up, since progress rate and prediction are rough; and the
 #: ratio for a method that is only tried
-CLEARLY_DEARER, TRIED = 3.0, 1.5
+CLEARLY_COSTLIER, TRIED = 3.0, 1.5
 #: fraction of the other method's predicted cost at which the required ratio doubles, and earlier grows further: starts
 #: may be hasty
 EARLY_FRACTION = 0.1
@@ -76,7 +76,7 @@ class Rates:
 
 
 @dataclass
-class Suit:
+class Costs:
     """Known and predicted costs of a scene's runs.
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
@@ -121,7 +121,7 @@ class Suit:
     def cost(self, name: str, rtol: float) -> float:
         """Return the predicted cost of a run, in evaluations of the default method; 0 where only a run can show it."""
         if name in self.seen:
-            return DEARER[name] * self.evaluations(name, rtol)
+            return RELATIVE_COST[name] * self.evaluations(name, rtol)
         return self.least if name == DEFAULT else 0.0
 
     def possible(self, rtol: float) -> list[str]:
@@ -208,7 +208,7 @@ class Suit:
             every = max(int(LOOK_FRACTION * most), LEAST_LOOK)
             least = WORTH_STIFF
             if self.touching and heir not in self.seen:
-                least = WORTH_COMPILING / CLEARLY_DEARER
+                least = WORTH_COMPILING / CLEARLY_COSTLIER
             panel[name] = (Judge(every, self._verdict(name, heir, max(most, least))), heir)
         return panel
 
@@ -220,10 +220,10 @@ class Suit:
             if engine.model.scene.solver.integrator == DEFAULT and not limited(looks):
                 return ""
             # a method that handed over in this run took more than predicted
-            enough = max(most, DEARER[heir] * self.expected.get(heir, 0.0)) / DEARER[name]
-            whole = pace(looks, CLEARLY_DEARER * enough) * self.span
+            enough = max(most, RELATIVE_COST[heir] * self.expected.get(heir, 0.0)) / RELATIVE_COST[name]
+            whole = pace(looks, CLEARLY_COSTLIER * enough) * self.span
             used = max(looks[-1].evaluations - looks[0].evaluations, 1)
-            if whole < (TRIED if tried else CLEARLY_DEARER) * (1.0 + EARLY_FRACTION * enough / used) * enough:
+            if whole < (TRIED if tried else CLEARLY_COSTLIER) * (1.0 + EARLY_FRACTION * enough / used) * enough:
                 return ""
             self.expected[name] = whole
             self.left = looks[-1].evaluations, (looks[-1].time - engine.start) / self.span
@@ -231,7 +231,7 @@ class Suit:
                 return refusal.stiffness(engine.n, engine.control)
             return (
                 f"at this pace the run takes {whole:.2g} evaluations with {name}, "
-                f"which {heir} is foreseen to make with {most / DEARER[heir]:.2g}"
+                f"which {heir} is foreseen to make with {most / RELATIVE_COST[heir]:.2g}"
             )
 
         return verdict
@@ -252,7 +252,7 @@ class Suit:
 ORDERS = {DEFAULT: 7.0, VIBRATING: 4.0, STIFF: 3.0}
 
 
-def suit(scene: Scene, bundles: Mapping[str, Labelled]) -> Suit:
+def method_costs(scene: Scene, bundles: Mapping[str, Labelled]) -> Costs:
     """Return the costs of a scene's methods that are known before any run."""
     names = by_need(bool(scene.flexible()))
     engine = engine_of(
@@ -264,7 +264,7 @@ def suit(scene: Scene, bundles: Mapping[str, Labelled]) -> Suit:
         known = rates(engine, start)
     except SolverError:  # a run may start where linearisation is impossible, as in a singular pose
         known = Rates(0.0, 0.0)
-    return Suit(known, engine.end - engine.start, names, touching=bool(engine.model.contacts))
+    return Costs(known, engine.end - engine.start, names, touching=bool(engine.model.contacts))
 
 
 def rates(engine: Engine, y: np.ndarray) -> Rates:
