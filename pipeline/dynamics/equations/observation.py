@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ BEARING = m.NAMED["bearing"]
 #: variables of a run's dataset with their dimensions, and coordinates
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 Series = tuple[Variables, dict[str, object]]
-#: tolerance by which the loops of rows stay as they are, and nothing but frames is written
+#: tolerance by which the loops of rows stay as they are, and nothing but frames of links is written
 AS_RECORDED = -1.0
 #: of so many rows one is closed first, and those between two of them start from what that changed there, where rows
 #: follow at distances in time that differ by no more than this fraction
@@ -88,7 +88,8 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
         "frame_position": (3, size(m.N_FRAMES)),
         "residual": (None, 1),
         "status": (None, 1),
-        **_frames(size),
+        **_links(size),
+        "sites": (m.SITE_FRAMES, size(m.N_SITES)),
         "state": (None, size(m.NY)),
         "positions": (None, size(m.NQ) + drives),
         "speeds": (None, size(m.NV) + drives),
@@ -105,15 +106,8 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
     }
 
 
-def _frames(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
-    return {"links": (m.LINK_FRAMES, size(m.N_LINKS)), "sites": (m.SITE_FRAMES, size(m.N_SITES))}
-
-
-class Frames(NamedTuple):
-    """Frames of links and sites in rows of the record; of LINK_FRAMES without accelerations, (rows, links or sites)."""
-
-    links: np.ndarray
-    sites: np.ndarray
+def _links(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
+    return {"links": (m.LINK_FRAMES, size(m.N_LINKS))}
 
 
 #: what `observe` has written, each over the rows: (rows, numbers)
@@ -123,9 +117,9 @@ Blocks = dict[str, np.ndarray]
 def room(rows: int, size: Callable[[int], int], *, frames: bool = False) -> tuple[np.ndarray, Blocks]:
     """Zeros that `observe` can write on, all in one piece, and the parts of it; size: of a place in the header.
 
-    One quantity of all rows is in one piece, as datasets have it.  frames: whether only they are written.
+    One quantity of all rows is in one piece, as datasets have it.  frames: whether only those of links are written.
     """
-    columns = _frames(size) if frames else _columns(size)
+    columns = _links(size) if frames else _columns(size)
     widths = [_numbers(kind) * count for kind, count in columns.values()]
     ends = rows * np.cumsum(widths)
     whole = np.zeros(int(ends[-1]))
@@ -135,12 +129,6 @@ def room(rows: int, size: Callable[[int], int], *, frames: bool = False) -> tupl
 
 def _numbers(kind: Any) -> int:
     return 1 if kind is None else getattr(kind, "size", kind)
-
-
-def frames_by_name(blocks: Blocks, size: Callable[[int], int]) -> Frames:
-    """Views of the frames alone that `observe` has written."""
-    known = ["origin", "axes", "omega", "velocity"]
-    return Frames(*(_named(kind, count, blocks[name])[known] for name, (kind, count) in _frames(size).items()))
 
 
 def by_name(blocks: Blocks, size: Callable[[int], int]) -> Observed:
@@ -287,7 +275,7 @@ def make_description(
 def make_observation(evaluate: Callable, project: Callable, laws: Callable, describe: Callable) -> Callable:
     """The kernel observe(h, f, w, n, rows, pieces, tolerance, out), which writes on the blocks of `room`.
 
-    With a tolerance of AS_RECORDED nothing is evaluated and only frames are written, of links and of sites.
+    With a tolerance of AS_RECORDED nothing is evaluated and only frames of links are written.
 
     evaluate, project, laws: as the stepper calls them.  describe: of `make_description`.
     """
@@ -303,7 +291,7 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
     def copy(d, out, every, r, column, frames):
         """Copy the stretches of w that are recorded as they are, each to its row in its block.
 
-        column: number of columns before them.  frames: whether only those of links and sites.
+        column: number of columns before them.  frames: whether only those of links.
         """
         known = d.n_drives
         stretches = (
@@ -323,7 +311,7 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
             (d.at_energy, m.ENERGY.size * d.n_components),
             (d.at_jacobian, d.jacobian_size),
         )
-        for s in range(2 if frames else len(stretches)):  # one loop: several would each be compiled
+        for s in range(1 if frames else len(stretches)):  # one loop: several would each be compiled
             first, count = stretches[s]
             o = every * column + count * r
             for k in range(count):
