@@ -101,11 +101,14 @@ def test_the_answer_says_which_accuracy_calls_for_which_effect():
     assert "An accuracy of 10 % calls for strong." in text
     assert "An accuracy of 0.1 % calls also for weak." in text
     assert "An accuracy of 1 % calls for no more." in text
+    assert text.endswith(
+        "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
+    )
 
 
 def test_a_requested_accuracy_decides_instead_of_levels():
     found = study(strong=Pair(point(0.0), point(0.2), 0), weak=Pair(point(0.0), point(5e-3), 0))
-    assert sentence(found, {"slider.velocity": 0.1}) == "The requested accuracy calls for strong."
+    assert sentence(found, {"slider.velocity": 0.1}) == "The requested accuracy calls for strong."  # and no percentages
 
 
 def test_what_chance_may_hide_is_not_called_absent():

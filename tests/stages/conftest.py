@@ -50,7 +50,7 @@ def simulated(scene, bundles, progress):
     data = {"position": (("time", "body"), np.outer(time_axis, [1.0, 2.0]))}
     attributes = {"scene": scene.name, "parameters": scene.model_dump_json()}
     if scene.accuracy is not None:
-        attributes["accuracy_verdict"] = "ball.position is good to 2e-06, 2 times what is requested"
+        attributes["accuracy_verdict"] = "missed: ball.position is good to 2e-06, 2 times what is requested"
     if "doubtful" in scene.name:
         attributes["warnings"] = "the rod bends too far\\nthe contact is too deep"
     return xr.Dataset(data, coords={"time": time_axis, "body": names}, attrs=attributes)
@@ -164,10 +164,14 @@ class Project:
         path.touch()
         return path
 
+    def began(self) -> bool:
+        """Whether an engine was called since."""
+        return (self.folder / "calls").exists()
+
     def calls(self) -> list[str]:
         """What the engines did since this was asked last."""
         path = self.folder / "calls"
-        lines = path.read_text().splitlines() if path.exists() else []
+        lines = path.read_text().splitlines() if self.began() else []
         path.unlink(missing_ok=True)
         return lines
 

@@ -1,4 +1,4 @@
-"""One point of a sweep: a run of which only the recorded numbers are made."""
+"""One point of a sweep: a run of which only the requested numbers are computed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.effects import EVENTS
-from flexclear.pipeline.dynamics.record.dataset import chosen, events_of, series
+from flexclear.pipeline.dynamics.record.dataset import events_of, series, variables_for
 from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
@@ -37,21 +37,21 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: where only final values are recorded, the ledger of energy is examined so often
+#: number of outputs at which the energy ledger is checked where only final values are recorded
 LOOKS = 50
-#: how much tighter the tolerance of the run is by which the error is estimated
+#: tolerance of the run from which the error is estimated, as a fraction of the point's
 TIGHTER = 1e-2
-#: points that step side by side, and the fewest that do: of less, each is evaluated alone all the same
+#: number of points that step together, and the least number: of fewer points, each is evaluated alone
 TOGETHER, FEWEST = 8, 3
 
 
 @dataclass
 class Runner:
-    """Runs points of one family, all edits of one scene with the same bundles; keeps the engine that it made first.
+    """Runs points of one family, all edits of one scene with the same bundles, and reuses its first engine.
 
-    recorded: the quantities.  members: starts of each point that differ by a hair; 0: the one of the scene.
-    error: whether each point is run at a tighter tolerance as well.  scaled: whether starts differ by what clearances,
-    depths and the size allow, where the scene has no ensemble; else by the default of ensembles.
+    recorded: the quantities.  members: number of perturbed starts per point; 0: the scene's start alone.
+    error: run each point at a tighter tolerance as well.  scaled: starts differ by what clearances, penetrations and
+    the size allow, where the scene has no ensemble; else by the default of ensembles.
     """
 
     bundles: Mapping[str, Labelled]
@@ -61,14 +61,14 @@ class Runner:
     scaled: bool = True
     engine: Engine | None = None
     _making: Lock = field(default_factory=Lock)
-    #: what is seen of all rows is large, and seen in turn it is there once
+    #: the observed rows of a point are large: one thread at a time holds them in memory
     _looking: Lock = field(default_factory=Lock)
 
     def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
-        """One point; what physics or the input of this point refuses is reported in the point, not raised.
+        """Run one point; errors from physics or input of this point are reported in the result, not raised.
 
-        place: where its steps may be taken next to those of other points, which changes no bit of it.  alive: called
-        now and then; what it raises ends the work.
+        place: where its steps may be evaluated together with those of other points, with the same bits.  alive: called
+        now and then; an exception from it ends the work.
         """
         scene = thinned(scene, self.recorded)
         try:
@@ -88,7 +88,7 @@ class Runner:
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
 
     def places(self, scene: Scene, points: int) -> Places | None:
-        """Where so many points like that of a scene may step together; None where each is to be run alone."""
+        """Return places in which points like a scene's step together; None where each is run alone."""
         return Places(TOGETHER, 1) if points >= FEWEST and self._steps_together(scene) else None
 
     def _steps_together(self, scene: Scene) -> bool:
@@ -97,15 +97,15 @@ class Runner:
         try:
             self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
-            return False  # as each point reports by itself
+            return False  # each point reports the error itself
         return self.engine is not None and self.engine.staged
 
     def _rows(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[list[Values], int]:
-        """Recorded values of each start, and the evaluations of all."""
+        """Return the recorded values of each start, and the number of evaluations of all."""
         if scene.event:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
-        # exact, since how many points are run side by side depends on the machine and on how long they take
+        # exact: the number of points evaluated together depends on the machine and on their durations
         engine.straight.exact = True
         engine.straight.place = place
         if in_sections(self.recorded):
@@ -115,12 +115,12 @@ class Runner:
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other, judges and judges.run)
             with self._looking:
-                rows.append(_kept(scene, last, trajectory, self.recorded))
+                rows.append(_recorded_values(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         return rows, count
 
     def _over_events(self, scene: Scene, alive: Progress) -> tuple[list[Values], int]:
-        """Recorded values of a scene with events, read from its whole run."""
+        """Return the recorded values of a scene with events, from its whole run."""
         if in_sections(self.recorded) or self.members:
             raise InputError("[event]", "a run with events has neither sections nor members", "record other reductions")
         run = lookup(EVENTS, "phases", where="[event]")(scene, self.bundles, alive, affordable(scene))
@@ -130,7 +130,7 @@ class Runner:
         return [values], int(run.attrs["evaluations"])
 
     def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
-        """What runs a point, and the maker of what continues with another integrator; made one at a time."""
+        """Return the engine of a point, and a function that makes engines with another integrator; one at a time."""
         with self._making:
             engine, other = engines_alike(self.engine, scene, self.bundles)
             self.engine = self.engine or engine
@@ -153,7 +153,7 @@ class Runner:
 
 
 def _statistics(rows: Sequence[Values]) -> tuple[Values, Values]:
-    """Means over starts and their standard deviations; of one start its values alone."""
+    """Return means over starts and their standard deviations; for one start its values, without deviations."""
     if len(rows) == 1:
         return rows[0], {}
     stacked = {name: np.stack([values[name] for values in rows]) for name in rows[0]}
@@ -162,14 +162,14 @@ def _statistics(rows: Sequence[Values]) -> tuple[Values, Values]:
 
 
 def in_sections(recorded: Sequence[Recorded]) -> bool:
-    """Whether points are motions that their laws repeat, sampled once in each period."""
+    """Return True when points are periodic motions, sampled once in each period."""
     return any(one.reduction == "sections" for one in recorded)
 
 
 def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
-    """The scene with no more regular outputs than the recorded quantities need."""
+    """Return the scene with no more regular outputs than the recorded quantities need."""
     if in_sections(recorded):
-        # only the states between the stretches of a period are examined
+        # only the states at the waypoints of a period are examined
         return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
     if any(one.throughout for one in recorded):
         return scene
@@ -177,13 +177,13 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
+def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
     events = {} if all(one.quantity.over_time for one in kept) else events_of(engine.model, trajectory)
     terms = {term for one in kept for term in one.quantity.terms()}
-    arrays = chosen(scene, Motions(engine.model, seen), terms, trajectory.time, events)
+    arrays = variables_for(scene, Motions(engine.model, seen), terms, trajectory.time, events)
     return _values(arrays, kept, trajectory.time, _regular(engine, trajectory.time))
 
 
@@ -201,13 +201,13 @@ def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regul
 
 
 def _recorded(one: Recorded, time: np.ndarray, over_time: np.ndarray, regular: np.ndarray) -> np.ndarray:
-    """What is recorded of a series, shape (time, ...); regular: rows of the regular output times."""
+    """Return the recorded value of a series, shape (time, ...); regular: rows of the regular output times."""
     value = over_time[regular] if one.reduction == "series" else reduced(time, over_time, one.reduction)
     return np.asarray(value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0])
 
 
 def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
-    """Recorded values, once in each period, after the transient, and the evaluations that all periods took."""
+    """Return the recorded values once per period, after the transient, and the evaluations of all periods."""
     requested, period = scene.sections or Sections(), section_period(scene)
     start, parts = consistent_start(engine), stretches(engine, period, requested.phase)
     require_periodic(parts, start)
@@ -229,7 +229,7 @@ def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive:
 
 
 def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:
-    """Rows at the regular output times; a break that replaces one is the same but for rounding."""
+    """Return the rows at the regular output times; a break that replaces one differs only by rounding."""
     requested = regular_times(engine.model.scene.time, engine.model.scene.output)
     after = np.clip(np.searchsorted(time, requested), 1, len(time) - 1)
     nearer = np.where(np.abs(time[after - 1] - requested) < np.abs(time[after] - requested), after - 1, after)

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.scene.solver import Solver
 from flexclear.pipeline.dynamics.compile import reach
 from flexclear.pipeline.dynamics.compile.sources import sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
@@ -97,3 +99,12 @@ def test_no_number_of_the_solver_is_compiled_in(root: Path, one: dict, other: di
     path = root / "scenes" / "sps4" / "csj.toml"
     schemes = {scheme_of(load_scene(path, {"solver": solver}).solver) for solver in (one, other)}
     assert len(schemes) == 1
+
+
+def test_a_parameter_that_is_none_has_its_default_and_one_that_is_no_number_is_refused() -> None:
+    assert Solver(integrator="generalized-alpha", step=1e-3, rho_inf=None) == Solver(
+        integrator="generalized-alpha", step=1e-3
+    )
+    for value in (float("nan"), float("inf"), "nan", True):
+        with pytest.raises(ValidationError, match="rho_inf"):
+            Solver(integrator="generalized-alpha", step=1e-3, rho_inf=value)
