@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Collection, Iterator
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,14 +33,6 @@ from flexclear.pipeline.dynamics.run import ledger
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-
-def dataset(run: Run) -> xr.Dataset:
-    """Return all recorded variables of a run (schema RUN), as a dataset."""
-    return recorded(run).to_xarray()
 
 
 def recorded(run: Run) -> LabelledArrays:
