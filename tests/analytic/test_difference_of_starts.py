@@ -5,7 +5,8 @@ import pytest
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.record.ensemble import arms, difference_of_starts
+from flexclear.pipeline.dynamics.model.contacts import arms
+from flexclear.pipeline.dynamics.record.ensemble import difference_of_starts
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of

@@ -20,6 +20,7 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
+    from flexclear.pipeline.dynamics.model.model import Model
 
 #: least impact rates where the scene gives none: far below the approach speeds of common machines [m/s or rad/s], and
 #: the fraction of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
@@ -118,3 +119,9 @@ def _reduced_mass(masses: Sequence[float]) -> float | None:
     """Of the links on both sides [kg], the ground's (0 here) being infinite; None when both are."""
     inverse = sum(1.0 / mass for mass in masses if mass > 0.0)
     return 1.0 / inverse if inverse > 0.0 else None
+
+
+def arms(model: Model) -> np.ndarray:
+    """By what a gap of each contact is multiplied to be a length: 1, or the size [m] of ends of turning coordinates."""
+    turning = [getattr(contact.joint, "coordinate", None) for contact in model.contacts]
+    return np.array([model.length if one is not None and one.turning else 1.0 for one in turning])

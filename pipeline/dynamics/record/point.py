@@ -22,8 +22,9 @@ from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.record.dataset import series
-from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
+from flexclear.pipeline.dynamics.record.ensemble import ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.alike import engines_alike
