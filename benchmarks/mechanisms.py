@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_code
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
@@ -41,12 +41,12 @@ class Mechanism:
         return engine_of(self.scene, self.bundles, silent)
 
     def general_engine(self) -> Engine:
-        """Its engine that evaluates with the kernels for all wirings, as what is too long for straight code does."""
-        proper, straight_code.INTERPRETED = straight_code.INTERPRETED, True
+        """Its engine that evaluates with the kernels for all topologies, as topologies without specialised code do."""
+        proper, specialised_code.INTERPRETED = specialised_code.INTERPRETED, True
         try:
             return self.engine()
         finally:
-            straight_code.INTERPRETED = proper
+            specialised_code.INTERPRETED = proper
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
         """The same bundles under an edited scene."""

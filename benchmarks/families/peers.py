@@ -39,7 +39,7 @@ def cases() -> list[Case]:
 
 
 def _of_chain(name: str, links: int) -> Record:
-    """Evaluations of an open chain, by the kernels and, where there is such, by straight code; and those of its run."""
+    """Return times of an open chain's evaluations by kernels and specialised code, and the evaluations of its run."""
     peer, mine = CHAINS[name](links), Mechanism(name, hinged(links), {})
     engine, straight = mine.general_engine(), mine.engine()
     start, order = consistent_start(engine), [hinge.start for hinge in engine.model.numbering.coordinates[1:]]
@@ -62,9 +62,9 @@ def _of_chain(name: str, links: int) -> Record:
 
 
 def _times(peer: Peer, engine: Engine, straight: Engine, state: State, repeat: int) -> Record:
-    """Times of one evaluation by the peer, by the kernels and, where there is such, by straight code; their ratios."""
+    """Return times of one evaluation by the peer, by kernels and by specialised code, and their ratios."""
     tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
-    if straight.has_straight_code:
+    if straight.has_specialised_code:
         tasks["straight"] = partial(evaluation_time, straight, state, repeat)
     times = interleaved(tasks, ROUNDS)
     return {

@@ -5,8 +5,8 @@ Evaluations: against one LAPACK ``dgesv`` of the order of the maximal-coordinate
 Warm: the integration alone, and the simulate stage.  The first: as a command, from an empty folder of kernels to the
 dataset; meshes, modes, bundles and Python's bytecode, which installing makes, are made before. The same command with
 the kernels on disk is measured next to it: the difference is what compiling takes. So is that with all kernels but
-those of the scene's own wiring, as with the first mechanism of another shape. Two processes compile where there are two
-processors. Wall time means something on a machine without other work only; processor time is that of all processes
+those of the scene's own topology, as with the first mechanism of another shape. Two processes compile where there are
+two processors. Wall time means something on a machine without other work only; processor time is that of all processes
 together.
 """
 
@@ -139,7 +139,7 @@ COLD_COLUMNS: Columns = {
     "processor [s]": lambda r: short(r["processor_s"]),
     "kernels on disk, wall [s]": lambda r: short(r["warm_wall_s"]),
     "its processor [s]": lambda r: short(r["warm_processor_s"]),
-    "another wiring, wall [s]": lambda r: short(r["another_wall_s"]),
+    "another topology, wall [s]": lambda r: short(r["another_wall_s"]),
     "code [kB]": lambda r: str(r["kilobytes"]),
 }
 

@@ -26,11 +26,11 @@ def arrays() -> tuple[np.ndarray, ...]:
         sizes["w"] += m.AWAITED_TIME + 1  # the most named floats that a stretch has
     for k, place in enumerate(m.SIZES.values()):
         h[place] = -1 - k
-    wiring = np.arange(m.HEADER, sizes["h"]) * 10
+    topology = np.arange(m.HEADER, sizes["h"]) * 10
     f, w = (np.arange(float(sizes[array])) + start for array, start in (("f", 0.25), ("w", 0.5)))
     n = np.arange(m.INTEGERS + 2 * ROWS)
     n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + ROWS
-    return np.concatenate([h, wiring]), f, w, n
+    return np.concatenate([h, topology]), f, w, n
 
 
 def test_names_are_those_of_memory_and_none_means_two_things() -> None:

@@ -39,8 +39,8 @@ class Arrays:
 
     def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
         """Return a view of a table of h or f with named fields, shape (rows,); h: another copy of the topology."""
-        wiring, after = _neighbours()[table.place]
-        array = (self.h if h is None else h) if wiring else self.f
+        topology, after = _neighbours()[table.place]
+        array = (self.h if h is None else h) if topology else self.f
         end = len(array) if after is None else self.h[after]
         return m.named(table, array[self.h[table.place] : end])
 

@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.effects import Parts, most_parts
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling, couplings
 from flexclear.pipeline.dynamics.effects.stops.model import STOP
 from flexclear.pipeline.dynamics.model import contacts as contacting
-from flexclear.pipeline.dynamics.model import filling, flexible_bodies, guards, laws, wiring
+from flexclear.pipeline.dynamics.model import filling, flexible_bodies, guards, index_tables, laws
 from flexclear.pipeline.dynamics.model import loads as loading
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.model.assembly import assembled
@@ -104,7 +104,7 @@ def filled(
     """
     normals = contacting.resolve(mechanism)
     closing: list[Closure | Coupling] = [*mechanism.closures, *couplings(mechanism)]
-    looped, ordered = wiring.closures(numbering, closing) if like is None else ({}, like.closures)
+    looped, ordered = index_tables.closures(numbering, closing) if like is None else ({}, like.closures)
     site_pairs = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
     gauges = Gauges()
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
@@ -192,7 +192,7 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
         m.SITE_NUMBERS: [np.concatenate([s.place.p, s.place.R.ravel()]) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
-        **wiring.mass_entries(numbering, parts.articulated),
+        **index_tables.mass_entries(numbering, parts.articulated),
     }
 
 

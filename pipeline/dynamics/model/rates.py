@@ -27,11 +27,11 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
+from flexclear.pipeline.dynamics.model.index_tables import closure_route, uncommon
 from flexclear.pipeline.dynamics.model.interface_basis import frame_index
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Site
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 #: least arm of a rotation, in units of the mechanism's size: positions are not more exact at smaller distances
 LEAST_ARM = 1e-3

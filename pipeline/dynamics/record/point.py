@@ -107,8 +107,8 @@ class Runner:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
         # exact: the number of points evaluated together depends on the machine and on their durations
-        engine.straight.exact = True
-        engine.straight.place = place
+        engine.specialised.exact = True
+        engine.specialised.place = place
         if in_sections(self.recorded):
             values, count = _sections(scene, engine, self.recorded, alive)
             return [values], count

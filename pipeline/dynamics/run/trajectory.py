@@ -131,7 +131,7 @@ def integrate(
         outputs = engine.output_times(engine.model.scene.output.interval)
     stopping.check()  # many short integrations never pause
     with stopping.heeded():
-        engine.straight.rows.clear()
+        engine.specialised.rows.clear()
         tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
         engine.settle(progress)
         tape.looks.append(look(engine))

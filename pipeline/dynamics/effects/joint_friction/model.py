@@ -13,9 +13,9 @@ from flexclear.pipeline.dynamics.model.components import Floors, Group
 from flexclear.pipeline.dynamics.model.contacts import bristle, friction_law
 from flexclear.pipeline.dynamics.model.filling import Filling
 from flexclear.pipeline.dynamics.model.guards import Guard, speeds
+from flexclear.pipeline.dynamics.model.index_tables import closure_route, uncommon
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
-from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 Rows = list[tuple[int, ...]]
 BENDS = m.NAMED["bends"]
