@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
 from flexclear.pipeline.post.cost.causes import causes_of
-from flexclear.pipeline.post.cost.study import Point, assemble, believed, cost, relative_errors, with_reference
+from flexclear.pipeline.post.cost.study import Point, assemble, comparable_until, cost, relative_errors, with_reference
 from flexclear.pipeline.post.cost.work_precision import Mark
 from flexclear.pipeline.post.plotting.table import files
 
@@ -70,6 +70,6 @@ def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
     for name, group in (("this scene", "sampling"), ("paper's choice", "paper")):
         run = next((runs[p.key] for p in points if p.group == group and "refused" not in runs[p.key].attrs), None)
         if run is not None:
-            errors = relative_errors(run, reference, chosen, believed(points, runs))
+            errors = relative_errors(run, reference, chosen, comparable_until(points, runs))
             marks.append(Mark(name, cost(run, "cpu_seconds"), errors))
     return tuple(marks)

@@ -117,7 +117,7 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     from flexclear.pipeline.dynamics.plan.search import plan
 
     rigid = {name: data for name, data in inputs.items() if name.startswith(simulation.RIGID)}
-    fewer = less(inputs)
+    fewer = fewer_modes(inputs)
 
     def filled(scene: Scene) -> Scene:
         """Return the scene with the numbers of the rigid bodies that recipes describe."""
@@ -131,7 +131,7 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress)
 
 
-def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
+def fewer_modes(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
     """Return the bundles of fewer modes by level, the fewest first, and body; bodies without fewer modes are absent."""
     fewer: dict[int, dict[str, xr.Dataset]] = {}
     for name, data in inputs.items():

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: either datasets or labelled arrays
 Data = TypeVar("Data")
 #: limits of a scene rebuilt without its own: its requests were checked when the scene was read
-JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
+UNLIMITED = {"rows": sys.maxsize, "members": sys.maxsize}
 
 #: bytes of a row of a run, fitted to runs of 1 to 24 bodies: constant, per body, joint, contact, load, modal coordinate
 ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
@@ -39,8 +39,8 @@ MEMBER_ROWS = 2000
 RIGID = "rigid/"
 #: error of the frame positions from a mesh, as a fraction of their distance: the centre of a hole is the mean of its
 #: nodes; with sixteen around a hole of a twentieth of that distance, a chord is off the circle by 2 % of the radius
-LEFT_BY_MESHES = 1e-3
-SPEND = "choose a longer output.interval, or say more in [limits]"
+FRAME_ERROR = 1e-3
+REMEDY = "choose a longer output.interval, or say more in [limits]"
 
 
 def params(
@@ -85,8 +85,8 @@ def check_run(scene: Scene, results: Path) -> None:
     rows = (scene.time.end - scene.time.start) / scene.output.interval + 1.0
     need = rows * row(scene)
     what = f"a run of {rows:.3g} rows"
-    machine.require_memory(TIMES_IN_MEMORY * need, what, SPEND, scene.limits.memory)
-    machine.require_disk(TIMES_ON_DISK * need, what, results, SPEND, scene.limits.disk)
+    machine.require_memory(TIMES_IN_MEMORY * need, what, REMEDY, scene.limits.memory)
+    machine.require_disk(TIMES_ON_DISK * need, what, results, REMEDY, scene.limits.disk)
     if scene.ensemble is not None:
         n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
         need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
@@ -146,7 +146,7 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = N
 
     table, name = params["scene"], str(params.get("name", "scene"))
     body = filled(table["body"], inputs or {})
-    own = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
+    own = {"body": body, "title": name, "limits": params.get("limits", UNLIMITED)}
     scene = Scene.model_validate({**table, **own})
     scene._name = name
     return scene
@@ -175,7 +175,7 @@ def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[st
             "com": data["com"].values.tolist(),
             "inertia": data["inertia"].values.tolist(),
             "frames": frames,
-            "frame_tolerance": LEFT_BY_MESHES * float(np.ptp(data["frame_position"].values, axis=0).max()),
+            "frame_tolerance": FRAME_ERROR * float(np.ptp(data["frame_position"].values, axis=0).max()),
         }
         result[body] = {key: value for key, value in bodies[body].items() if key != "mesh"} | numbers
     return result

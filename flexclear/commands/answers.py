@@ -45,7 +45,7 @@ IDEAL = "clearance and flexibility"
 
 
 @dataclass(frozen=True)
-class Said:
+class ShownAnswer:
     """An answer as a page shows it: heading, text, file name of its picture with a caption, and a table as HTML."""
 
     heading: str
@@ -55,7 +55,7 @@ class Said:
     table: str = ""
 
 
-def said(name: str, answer: Made, scene: Scene) -> Said:
+def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     """Return heading, text, picture and table of the answer called accuracy, stability or matters."""
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
@@ -63,18 +63,18 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
     data = answer.dataset()
     if name == "accuracy":
         caption = "Error against processor time; the star is this scene"
-        return Said("What accuracy costs", sentences(data), "accuracy.png", caption)
+        return ShownAnswer("What accuracy costs", sentences(data), "accuracy.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
         caption = "Errors of energy and loops over time, and their limits"
         table = prose(("check", *columns), rows)
-        return Said("Is it stable", data.attrs["answer"], "stability.png", caption, table)
+        return ShownAnswer("Is it stable", data.attrs["answer"], "stability.png", caption, table)
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
     caption = "Change of each quantity without the effect; thin lines: what of it may be chance"
     text, table = matters.sentence(data, requested), scenes.tables(answer, "matters.md")
-    return Said("Which effects matter", text, "matters.png", caption, table)
+    return ShownAnswer("Which effects matter", text, "matters.png", caption, table)
 
 
 def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
@@ -93,7 +93,7 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool
         answer = getattr(Answers(scene, workplace, given, questions=1), name)
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
-    words = said(name, answer, scene)
+    words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
     return answered(answer.dataset(), words.text, picture, words.table)
 
@@ -125,7 +125,7 @@ class Answers:
         return dict(list(tasks.items())[:AHEAD])
 
     @cached_property
-    def _begun(self) -> cost.Study:
+    def _started(self) -> cost.Study:
         """Return the study with the scene's own run measured, and with the budget that follows from that run."""
         study = cost.Study(self.scene, self.workplace, (self.seconds or LEAST) / self.questions)
         study.begin()
@@ -136,7 +136,7 @@ class Answers:
     @cached_property
     def _study(self) -> cost.Study:
         """Return the study with the points in the neighbourhood of the scene's own setting."""
-        study = self._begun
+        study = self._started
         study.first()
         study.neighbourhood()
         return study
@@ -173,8 +173,8 @@ class Answers:
         if not effects or not chosen:
             return None
         self.workplace.bring(list(self.kernels.values()))
-        self._begun.compiled |= self.kernels
-        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task())[0]
+        self._started.compiled |= self.kernels
+        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._started).task())[0]
 
 
 @dataclass
@@ -193,18 +193,18 @@ class _Comparison:
     #: True when members run at the scene's own tolerance, since the looser one for means was refused
     tight: bool = False
     #: processor time of a run of each variant [s]
-    took: dict[str, float] = field(default_factory=dict)
+    cpu_seconds: dict[str, float] = field(default_factory=dict)
 
     def task(self) -> Task:
         """Run the points that the budget allows and return the task of the answer."""
         from flexclear.pipeline.post.answers.matters import Pair, undecided
 
-        levels = MEMBERS if self._touching("") else (0,)
-        waiting = names = self._fitting(list(self._gone), levels[0])
+        levels = MEMBERS if self._has_contacts("") else (0,)
+        waiting = names = self._affordable(list(self._removed), levels[0])
         pairs = dict.fromkeys(names, 0)
         for members in levels:
             if members != levels[0]:
-                waiting = self._fitting(waiting, members)
+                waiting = self._affordable(waiting, members)
             if not waiting:
                 break
             self._bring(["", *waiting], members)
@@ -214,10 +214,10 @@ class _Comparison:
             pairs |= dict.fromkeys(waiting, members)
             full = self.points["", members]
             waiting = [n for n in waiting if undecided(Pair(full, self.points[n, members], members), self.chosen)]
-        alone = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
-        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
+        repeated = IDEAL in self._removed and self._repeats(IDEAL, [name for name in self._removed if name != IDEAL])
+        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if repeated else IDEAL}
         without = {name: self._variant(name) for name in ("", *names)}
-        left = [words[name] for name in self._gone if name not in names and words[name]]
+        left = [words[name] for name in self._removed if name not in names and words[name]]
         return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left)
 
     @cached_property
@@ -227,20 +227,20 @@ class _Comparison:
         return {*self.study.compiled, *(kernels.shared(scene) for scene in run)}
 
     @cached_property
-    def _gone(self) -> Mapping[str, frozenset[str]]:
+    def _removed(self) -> Mapping[str, frozenset[str]]:
         """Return the effects that go with each one: first all clearances and flexible bodies, then single effects."""
-        alone = {e.name: self._closed({e.name}) for e in self.effects}
+        single = {e.name: self._closed({e.name}) for e in self.effects}
         ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
         both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
         order = sorted(self.effects, key=lambda effect: effect.kind not in (CLEARANCE, FLEXIBILITY))
-        return both | {effect.name: alone[effect.name] for effect in order}
+        return both | {effect.name: single[effect.name] for effect in order}
 
     def _closed(self, names: set[str]) -> frozenset[str]:
         """Return the names of effects, and those of effects that exist only within them."""
         return frozenset(names | {e.name for e in self.effects if e.within in names})
 
     def _variant(self, name: str) -> Scene:
-        gone = self._gone[name] if name else frozenset()
+        gone = self._removed[name] if name else frozenset()
         variant, setting = variants.without(self.scene, [e for e in self.effects if e.name in gone]), self.study.setting
         if setting.step is not None:
             return variant
@@ -249,16 +249,16 @@ class _Comparison:
         rtol = max(setting.rtol, MEANS) if means else setting.rtol
         return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})
 
-    def _touching(self, name: str) -> bool:
+    def _has_contacts(self, name: str) -> bool:
         scene = self._variant(name)
         return bool(scene.contacts() or scene.stop)
 
     def _seconds(self, name: str, members: int) -> float:
         """Predict the wall time of members of a variant [s]: from its last round, else from the scene's own run."""
-        runs = members if self._touching(name) else 1
-        return (runs * self.took.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
+        runs = members if self._has_contacts(name) else 1
+        return (runs * self.cpu_seconds.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
 
-    def _fitting(self, names: Sequence[str], members: int) -> list[str]:
+    def _affordable(self, names: Sequence[str], members: int) -> list[str]:
         """Return the first names that the rest of the budget allows, in the order in which the summary needs them; at
         least one while no point exists."""
         fitting, total = list[str](), self.spent + self._seconds("", members)
@@ -274,7 +274,7 @@ class _Comparison:
 
     def _repeats(self, name: str, others: Sequence[str]) -> bool:
         """Return True when another effect's variant has the same runs: a single effect may be all of them."""
-        return any(self._gone.get(name) == self._gone.get(other) for other in others)
+        return any(self._removed.get(name) == self._removed.get(other) for other in others)
 
     def _bring(self, names: Sequence[str], members: int) -> None:
         from flexclear.pipeline.core.artifacts.effect_size import watched
@@ -284,6 +284,6 @@ class _Comparison:
             stored = made.dataset()
             self.tasks[name, members] = made.task
             self.points[name, members] = watched(stored, self._variant(name).owners(), self.chosen)
-            self.took[name] = float(stored.attrs["cpu_seconds"]) / (members if self._touching(name) else 1)
+            self.cpu_seconds[name] = float(stored.attrs["cpu_seconds"]) / (members if self._has_contacts(name) else 1)
             if not self._repeats(name, names[:k]):
                 self.spent += self._seconds(name, members) + float(stored.attrs["compile_seconds"]) / AT_ONCE

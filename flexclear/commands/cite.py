@@ -76,15 +76,15 @@ def _at_once(graph: Graph, sources: Sources) -> set[str]:
     single = [task for task in in_order(graph.up_to("post")) if task.met]
     met = {name for task in single for name in {*task.roots()} - {*task.roots(())}}  # other modules may reach them, too
     waiting = [name for names in _roots(graph, ()) for name in names - met]
-    seen = set[str]()
+    visited = set[str]()
     while waiting:
         name = waiting.pop()
         path = source_file(sources.root, name)
-        if name in seen or name in others or path is None:
+        if name in visited or name in others or path is None:
             continue
-        seen.add(name)
+        visited.add(name)
         waiting += [*imported(path.read_bytes(), name, path.name == "__init__.py", deep=False)[0], *parents(name)]
-    return seen
+    return visited
 
 
 def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:

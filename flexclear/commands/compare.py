@@ -92,8 +92,8 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
     ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
-        there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
-        if there or not ideals:
+        present = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
+        if present or not ideals:
             made = ideal(scene, effects)
             same = any(made.model_dump() == other.model_dump() for other in ideals)
             made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"

@@ -90,10 +90,10 @@ def command(options: argparse.Namespace) -> None:
     if options.json:
         print(as_json({name: made.dataset() for name, made in studies.items()}))
     if options.page is not None:
-        said = f" --peer {options.peer.as_posix()}" if options.peer else ""
-        said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
-        said += f" --budget {options.budget}{' --models' if options.models else ''}"
-        write_page(studies, options.page, said)
+        shown_options = f" --peer {options.peer.as_posix()}" if options.peer else ""
+        shown_options += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        shown_options += f" --budget {options.budget}{' --models' if options.models else ''}"
+        write_page(studies, options.page, shown_options)
 
 
 @dataclass
@@ -131,7 +131,7 @@ class Study:
         """
         if self.points:
             return
-        record = self._made(self._near[0])
+        record = self._made(self._neighbours[0])
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
         self.own = float(record.attrs["evaluations"])
@@ -140,11 +140,11 @@ class Study:
     def first(self) -> None:
         """Compute the first few points in the neighbourhood of the scene's own setting."""
         self.begin()
-        self._queue(self._near[1 : cost_design.FIRST])
+        self._queue(self._neighbours[1 : cost_design.FIRST])
 
     def neighbourhood(self) -> None:
         """Compute the other points in the neighbourhood of the scene's own setting, as far as the budget goes."""
-        self._queue(self._near[cost_design.FIRST :])
+        self._queue(self._neighbours[cost_design.FIRST :])
 
     def beyond(self) -> None:
         """Compute the points farther away, the cheapest first, as far as the budget goes."""
@@ -152,8 +152,8 @@ class Study:
         if self.models and scene.flexible():
             bundles = scenes.bundles(scene, self.workplace, jobs=None).values()
             more += cost_design.models(scene, self.setting, max(float(one["frequency"].max()) for one in bundles))
-        there = {design.key for design in (*self.points, *self.undone)}
-        more = [design for design in more if design.key not in there]
+        known = {design.key for design in (*self.points, *self.undone)}
+        more = [design for design in more if design.key not in known]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
         self._complete = True
 
@@ -163,7 +163,7 @@ class Study:
         return self.scene.requested() if self.scene.accuracy is not None else self.scene.watched()
 
     @cached_property
-    def _near(self) -> list[cost_design.Design]:
+    def _neighbours(self) -> list[cost_design.Design]:
         return cost_design.neighbours(self.scene, self.setting)
 
     @cached_property
@@ -189,9 +189,9 @@ class Study:
                 "quantities": [q.written() for q in self._chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
-                "complete": self._complete and all(self._crawls(design) for design in self.undone),
-                "undone": _listed([d.key for d in self.undone if not self._crawls(d)]),
-                "given_up": _listed([d.key for d in self.undone if self._crawls(d)]),
+                "complete": self._complete and all(self._exhausted(design) for design in self.undone),
+                "undone": _listed([d.key for d in self.undone if not self._exhausted(d)]),
+                "given_up": _listed([d.key for d in self.undone if self._exhausted(d)]),
                 "peers": list(self.peers),
             },
             inputs=inputs | self._ensembles,
@@ -221,12 +221,12 @@ class Study:
         for design in designs:
             seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
             compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
-            if self.spent + seconds + compiling > self.seconds or self._crawls(design):
+            if self.spent + seconds + compiling > self.seconds or self._exhausted(design):
                 self.undone.append(design)
             else:
                 self._made(design)
 
-    def _crawls(self, design: cost_design.Design) -> bool:
+    def _exhausted(self, design: cost_design.Design) -> bool:
         """Return True when the design's method used up its evaluations at the same or a looser tolerance."""
         solver = design.scene.solver
         return design.chooses_steps and solver.rtol <= self.used_up.get(solver.integrator, 0.0)
@@ -234,7 +234,7 @@ class Study:
     def _made(self, design: cost_design.Design) -> xr.Dataset:
         """Return one point, brought up to date."""
         if self.own:
-            limit = min(self.scene.solver.evaluations, self._most())
+            limit = min(self.scene.solver.evaluations, self._evaluation_limit())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
         names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self.compiled
         compiled = self._kernels(design)
@@ -245,7 +245,7 @@ class Study:
         self.points.append(design)
         solver = design.scene.solver
         if "evaluations" in record.attrs.get("refused", ""):
-            self.spent += POINT + self._most() * self.seconds_each
+            self.spent += POINT + self._evaluation_limit() * self.seconds_each
             if design.chooses_steps:
                 self.used_up[solver.integrator] = max(solver.rtol, self.used_up.get(solver.integrator, 0.0))
         elif "refused" in record.attrs:
@@ -257,7 +257,7 @@ class Study:
                 known[solver.rtol] = float(record.attrs["evaluations"])
         return record
 
-    def _most(self) -> int:
+    def _evaluation_limit(self) -> int:
         """Return the evaluations that a point may take: 1, 2 or 5 times a power of ten, so that keys rarely change with
         budgets."""
         affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
@@ -315,8 +315,8 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
 
     shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem in FIGURES}
     shown = {stem: path for stem, path in shown.items() if f"{stem}.png" in made.record.files}
-    said = advice(made.dataset(), tables(made))
-    page = Studied(name, said, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
+    paragraph = advice(made.dataset(), tables(made))
+    page = Studied(name, paragraph, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
     return page, {path: f"{stem}.png" for stem, path in shown.items()}
 
 
@@ -329,8 +329,8 @@ def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> No
 
     sections, files = list[Studied](), dict[str, bytes]()
     for name, made in studies.items():
-        said, pictures = figures_and_tables(name, made, page.stem)
-        sections.append(said)
+        section, pictures = figures_and_tables(name, made, page.stem)
+        sections.append(section)
         files |= {Path(path).name: made.read(file) for path, file in pictures.items()}
     scenes.write_page(page, markdown(tuple(sections), f"{page.as_posix()}{options}"), files)
 

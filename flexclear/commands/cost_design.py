@@ -69,16 +69,16 @@ class Design:
         """True when the run has the scene's own model and steps of variable length."""
         return self.scene.solver.step is None and self.group in ("tolerance", "sampling")
 
-    def evaluations(self, seen: Mapping[str, Mapping[float, float]], own: float) -> float:
+    def evaluations(self, measured: Mapping[str, Mapping[float, float]], own: float) -> float:
         """Predict the evaluations of the right-hand side.
 
-        seen: those of runs with variable steps, by integrator and tolerance.  own: those of the scene's own run.
+        measured: those of runs with variable steps, by integrator and tolerance.  own: those of the scene's own run.
         """
         solver = self.scene.solver
         order = INTEGRATORS[solver.integrator].order
         if solver.step is not None:
             return (self.scene.time.end - self.scene.time.start) / solver.step * order
-        known = seen.get(solver.integrator)
+        known = measured.get(solver.integrator)
         if not self.chooses_steps:
             return UNSEEN * own
         if not known:

@@ -119,8 +119,8 @@ def command(options: argparse.Namespace) -> None:
             print(f"left out: {file}, since a mesh names it outside of the scene's folders; move it next to the mesh")
         return
     if options.repeat is not None:
-        same, said = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
-        print(said)
+        same, report = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
+        print(report)
         if not same:
             raise UnwellError("it does not end here as it did there")
         return
@@ -163,13 +163,13 @@ def _results(root: Path) -> tuple[str, bool]:
 
 
 def _kernels() -> tuple[str, bool]:
-    said: list[str] = []
+    messages: list[str] = []
     try:
-        folder = writable(kernel_root(), said.append)
+        folder = writable(kernel_root(), messages.append)
     except FlexclearError as error:
         return str(error), False
-    if said:
-        return f"{said[0]}: FLEXCLEAR_KERNELS names another folder", False
+    if messages:
+        return f"{messages[0]}: FLEXCLEAR_KERNELS names another folder", False
     text = f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled"
     if machine.disk(folder) < LITTLE_FOR_KERNELS:
         return f"{text}; only {machine.size(machine.disk(folder))} free: FLEXCLEAR_KERNELS names another folder", False
@@ -203,9 +203,9 @@ def _self_test() -> tuple[str, bool]:
         return f"a free fall cannot be computed: {error.strerror} ({error.filename})", False
     lines = done.stdout.split()
     if done.returncode or not lines:
-        said = done.stderr.strip().splitlines()
+        errors = done.stderr.strip().splitlines()
         # users need only the last line of a traceback
-        last_lines = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
+        last_lines = errors[-1:] if any(line.startswith("Traceback") for line in errors) else errors[-4:]
         return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine

@@ -60,8 +60,8 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
         raise InputError(
             "--members", f"must be at least 2 (got {members})", "the scatter cannot be estimated from one start"
         )
-    there, chosen = variants.effects(scene), scene.watched()
-    if not there:
+    present, chosen = variants.effects(scene), scene.watched()
+    if not present:
         raise InputError(
             str(scene.path or scene.name),
             "has no effect that could be taken away: no clearance, flexible body, friction, gravity or stop",
@@ -69,10 +69,10 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
         )
     if not chosen:
         raise InputError(str(scene.path or scene.name), "nothing in it is watched", "name quantities in [view] watch")
-    by_name = {effect.name: effect for effect in there}
-    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(there)}
+    by_name = {effect.name: effect for effect in present}
+    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(present)}
     tasks = {gone: watched_quantities.task(variant, chosen, members) for gone, variant in scenes.items()}
-    (made,) = workplace.made(effect_study.task(scene, there, chosen, scenes, tasks, members))
+    (made,) = workplace.made(effect_study.task(scene, present, chosen, scenes, tasks, members))
     parts = [
         Part("chart", "Chart", pictures(made, {"effects.png": ("Each effect alone",)})),
         Part("table", "Table", tables(made, "effects.md")),

@@ -147,8 +147,8 @@ def text(linear: xr.Dataset) -> str:
     columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "decay_rate", "dominant")]
     for number, hertz, damping, rate, name, part in zip(*columns, fraction, strict=True):
         # an overdamped motion has two rates and no frequency: two rows of one motion
-        alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
-        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")
+        note = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
+        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){note}")
     return "\n".join(lines) + "\n"
 
 
@@ -173,5 +173,5 @@ def _pose(linear: xr.Dataset) -> list[str]:
     names = [str(name) for name in linear["drive"].values]
     position, each = linear["drive_position"], linear.coords.get("drive_position_units")
     units = [str(position.attrs.get("units", ""))] * len(names) if each is None else [str(unit) for unit in each.values]
-    places = zip(names, position.values, units, strict=True)
-    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in places)]
+    columns = zip(names, position.values, units, strict=True)
+    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in columns)]

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.scene.variants import lessened
+from flexclear.pipeline.core.scene.variants import pruned
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.post.plotting.table import as_html, as_markdown
 from flexclear.stages import effect_plan, watched_quantities
@@ -82,7 +82,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     plans: dict[str, xr.Dataset | str] = {}
     for level in LEVELS:
         try:
-            plans[level] = bring(asking(scene, level), workplace).made.dataset()
+            plans[level] = bring(with_accuracy(scene, level), workplace).made.dataset()
         except (InputError, FailedTasksError) as error:
             if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
@@ -90,7 +90,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     return as_markdown(shown(plans))
 
 
-def asking(scene: Scene, level: str) -> Scene:
+def with_accuracy(scene: Scene, level: str) -> Scene:
     """Return the scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
     chosen = {quantity.name: level for quantity in scene.watched()}
     if not chosen:
@@ -110,7 +110,7 @@ def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene
     from flexclear.pipeline.post.answers.plan import verified, words
 
     workplace = open_workplace()
-    planned = bring(scene if scene.accuracy is not None else asking(scene, level), workplace)
+    planned = bring(scene if scene.accuracy is not None else with_accuracy(scene, level), workplace)
     result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))
@@ -184,7 +184,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """Apply a plan to a scene: replace and remove parts, set solver and watched quantities."""
     decided = json.loads(plan.attrs["planned"])
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
-    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
+    fewer = pruned(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
     watch = [q.name for q in scene.watched() if q.is_there(owners)]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}

@@ -48,8 +48,8 @@ def command(options: argparse.Namespace) -> None:
     if len(graphs) > 1 and requested == ("modes", "html"):
         made.append(_mode_sets(graphs))
     outcome = workplace.bring(made)
-    there, files = workplace.artifacts(outcome), dict[str, list[str]]()
-    for one in (there[task] for task in made if task in there):
+    artifacts, files = workplace.artifacts(outcome), dict[str, list[str]]()
+    for one in (artifacts[task] for task in made if task in artifacts):
         files.setdefault(one.task.scene, []).extend(str(one.folder / name) for name in one.record.files)
         if not options.json:
             shown = [name for name in sorted(one.record.files) if not name.endswith(".vtp")]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import compare
-from flexclear.commands.answers import Answers, said
+from flexclear.commands.answers import Answers, shown_answer
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import graphs, in_file, pictures
 from flexclear.papers.wang_wang_2019 import tasks
@@ -187,7 +187,7 @@ def _answered(scene: Scene, result: Mapping[str, Made]) -> list[Part]:
     """Return the sections of the answers: each with a sentence, a picture and a table."""
     parts = []
     for name, answer in result.items():
-        words = said(name, answer, scene)
+        words = shown_answer(name, answer, scene)
         shown = pictures(answer, {words.picture: (words.caption,)})
         parts.append(Part(name, words.heading, f"<p>{html.escape(words.text)}</p>\n{shown}{words.table}"))
     return parts
@@ -206,7 +206,7 @@ def _page(
 
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
-    doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
+    warnings = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
     assumptions = by_weight(assumed(derived_series.sources(scene)), run)
     members = _members(graph, made)
     parts: list[Any] = [
@@ -214,7 +214,7 @@ def _page(
         Part("run", "The run", pictures(made.get(graph.overview), FIGURES)),
         *_answered(scene, answers),
         *(compare.parts(compared) if compared is not None else []),
-        Part("doubts", "Warnings", prose(("no.", "warning"), [(f"{k + 1}", text) for k, text in enumerate(doubts)])),
+        Part("doubts", "Warnings", prose(("no.", "warning"), [(f"{k + 1}", text) for k, text in enumerate(warnings)])),
         Part(
             "assumptions",
             "Assumptions, the most influential first",
@@ -232,7 +232,7 @@ def _page(
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
     changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
-    return page(scene.title, lead, parts, answer(dataset, run, doubts, changes, members))
+    return page(scene.title, lead, parts, answer(dataset, run, warnings, changes, members))
 
 
 def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:

@@ -88,16 +88,16 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         facts, log = _unpack(path, folder)
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
         done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
-        said = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST_LOG:]
+        output = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST_LOG:]
     differences = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
     if digest and facts.get("run"):
         differences += [
             f"the run is {'the same to the last bit' if digest == facts['run'] else 'not the same to the last bit'}"
         ]
-    now = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
-    then = {**facts["libraries"], "python": facts["python"]}
-    differences += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
-    ending = [text.strip().splitlines()[-REPORTED:] for text in (log, said)]
+    here = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
+    recorded = {**facts["libraries"], "python": facts["python"]}
+    differences += [f"{k} is {here[k]} here, {v} there" for k, v in sorted(recorded.items()) if here.get(k, v) != v]
+    ending = [text.strip().splitlines()[-REPORTED:] for text in (log, output)]
     differences += [
         f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines
     ]

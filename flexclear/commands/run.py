@@ -75,9 +75,9 @@ def command(options: argparse.Namespace) -> None:
 def _result(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, object]:
     """Return the JSON record of a scene: its shown files, warnings, and the verdict on its accuracy."""
     folder, record = workplace.store.root / graph.simulate.folder, outcome.records.get(graph.simulate)
-    said = {} if record is None else record.said
+    reported = {} if record is None else record.said
     return {
         "files": [str(path) for path in sorted(folder.rglob("*")) if path.is_file() and FACTS not in path.parts],
-        "warnings": [text for text in said.get("warnings", "").split("\n") if text],
-        "accuracy": said.get("accuracy_verdict"),
+        "warnings": [text for text in reported.get("warnings", "").split("\n") if text],
+        "accuracy": reported.get("accuracy_verdict"),
     }

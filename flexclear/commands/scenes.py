@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import export
-from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts import maintenance
 from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
@@ -52,9 +52,9 @@ def scene_arguments(parser: argparse.ArgumentParser, *more: str, **changed: Any)
 
 def print_files(folder: Path, files: Mapping[str, str]) -> None:
     """Print one line that lists the files that exist in a folder, with their descriptions."""
-    there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
-    if there:
-        print(f"{relative(folder)}: {', '.join(there)}")
+    existing = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
+    if existing:
+        print(f"{relative(folder)}: {', '.join(existing)}")
 
 
 def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
@@ -130,7 +130,7 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     )
     if not files:
         raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
-    changed = upkeep.shown_faults(Store(results_root()), folder)
+    changed = maintenance.shown_faults(Store(results_root()), folder)
     if changed:
         raise ResourceError(f"{changed[0]}: flexclear run {name}")
     if _of_another_run(folder):
@@ -299,19 +299,19 @@ def placed(error: InputError, path: Path | None) -> InputError:
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
     """Return plausibility warnings about a scene; those about values from `settings` are located there."""
     changed = overrides(settings)
-    doubts = []
-    for doubt in implausible(scene):
-        key = doubt.place.partition("[")[2].rstrip("]")
-        place = f"--set {key}" if key in changed else doubt.place
-        doubts.append(InputError(place, doubt.problem, doubt.remedy))
-    return doubts
+    warnings = []
+    for warning in implausible(scene):
+        key = warning.place.partition("[")[2].rstrip("]")
+        place = f"--set {key}" if key in changed else warning.place
+        warnings.append(InputError(place, warning.problem, warning.remedy))
+    return warnings
 
 
 def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
     """Print plausibility warnings; raise InputErrors for dangling names. Both come before any computation."""
     require_names(scene)
-    for doubt in implausibilities(scene, settings):
-        print(f"flexclear: {WARNING}{lines.located(doubt)}", file=sys.stderr)
+    for warning in implausibilities(scene, settings):
+        print(f"flexclear: {WARNING}{lines.located(warning)}", file=sys.stderr)
 
 
 def require_names(scene: Scene) -> None:

@@ -101,7 +101,7 @@ def of_scene(
 
 
 @dataclass
-class _Desk:
+class _Sink:
     """Collector of finished points: it stores them now and then, and reports progress."""
 
     plan: sweep_plan.Plan
@@ -166,32 +166,32 @@ def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: 
         }
         requested = {job.key: job for job in ready.jobs}
         known = {key: points[key] for key in requested if key in points}
-        desk = _Desk(ready, workplace, len(requested), known, here=workers.here, large=large)
-        missing = [job for key, job in requested.items() if key not in desk.done]
+        sink = _Sink(ready, workplace, len(requested), known, here=workers.here, large=large)
+        missing = [job for key, job in requested.items() if key not in sink.done]
         try:
             if missing:
-                _run(desk, workers, missing)
+                _run(sink, workers, missing)
         finally:
-            desk.store()
+            sink.store()
             if folder is not None and large:
-                result = sweep_large.written(ready, workplace.store, desk.done, folder / f"{NAME}{sweep_large.SUFFIX}")
+                result = sweep_large.written(ready, workplace.store, sink.done, folder / f"{NAME}{sweep_large.SUFFIX}")
                 (folder / f"{NAME}.nc").unlink(missing_ok=True)
             else:
-                result = ready.dataset(desk.done)
+                result = ready.dataset(sink.done)
                 if folder is not None:
                     _publish(result, folder)
     return result
 
 
-def _run(desk: _Desk, workers: Engine, missing: list[Job]) -> None:
-    monitor = desk.workplace.monitor
+def _run(sink: _Sink, workers: Engine, missing: list[Job]) -> None:
+    monitor = sink.workplace.monitor
     monitor.start(1)
-    sweep, scene = desk.plan.sweep, desk.plan.scene
+    sweep, scene = sink.plan.sweep, sink.plan.scene
     name = monitor.begin(scene.name if sweep.name == UNNAMED else sweep.name, "sweep")
-    packed = {family.key: pickle.dumps(family.work) for family in desk.plan.families}
+    packed = {family.key: pickle.dumps(family.work) for family in sink.plan.families}
     failed = True
     try:
-        workers.run(missing, packed, lambda finished, _: desk.take(finished, lambda f, t: monitor.update(name, f, t)))
+        workers.run(missing, packed, lambda finished, _: sink.take(finished, lambda f, t: monitor.update(name, f, t)))
         failed = False
     finally:
         monitor.finish(name, failed=failed)

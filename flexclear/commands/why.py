@@ -27,16 +27,16 @@ def command(options: argparse.Namespace) -> None:
     for graph in scenes.graphs(options.scenes, options.set):
         stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
         reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
-        others[graph.scene.name] = [text for state in stages for text in elsewhere(state.task.label, state.record)]
+        others[graph.scene.name] = [text for state in stages for text in notes(state.task.label, state.record)]
     print(as_json(reasons) if options.json else text(reasons, others))
 
 
-def elsewhere(label: str, record: Record | None) -> list[str]:
+def notes(label: str, record: Record | None) -> list[str]:
     """Return a note on a fresh result that other instructions than this process's computed: rounding differs."""
-    there = record.computed_by if record is not None else {}
-    here = instruction_set() if there else {}
-    names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-    changes = ", ".join(f"{name} {there.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
+    stored = record.computed_by if record is not None else {}
+    here = instruction_set() if stored else {}
+    names = [name for name in {**stored, **here} if stored.get(name) != here.get(name)]
+    changes = ", ".join(f"{name} {stored.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
     return [f"{label} was computed by other instructions, its numbers differ by rounding: {changes}"] if names else []
 
 

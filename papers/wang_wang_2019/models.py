@@ -116,12 +116,12 @@ def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
         acceleration=1e3 * platform.acceleration.sel(axis="z").values,
         reaction=post.reaction.sel(joint=JOINT).values,
         ball=1e3 * run.frame_position.sel(frame=BALL_FRAME).values,
-        horizon=believed_until(post),
+        horizon=comparable_until(post),
         impacts=_impacts(post),
     )
 
 
-def believed_until(post: xr.Dataset) -> float:
+def comparable_until(post: xr.Dataset) -> float:
     """Return the end of pointwise comparison [s]: where the run's ensemble diverges, or else the perturbed run."""
     return float(post.ensemble_horizon if "ensemble_horizon" in post else post.horizon)
 

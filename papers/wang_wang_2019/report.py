@@ -280,9 +280,9 @@ def _answer(content: Content) -> str:
     if table is None:
         return ""
     verdict = table.columns.index("verdict")
-    said = [row[verdict] for row in table.rows]
-    counts = "; ".join(f"{_word(word)}: {said.count(word)}" for word in dict.fromkeys(said))
-    lines = [f"<li>Of {len(said)} statements of the paper, judged by rules: {counts}.</li>"]
+    verdicts = [row[verdict] for row in table.rows]
+    counts = "; ".join(f"{_word(word)}: {verdicts.count(word)}" for word in dict.fromkeys(verdicts))
+    lines = [f"<li>Of {len(verdicts)} statements of the paper, judged by rules: {counts}.</li>"]
     for row in table.rows:
         if row[verdict] in BAD:
             section, text, word, numbers = row

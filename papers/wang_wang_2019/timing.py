@@ -31,7 +31,7 @@ PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-
 #: or the mechanism's size
 TOLERANCE, DAMPED, STROKE = 4e-6, "radau", 0.06
 #: the three settings, as variables are called
-WAYS = ("equal", "step", "tolerance")
+SETTINGS = ("equal", "step", "tolerance")
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -47,7 +47,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """
     import xarray as xr
 
-    costs: dict[str, dict[str, Cost | None]] = {way: {} for way in (*WAYS, "size")}
+    costs: dict[str, dict[str, Cost | None]] = {setting: {} for setting in (*SETTINGS, "size")}
     tolerance: dict[str, dict[str, float]] = {"equal": {}, "tolerance": {}, "size": {}}
     refused = []
     for i, name in enumerate(params):
@@ -60,20 +60,20 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         tolerance["tolerance"][name] = damped.solver.rtol
         tolerance["size"][name] = TOLERANCE / equal.length
         costs["size"][name], _ = _measured(damped_scene(scene, TOLERANCE / equal.length), reduced, checked=False)
-        for way, requested in (("step", paper_scene(scene)), ("tolerance", damped)):
-            costs[way][name], why = _measured(requested, reduced, checked=way == "step")
+        for setting, requested in (("step", paper_scene(scene)), ("tolerance", damped)):
+            costs[setting][name], why = _measured(requested, reduced, checked=setting == "step")
             refused += [f"{name}: {why}"] if why else []
     data: dict[str, Any] = {}
-    for way, costs_of_way in costs.items():
-        data |= _variables(way, list(costs_of_way.values()))
-    for way, values in tolerance.items():
-        data[f"{way}_rtol"] = (("scene",), list(values.values()), {"units": "1"})
+    for setting, costs_of_setting in costs.items():
+        data |= _variables(setting, list(costs_of_setting.values()))
+    for setting, values in tolerance.items():
+        data[f"{setting}_rtol"] = (("scene",), list(values.values()), {"units": "1"})
     attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": FRACTION, "step": PAPER["step"]}
     attributes |= {"tolerance": TOLERANCE, "damped": DAMPED, "refused": "; ".join(refused)}
     return {"nc": xr.Dataset(data, coords={"scene": list(params)}, attrs=attributes)}
 
 
-def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
+def _variables(setting: str, costs: list[Cost | None]) -> dict[str, Any]:
     """Return the variables of one setting, in the order of the scenes."""
     import numpy as np
 
@@ -82,16 +82,16 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
 
     error = [float(np.abs(cost.run["energy_error"]).max()) if cost else float("nan") for cost in costs]
     variables: dict[str, Any] = {
-        f"{way}_evaluations": (("scene",), of_scenes("evaluations"), {"units": "1"}),
-        f"{way}_steps": (("scene",), of_scenes("steps"), {"units": "1"}),
-        f"{way}_energy_error": (("scene",), error, {"units": "J"}),
+        f"{setting}_evaluations": (("scene",), of_scenes("evaluations"), {"units": "1"}),
+        f"{setting}_steps": (("scene",), of_scenes("steps"), {"units": "1"}),
+        f"{setting}_energy_error": (("scene",), error, {"units": "J"}),
     }
     for part, dim in (("integration", "repeat"), ("recording", "recorded")):
         repeats = [getattr(cost, part) if cost else () for cost in costs]
         seconds = np.full((len(costs), max(1, *map(len, repeats))), np.nan)
         for row, values in zip(seconds, repeats, strict=True):
             row[: len(values)] = values
-        variables[f"{way}_{part}_seconds"] = (("scene", f"{way}_{dim}"), seconds, {"units": "s"})
+        variables[f"{setting}_{part}_seconds"] = (("scene", f"{setting}_{dim}"), seconds, {"units": "s"})
     return variables
 
 

@@ -76,12 +76,12 @@ def _sizes(declared: str) -> list[int]:
 
 def _stretches(declared: str) -> list[int]:
     """Return the next indices of h's header, for stretches of w: "name:length", or the name where `_floats` sets it."""
-    made = []
+    indices = []
     for name, _, length in (one.partition(":") for one in declared.split()):
         STRETCHES[name] = place = next(_place)
         LENGTHS[place] = (1, length)
-        made.append(place)
-    return made
+        indices.append(place)
+    return indices
 
 
 def _numbered(declared: str) -> dict[str, int]:
@@ -106,9 +106,9 @@ def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str =
     fields = {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
     begins = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
     make: Any = namedtuple
-    made = make(kind, [*place, *fields, "size"])
-    _ROWS[made] = np.dtype([(name, number, shape) for name, shape in fields.items()])
-    return made(*place.values(), *begins)
+    row = make(kind, [*place, *fields, "size"])
+    _ROWS[row] = np.dtype([(name, number, shape) for name, shape in fields.items()])
+    return row(*place.values(), *begins)
 
 
 def _table(array: str, declared: str, count: str = "") -> Any:
@@ -232,12 +232,12 @@ DRIVES = wiring("book")  # index in the ledger of each drive's work
 LINK_NUMBERS = numbers("mass com:3 inertia:6 borne reaching")
 SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
 FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3")
-FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
+FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness, damping (n); stiffening 2 (n n)
 MOMENT_VALUES = numbers("value")
 BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
-PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
+PORT_DATA = numbers("value")  # per port, r moving shapes: translation (3r), rotation (3r); with stiffening (r r)
 #: radius: of the inner surface; stiffness, exponent, damping: of the normal law (`contact.law.Numbers`); shape: further
 #: numbers of its kind of surfaces; length: size of the mechanism that it belongs to
 CONTACT_NUMBERS = numbers("clearance radius floor stick_speed stiffness exponent damping friction_law:6 shape:2 length")

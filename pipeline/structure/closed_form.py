@@ -147,8 +147,8 @@ def bending(span: Span, ends: str, count: int) -> np.ndarray:
 def _at_end(span: Span, omega: float) -> np.ndarray:
     """Return deflection, slope, moment / EI and shear force / rho A omega^2 at x = l of the four shapes, (4, 4).
 
-    At x = -l deflection and moment of the even ones are the same, slope and shear force the opposite; of the odd ones
-    it is the other way round.
+    From x = l to x = -l, deflection and moment of the even shapes (cos, cosh) keep their sign, slope and shear force
+    change it. The odd shapes (sin, sinh) behave the opposite way.
     """
     half, k = 0.5 * span.length, span.line_mass * omega**2 / span.shear
     b = omega**2 * span.rotary / span.bending + k

@@ -33,9 +33,9 @@ PER_WORKER = 5e-3
 #: seconds within which a scheduler must answer
 SCHEDULER_TIMEOUT = 10.0
 #: interval at which a cluster is asked for its number of workers [s]
-LOOK = 5.0
+POLL_INTERVAL = 5.0
 #: losses of worker processes in a row after which the sweep stops
-LOSSES = 3
+MOST_LOSSES = 3
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Engine:
                     again = [mine, *running.values()]
                     running.clear()
                     lost += 1
-                    if lost > LOSSES:
+                    if lost > MOST_LOSSES:
                         text = f"worker processes were killed {lost} times in a row; is the memory full?"
                         raise ResourceError(text) from None
                     waiting += [list(reversed(batch)) for batch in again]
@@ -245,7 +245,7 @@ def _on_cluster(client: Any, where: str) -> Engine:
 
     def width() -> int:
         """Return the current number of threads; workers may join and leave."""
-        if time.monotonic() - last_poll[0] > LOOK:
+        if time.monotonic() - last_poll[0] > POLL_INTERVAL:
             last_poll[:] = time.monotonic(), sum(client.nthreads().values())
         return max(1, int(last_poll[1]))
 

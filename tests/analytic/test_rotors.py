@@ -179,10 +179,10 @@ SCENES: dict[str, tuple[str, dict[str, object]]] = {
 
 
 @cache
-def spun(case: str, rtol: float = 1e-10) -> xr.Dataset:
-    """The run of a case."""
+def spun(case: str) -> xr.Dataset:
+    """The run of a case at a tolerance that energies need, see below."""
     name, overrides = SCENES[case]
-    scene = load_scene(TREE / "scenes" / f"{name}.toml", {**overrides, "solver.rtol": rtol})
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", {**overrides, "solver.rtol": 1e-12})
     return dynamics.simulate(scene, bundles(scene), silent)
 
 
@@ -201,20 +201,6 @@ def test_a_beam_spun_up_lags_and_recovers_as_assumed_modes_say(case: str) -> Non
 
 
 @pytest.mark.parametrize("case", SCENES)
-def test_the_spun_beam_ends_stretched_by_its_centrifugal_force(case: str) -> None:
-    """Steady stretch tan(k L)/k - L with k^2 = rho A omega^2 / (E A): the mean about which it vibrates."""
-    speed = float(case.split()[0])
-    k = np.sqrt(1.2 / 2.8e7) * speed
-    found = spun(case)
-    along, across = tip(found)
-    late = found.time.values >= 15.0
-    # the residual bending vibration b shortens it: by 1.2 b^2 / (2 L) in the first mode, if that is modelled
-    shortened = 0.6 * np.mean(across[late] ** 2) / LENGTH if "stiffening" in case else 0.0
-    stretch = np.tan(k * LENGTH) / k - LENGTH
-    assert np.mean(along[late]) == pytest.approx(stretch - shortened, rel=1e-3)
-
-
-@pytest.mark.parametrize("case", SCENES)
 def test_energy_and_work_of_the_spin_up_agree(case: str) -> None:
     """A shortening that were not Lagrangian would show at 1e-4.
 
@@ -223,6 +209,6 @@ def test_energy_and_work_of_the_spin_up_agree(case: str) -> None:
     At 1e-12 what rings is a hundred times smaller, its energy ten thousand times: of some thirty such runs the worst
     had 3e-14.
     """
-    found = spun(case, 1e-12)
+    found = spun(case)
     assert np.abs(found.energy_error).max() < 1e-12 * found.kinetic.max()
     assert found.drive_work.values[-1] == pytest.approx(found.kinetic.values[-1] + found.elastic.values[-1], rel=1e-12)

@@ -6,6 +6,7 @@ import ast
 import doctest
 import re
 from collections import defaultdict
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -232,3 +233,23 @@ def test_examples_show_what_happens(name: str, monkeypatch: pytest.MonkeyPatch) 
     failed, tried = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert tried > 0
     assert failed == 0
+
+
+# First sentences of docstrings ----------------------------------------------------------------------------------------
+
+#: first words of fragments that only a reader of the code understands: "Whether it is.", "Of each row, by name."
+FRAGMENTS = {"Of", "By", "As", "In", "From", "With", "Its", "Those", "That", "Meanwhile"}
+FRAGMENTS |= {"What", "Whether", "Which", "Where", "When", "Why", "How", "Itself"}
+
+
+def _functions(path: Path) -> Iterator[tuple[str, str]]:
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef) and (text := ast.get_docstring(node)):
+            yield f"{path.relative_to(ROOT)}: {node.name}", text
+
+
+def test_docstrings_of_functions_begin_with_a_sentence() -> None:
+    folders = [ROOT / folder for folder in ("pipeline", "stages", "papers", "flexclear/commands")]
+    functions = [one for folder in folders for path in sorted(folder.rglob("*.py")) for one in _functions(path)]
+    assert len(functions) > 1000
+    assert [name for name, text in functions if text.split()[0].strip(",.:;") in FRAGMENTS] == []

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from flexclear.commands import cost, scenes
-from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts import maintenance
 from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
 from flexclear.pipeline.core.artifacts.store import Store, read_record
 from flexclear.pipeline.core.scene.load import load_scene
@@ -259,12 +259,12 @@ def test_what_is_pruned_lies_in_the_cache(tmp_path: Path) -> None:
     (record.parent / "key.x").mkdir()
     altered(record, files={"x/../../../../precious.txt": sha256(b"other")})
     assert read_record(record) is None
-    assert upkeep.inventory(store, whole=True).unreadable == (record,)
+    assert maintenance.inventory(store, whole=True).unreadable == (record,)
     for stage in ("../stage", "stage/../..", "/stage", ""):
         altered(record, stage=stage, files={"txt": sha256(b"content")})
         assert read_record(record) is None
-    for artifact in upkeep.prunable(store, upkeep.inventory(store, whole=True), -1.0):
-        upkeep.remove(store, artifact)
+    for artifact in maintenance.prunable(store, maintenance.inventory(store, whole=True), -1.0):
+        maintenance.remove(store, artifact)
     assert (tmp_path / "precious.txt").read_text() == "precious"
 
 

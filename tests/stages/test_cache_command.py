@@ -118,11 +118,11 @@ def test_results_of_another_processor_are_reported_and_are_fresh():
         Record("simulate", "a" * 32, {"nc": "b"}, {}, {}, facts)
         for facts in (here, {**here, "NUMBA_CPU_NAME": "generic"})
     )
-    assert why.elsewhere("simulate", of_here) == []
-    (note,) = why.elsewhere("simulate", of_others)
+    assert why.notes("simulate", of_here) == []
+    (note,) = why.notes("simulate", of_others)
     assert note.endswith("numbers differ by rounding: NUMBA_CPU_NAME generic, here (none)")
     # records of before have none
-    assert why.elsewhere("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
+    assert why.notes("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
 
 
 # Files that are shown below results/runs ----------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from flexclear.pipeline.core.artifacts.disk import checked, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.compile import files, folder, machine_code
-from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, loaded
+from flexclear.pipeline.dynamics.compile.files import compiled, file_lock, load_files, loaded
 
 #: a constant that a flipped bit of the code would change
 SOURCE = """from numba import cfunc
@@ -38,7 +38,7 @@ def used(path: Path) -> bool:
     """Load it as a new process would, and use it; whether it had to be compiled."""
     loaded.pop(path.stem, None)
     reported: list[Path] = []
-    bring([path], reported.append)
+    load_files([path], reported.append)
     scaled = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(loaded[path.stem].address)
     assert scaled(2.0) == 2.0 * 0.123456789
     assert compiled(path)
@@ -138,7 +138,7 @@ def test_what_nobody_uses_is_pruned(kernel: Path) -> None:
     assert folder.prune(kernel.parent) == 0
     month = time.time() - 30 * 86400.0
     os.utime(kernel.with_suffix(".sum"), (month, month))
-    with claimed(kernel, wait=True):
+    with file_lock(kernel, wait=True):
         assert folder.prune(kernel.parent, unused=86400.0) == 0
     assert compiled(kernel)
     assert not used(kernel)  # and that is noted

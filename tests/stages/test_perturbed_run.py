@@ -70,7 +70,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(monkeypatc
     scene = check("clearance_slider_crank")
     expected = alone(scene, monkeypatch)
     assert float(expected.horizon) < 0.5 * scene.time.end
-    hear, enough = Pair._hear, Pair._enough
+    hear, enough = Pair._store_rows, Pair._enough
 
     def late_run(self: Pair, rows: np.ndarray) -> bool:
         time.sleep(3e-3)  # the twin takes a tenth of that between two looks
@@ -80,7 +80,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(monkeypatc
         assert self._ended.wait(PATIENCE)
         return enough(self, twin, alive)
 
-    for late in ({}, {"_enough": late_twin}, {"_hear": late_run}):
+    for late in ({}, {"_enough": late_twin}, {"_store_rows": late_run}):
         with monkeypatch.context() as patch:
             for name, slow in late.items():
                 patch.setattr(Pair, name, slow)

@@ -25,14 +25,14 @@ from flexclear.pipeline.core.scene.variants import uncoupled
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, bounds, lever_of
+from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, bounds, opening_map
 from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
-from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer
+from flexclear.pipeline.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
@@ -76,8 +76,8 @@ def pilot(scene: Scene) -> Pilot:
     place, task = open_workplace(), effect_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
-    gone = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
-    bare = watched_quantities.plain(variants.without(scene, gone))
+    dropped = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
+    bare = watched_quantities.plain(variants.without(scene, dropped))
     rigid = {name: inputs[name] for name in Graph(bare, shown=False).bodies()}
     return Pilot(scene, integrate(simulation.rebuild(simulation.params(bare), rigid), {}, silent), inputs)
 
@@ -218,10 +218,10 @@ class Priced:
         self.scene = SimpleNamespace(solver=solver, by_need=lambda: False)
         self.own, self.error = evaluations, error
 
-    def variant(self, gone: object) -> object:
+    def variant(self, dropped: object) -> object:
         return SimpleNamespace(contacts=dict, stop={})
 
-    def point(self, gone: object, *, integrator: str, evaluations: int = 10**9, **_: object) -> object:
+    def point(self, dropped: object, *, integrator: str, evaluations: int = 10**9, **_: object) -> object:
         taken = 1000 if integrator == "dop853" else self.own
         return SimpleNamespace(refused="takes long" if taken > evaluations else "", evaluations=taken)
 
@@ -236,30 +236,30 @@ class Priced:
 def test_a_plan_takes_the_scenes_own_integrator_where_that_does_as_well(
     evaluations: int, error: float, integrator: str
 ):
-    pilots: Any = Priced(evaluations, error)
+    runs: Any = Priced(evaluations, error)
     known = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
-    found = no_dearer(Search(pilots, {"bob.position": 1e-2}), known)
+    found = cheaper_method(Search(runs, {"bob.position": 1e-2}), known)
     assert found.integrator == integrator
 
 
 @pytest.mark.parametrize("evaluations, same", [(1100, True), (900, True), (1300, False)])
 def test_a_plan_that_is_not_cheaper_by_a_fifth_is_the_scene_as_it_is(evaluations: int, same: bool):
     """The planned run takes 1000 evaluations; that of the scene by its own method as many as given."""
-    pilots: Any = Priced(evaluations, 0.0)
-    pilots.variant = lambda gone: SimpleNamespace(contacts=lambda: {"pin": None}, stop={})
-    pilots.part, pilots.extent = lambda gone: 0.5, SimpleNamespace(most=10**6)
+    runs: Any = Priced(evaluations, 0.0)
+    runs.variant = lambda dropped: SimpleNamespace(contacts=lambda: {"pin": None}, stop={})
+    runs.part, runs.extent = lambda dropped: 0.5, SimpleNamespace(most=10**6)
     chosen = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
-    assert as_it_is(Search(pilots, {"bob.position": 1e-2}), chosen) is same
+    assert scene_is_cheaper(Search(runs, {"bob.position": 1e-2}), chosen) is same
 
 
 def test_where_nothing_is_known_of_methods_a_plan_keeps_that_of_the_scene():
     unknown = Chosen("dop853", 1e-8, {"bob.position": np.nan})
     for own, expected in (("radau", "radau"), ("dop853", "dop853")):
-        pilots: Any = Priced(400, 1.0, own=own)
-        assert no_dearer(Search(pilots, {"bob.position": 1e-2}), unknown).integrator == expected
+        runs: Any = Priced(400, 1.0, own=own)
+        assert cheaper_method(Search(runs, {"bob.position": 1e-2}), unknown).integrator == expected
     left_open: Any = Priced(1, 0.0)
     left_open.scene.by_need = lambda: True
-    assert no_dearer(Search(left_open, {"bob.position": 1e-2}), unknown) is unknown
+    assert cheaper_method(Search(left_open, {"bob.position": 1e-2}), unknown) is unknown
 
 
 def test_a_plan_retains_a_rod_that_bends_by_more_than_the_accuracy_and_drops_one_that_does_not(tmp_path: Path):
@@ -369,7 +369,7 @@ def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(standin
     """Beside the pseudoinverse of the joints' rates, which has no closed form but another computation."""
     found = standing.ideal
     poses = [Placement(frame["origin"], frame["axes"]) for frame in found.observed.links[0]]
-    lever = lever_of(found.model, constraints(found.model.mechanism), poses)
+    lever = opening_map(found.model, constraints(found.model.mechanism), poses)
     G = lever.gradient.toarray()
     shown = np.random.default_rng(0).standard_normal((3, G.shape[0])) @ G
     expected = -shown @ np.linalg.pinv(G)

@@ -167,6 +167,7 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "negative gain with a unit": (SCENE, None, CONTROLLER.format('"-5 N/mm"', "0.2")),
     # meshes and modes
     "more modes than the mesh has": (SCENE, "count = 13 }", "count = 500 }"),
+    "a number of modes that no mesh has": (SCENE, "count = 13 }", "count = 1000000000000 }"),
     "fewer modes than the interfaces need": (SCENE, "count = 13 }", "count = 3 }"),
     "recipe without interfaces": (ROD, 'interfaces = ["big_end", "small_end"] ', ""),
     "held direction that is none": (SCENE, 'reference = "craig-bampton", count = 13', 'reference = "constrained", held = ["big_end.u"], count = 7'),

@@ -166,7 +166,7 @@ def of_clearance(data: Data) -> Table:
     """Tabulate the CSJ model's deviations, in the scenes' layout and in the first one, up to the horizon."""
     post = data[f"{paper.CSJ.scene}:post"]
     (ours, tighter), (first, first_tighter) = (
-        _both(data, model, ideal, paper.believed_until(data[f"{model.scene}:post"]))
+        _both(data, model, ideal, paper.comparable_until(data[f"{model.scene}:post"]))
         for model, ideal in ((paper.CSJ, paper.IDEAL), (paper.FIRST_CSJ, paper.FIRST_IDEAL))
     )
     columns = (
@@ -209,7 +209,7 @@ def _velocity(ours: Deviation, first: Deviation) -> str:
 def _between_outputs(data: Data) -> str:
     """Return the largest error of the velocity at events, which lie between the outputs that the rows compare."""
     run, ideal = data[f"{paper.CSJ.scene}:run"], data[f"{paper.IDEAL.scene}:run"]
-    until = paper.believed_until(data[f"{paper.CSJ.scene}:post"])
+    until = paper.comparable_until(data[f"{paper.CSJ.scene}:post"])
     interval = 1e3 * float(np.median(np.diff(ideal.time.values)))
     speed, time = velocity_at_events(run, ideal, paper.PLATFORM, until)
     return (
@@ -262,7 +262,7 @@ def of_all(data: Data) -> Table:
 
 
 def _ours(name: str, model: paper.Model, data: Data) -> list[Column]:
-    horizon = paper.believed_until(data[f"{model.scene}:post"])
+    horizon = paper.comparable_until(data[f"{model.scene}:post"])
     inside, tighter = _both(data, model, paper.IDEAL, horizon)
     head = f"ours, {name}, to {1e3 * inside.until:.1f} ms"
     return [single(head, inside, tighter), several(f"ours, {name}, whole stroke", _members(model, data))]

@@ -174,11 +174,11 @@ def _part(member: str, bodies: dict[str, Any]) -> tuple[str, ...]:
     return (
         member,
         name or ABSENT,
-        _said(printed.mass, "{:.2f}"),
-        _said(ours and ours["mass"], "{:.2f}"),
-        _said(printed.length, "{:g}"),
-        _said(printed.inertia, MOMENTS),
-        _said(ours and 1e6 * np.diag(np.array(ours["inertia"])), MOMENTS),
+        _formatted(printed.mass, "{:.2f}"),
+        _formatted(ours and ours["mass"], "{:.2f}"),
+        _formatted(printed.length, "{:g}"),
+        _formatted(printed.inertia, MOMENTS),
+        _formatted(ours and 1e6 * np.diag(np.array(ours["inertia"])), MOMENTS),
     )
 
 
@@ -186,7 +186,7 @@ def _part(member: str, bodies: dict[str, Any]) -> tuple[str, ...]:
 MOMENTS = "{:.3f}, {:.3f}, {:.3f}"
 
 
-def _said(values: Any, form: str) -> str:
+def _formatted(values: Any, form: str) -> str:
     return ABSENT if values is None else form.format(*np.atleast_1d(values))
 
 

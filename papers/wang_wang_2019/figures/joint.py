@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Drawing
 
 from flexclear.papers.wang_wang_2019.figures import Data, drawn
 from flexclear.papers.wang_wang_2019.figures.phase import at_times
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, believed_until, references
+from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, comparable_until, references
 from flexclear.pipeline.dynamics.contact.friction import modified_coulomb
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import parameters
@@ -171,7 +171,7 @@ def _projection(axes: style.Axes, plane: tuple[str, str], model: Model, data: di
     run, post = data[f"{model.scene}:run"], data[f"{model.scene}:post"]
     offset = 1e3 * run.contact_offset.sel(contact=JOINT)
     x, y = (offset.sel(axis=name).values for name in plane)
-    time, horizon = run.time.values, believed_until(post)
+    time, horizon = run.time.values, comparable_until(post)
     circle = 1e3 * float(post.clearance.sel(contact=JOINT)) * CIRCLE
     axes.fill(*circle.T, color="#f3f3f3", zorder=0)
     axes.plot(*circle.T, color="#a8a8a8", lw=1.0, zorder=1)

@@ -260,7 +260,7 @@ def tilt(data: Data) -> Drawing:
     """Draw the angle over the stroke, with its largest value marked."""
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(1, 1, (6.4, 3.5))
-    _alone(axes[0, 0], paper.ANGLE, ideal, 1.8)
+    _single_curve(axes[0, 0], paper.ANGLE, ideal, 1.8)
     _mark_extreme(axes[0, 0], ideal.time, ideal.angle)
     tilt = float(np.degrees(np.abs(ideal.angle).max()))
     style.heading(
@@ -271,7 +271,7 @@ def tilt(data: Data) -> Drawing:
     return figure
 
 
-def _alone(axes: style.Axes, quantity: Quantity, motion: paper.Motion, width: float) -> None:
+def _single_curve(axes: style.Axes, quantity: Quantity, motion: paper.Motion, width: float) -> None:
     axes.plot(motion.time, quantity.values(motion), color=motion.model.color, lw=width)
     axes.set(xlabel="time (s)", ylabel=quantity.label, xlim=(motion.time[0], motion.time[-1]))
 
@@ -296,7 +296,7 @@ def response(data: Data) -> Drawing:
     figure, axes = style.grid(2, 2, (9.4, 5.8))
     shown = QUANTITIES[1:]
     for letter, panel, quantity in zip("abcd", axes.flat, shown, strict=True):
-        _alone(panel, quantity, ideal, 1.6)
+        _single_curve(panel, quantity, ideal, 1.6)
         panel.set_title(f"({letter}) {quantity.title}")
     style.heading(
         figure,

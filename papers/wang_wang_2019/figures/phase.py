@@ -54,7 +54,7 @@ def _maps(plane: Plane, data: Data) -> Drawing:
         axes[0, column].set_title(short, fontsize=8.4)
         at_impacts(axes[1, column], plane, run, motions[0])
         axes[1, column].set_xlabel(plane.x.label)
-    _say(axes[1, 0], "no impacts")
+    _note(axes[1, 0], "no impacts")
     if plane.y.jumps:
         reach = 1.3 * float(np.abs(plane.y.values(motions[0])).max())
         for panel in axes.flat:
@@ -99,10 +99,10 @@ def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion) -> None:
     inside = when <= run.horizon
     axes.scatter(x[inside], y[inside], s=11, color=run.model.color, zorder=3, lw=0)
     axes.scatter(x[~inside], y[~inside], s=11, facecolors="none", edgecolors=run.model.color, lw=0.7, zorder=3)
-    _say(axes, f"at {when.size} impacts")
+    _note(axes, f"at {when.size} impacts")
 
 
-def _say(axes: Axes, text: str) -> None:
+def _note(axes: Axes, text: str) -> None:
     axes.set_title(text, fontsize=8.0, fontweight="normal", color=style.SOFT)
 
 

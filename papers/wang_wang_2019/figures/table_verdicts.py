@@ -41,7 +41,7 @@ Outcome = tuple[str, str]  #: verdict, and the numbers behind it
 )
 def verdicts(data: Data) -> Table:
     """Tabulate each statement with the verdict of its test."""
-    said = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
+    judged = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
@@ -53,7 +53,7 @@ def verdicts(data: Data) -> Table:
         "and 5 have verdicts of their own below them.",
     )
     heads = ("place", "statement", "verdict", "numbers")
-    return Table("Verdicts on the paper's statements (added)", heads, said, notes)
+    return Table("Verdicts on the paper's statements (added)", heads, judged, notes)
 
 
 def _verdict(*tests: bool) -> str:
@@ -229,11 +229,11 @@ def _enlarged(data: Data) -> Outcome:
 def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
     """Judge whether costs over the ideal model's are the paper's, at each setting of Table 10."""
     tests, words = [], []
-    for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
-        costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
+    for setting, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
+        costs = {m: ratios(data["sps4:timing"], setting).get(m.scene, np.nan) for m in models}
         tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
-        said = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
-        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in said.items()))
+        texts_by_model = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
+        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in texts_by_model.items()))
     printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
     return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
 

@@ -170,7 +170,7 @@ def unit(run: xr.Dataset, quantity: Quantity) -> str:
     return kind.units[1] if turns else quantity.unit
 
 
-def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.ndarray:
+def events(run: xr.Dataset | LabelledArrays, quantity: Quantity, until: float = np.inf) -> np.ndarray:
     """Return impact times [s], or the largest contact force [N], of contacts that begin up to `until` [s], shape (n,).
 
     For `impulse` return the total normal impulse of the run [N s].

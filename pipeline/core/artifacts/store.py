@@ -171,13 +171,13 @@ class Store:
                 source = self.path(record.stage, record.key, name)
                 # bit rot changes neither size nor time, so the file that users read as data is compared by content
                 if not is_copy(source, target) or (name == MAIN and digest_of(target) != record.files[name]):
-                    self._keep_edited(target, name, folder, label)
+                    self._set_edited_aside(target, name, folder, label)
                     copy(source, target)
             _partial(shown[MAIN] if MAIN in shown else self.root / folder / label).unlink(missing_ok=True)
             self._facts(folder, label, "failed").unlink(missing_ok=True)
-            self._tell_outdated(folder)
+            self._write_outdated_note(folder)
 
-    def _keep_edited(self, target: Path, name: str, folder: str, label: str) -> None:
+    def _set_edited_aside(self, target: Path, name: str, folder: str, label: str) -> None:
         """Rename a shown file that was edited, so that showing the artifact does not overwrite the edit."""
         last = self.last(folder, label)
         platforms.set_aside(target)
@@ -210,7 +210,7 @@ class Store:
         with disk_limits(self.root / folder):
             self._facts(folder, label).parent.mkdir(parents=True, exist_ok=True)
             publish(self._facts(folder, label, "failed"), checked({"label": label, "why": why}))
-            self._tell_outdated(folder)
+            self._write_outdated_note(folder)
 
     def why_outdated(self, folder: str, label: str) -> str | None:
         """Return the reason that `outdated` has noted; None without a note."""
@@ -231,7 +231,7 @@ class Store:
                 if path not in paths:
                     path.unlink(missing_ok=True)
 
-    def _tell_outdated(self, folder: str) -> None:
+    def _write_outdated_note(self, folder: str) -> None:
         path = self.root / folder / OUTDATED
         notes = [read_checked(path_of_note) for path_of_note in sorted((path.parent / ".facts").glob("*.failed"))]
         lines = [f"{note.get('label')}: {note.get('why')}\n" for note in notes if note is not None]

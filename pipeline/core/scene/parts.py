@@ -163,7 +163,7 @@ class Modes(Part):
 
     reference: str
     """name of the reference condition, as docs/structure.md lists them"""
-    count: Annotated[int, Field(ge=0)] | Literal["all"] | None = None
+    count: Annotated[int, Field(ge=0, le=1_000_000)] | Literal["all"] | None = None
     """number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete basis; 0
     makes a rigid body with the recipe's mass and inertia"""
     up_to: Annotated[Frequency, Positive] | None = None

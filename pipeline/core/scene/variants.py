@@ -241,7 +241,7 @@ def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
     return () if names & referenced else tuple(uncoupled_parts)
 
 
-def lessened(scene: Scene, removed: Collection[str]) -> Scene:
+def pruned(scene: Scene, removed: Collection[str]) -> Scene:
     """Return the scene without these parts; the scene itself where none are given."""
     if not removed:
         return scene

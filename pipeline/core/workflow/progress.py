@@ -33,14 +33,14 @@ class Job:
     """A running task on the screen."""
 
     name: str
-    begun: float
+    started: float
     since: tuple[float, float] | None = None  #: time and finished fraction where the last sample began
     samples: int = 0
     spent: float = 0.0  #: weighted sums over all samples: time [s], and fraction of the work in `advanced`
     advanced: float = 0.0
     fraction: float | None = None
     text: str = ""
-    said: float = 0.0
+    last_line: float = 0.0  #: time of the last permanent line
 
 
 @dataclass
@@ -86,7 +86,7 @@ class Monitor:
         while name in self.jobs:  # an edited copy of a scene has tasks of the same label
             others += 1
             name = f"{plain} ({others})"
-        self.jobs[name] = Job(name, self.clock(), said=self.clock())
+        self.jobs[name] = Job(name, self.clock(), last_line=self.clock())
         self._show(f"{self._count()}{name}")
         return name
 
@@ -106,15 +106,15 @@ class Monitor:
             job.advanced = FADING * job.advanced + fraction - job.since[1]
             job.since, job.samples = (self.clock(), fraction), job.samples + 1
         job.fraction, job.text = fraction, text
-        if self.rewrites or self.verbose or news or self.clock() - job.said >= SPARSE:
-            job.said = self.clock()
+        if self.rewrites or self.verbose or news or self.clock() - job.last_line >= SPARSE:
+            job.last_line = self.clock()
             self._show(f"{self._count()}{self._line(job)}")
 
     def finish(self, name: str, *, failed: bool) -> None:
         """Note the end of a task."""
         job = self.jobs.pop(name)
         self.done += 1
-        seconds = self.clock() - job.begun
+        seconds = self.clock() - job.started
         if not self.rewrites and (failed or seconds >= 1.0):
             self._show(f"{self._count()}{name} {'failed' if failed else 'done'} after {duration(seconds)}")
         elif self.rewrites:

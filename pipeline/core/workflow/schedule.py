@@ -166,7 +166,7 @@ def _end_in_good_order(
     channel.request_stop(why)
     while time.monotonic() < end:
         _, late = wait(running, timeout=TICK)
-        if len(late) <= channel.deaf.value:
+        if len(late) <= channel.unstoppable.value:
             break
         _relay(channel, monitor)
     for future, job in running.items():

@@ -20,7 +20,7 @@ INTERRUPTED = "interrupted"
 
 _why = ""
 _heeded = 0
-_counting = threading.Lock()
+_heeded_lock = threading.Lock()
 _busy = False
 _deadlines: list[tuple[float, str]] = []
 
@@ -53,12 +53,12 @@ def heeds() -> bool:
 def heeded() -> Iterator[None]:
     """Declare that the work inside this context checks for requests."""
     global _heeded
-    with _counting:  # several threads of a task may integrate at the same time
+    with _heeded_lock:  # several threads of a task may integrate at the same time
         _heeded += 1
     try:
         yield
     finally:
-        with _counting:
+        with _heeded_lock:
             _heeded -= 1
 
 
@@ -111,13 +111,13 @@ def gently(say: Callable[[str], None]) -> Iterator[None]:
             signal.signal(signal.SIGINT, before)
 
 
-def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], deaf: Callable[[], None]) -> None:
-    """Let a worker stop when its parent requests it; `deaf` tells the parent that the task does not heed requests."""
+def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], unstoppable: Callable[[], None]) -> None:
+    """Let a worker stop when its parent requests it; `unstoppable` reports a task that does not heed requests."""
 
     def wait() -> None:
         wait_for_signal()
         request(why())
         if _busy and not heeds():
-            deaf()
+            unstoppable()
 
     threading.Thread(target=wait, daemon=True).start()

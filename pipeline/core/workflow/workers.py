@@ -31,13 +31,13 @@ LOST = "a helper process was killed; is the memory full? Finished results are st
 class Channel:
     """Data shared by the workers of a pool and their parent: the request to stop with its reason, and progress.
 
-    deaf: number of workers with a task that cannot stop in good order. reports: arguments of `Monitor.update`; a queue
+    unstoppable: number of workers whose task cannot stop in good order. reports: arguments of `Monitor.update`; a queue
     without a process or thread of its own, whose writers wait while it is full.
     """
 
     stop: Any
     why: Any
-    deaf: Any
+    unstoppable: Any
     reports: Any
 
     @staticmethod
@@ -51,10 +51,10 @@ class Channel:
         self.why.value = why.encode()[:999]
         self.stop.set()
 
-    def count_deaf(self) -> None:
+    def count_unstoppable(self) -> None:
         """Count this worker as one whose task does not heed requests."""
-        with self.deaf.get_lock():
-            self.deaf.value += 1
+        with self.unstoppable.get_lock():
+            self.unstoppable.value += 1
 
     def received(self) -> list[Any]:
         """Return, in the parent, the reports of workers since the last call."""
@@ -83,7 +83,7 @@ def _begin(channel: Channel | None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch, daemon=True).start()
     if channel is not None:
-        stopping.obey(channel.stop.wait, lambda: channel.why.value.decode(errors="replace"), channel.count_deaf)
+        stopping.obey(channel.stop.wait, lambda: channel.why.value.decode(errors="replace"), channel.count_unstoppable)
 
 
 def report(name: str, fraction: float | None, text: str) -> None:
@@ -136,7 +136,7 @@ class Team:
 
 #: the idle team, held for the next call
 _idle: list[Team] = []
-_keeping = 0
+_reusing = 0
 
 
 @contextmanager
@@ -145,13 +145,13 @@ def reused() -> Iterator[None]:
 
     Workers have the environment of their start, so a context is for one command.
     """
-    global _keeping
-    _keeping += 1
+    global _reusing
+    _reusing += 1
     try:
         yield
     finally:
-        _keeping -= 1
-        while _idle and not _keeping:
+        _reusing -= 1
+        while _idle and not _reusing:
             _idle.pop().pool.shutdown()
 
 
@@ -162,13 +162,13 @@ def team(width: int) -> Iterator[Team]:
         while _idle and _idle[-1].width < width:
             _idle.pop().pool.shutdown()
         # a team for reuse may serve a wider call later; workers that are never needed are never started
-        current = _idle.pop() if _idle else _team(max(width, cores.cores()) if _keeping else width)
+        current = _idle.pop() if _idle else _team(max(width, cores.cores()) if _reusing else width)
         stack.callback(kill, current.pool)
         current.channel.received()  # discards reports of the last call
         yield current
         if not stopping.requested():
             stack.pop_all()
-            if _keeping:
+            if _reusing:
                 _idle.append(current)
             else:
                 current.pool.shutdown()

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.workflow.cores import free
-from flexclear.pipeline.dynamics.compile.files import claimed, take
+from flexclear.pipeline.dynamics.compile.files import file_lock, load_file
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None
     with ExitStack() as stack:
         process = None
         if len(paths) > 1 and requested():
-            alone = stack.enter_context(claimed(paths[0].with_name("compiler"), wait=False))
+            alone = stack.enter_context(file_lock(paths[0].with_name("compiler"), wait=False))
             process = _start(paths) if alone else None
         if process is not None:
             stack.enter_context(process)  # waits for it, so that it is no zombie
@@ -73,7 +73,7 @@ def work(paths: list[str]) -> None:
     """Compile files as the second process."""
     threading.Thread(target=_follow_parent, daemon=True).start()
     for path in paths:
-        take(Path(path), lambda _: None)
+        load_file(Path(path), lambda _: None)
 
 
 def _follow_parent() -> None:

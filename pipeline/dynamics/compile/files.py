@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 
 #: receives the file that has to be compiled, or that another process compiles
-Tell = Callable[[Path], None]
+Report = Callable[[Path], None]
 #: functions loaded in this process, by the name of their file
 loaded: dict[str, machine_code.Code] = {}
 #: Python functions by their numbers, where nothing is compiled
@@ -46,26 +46,26 @@ SIGNATURES = {
 }
 
 
-def bring(paths: list[Path], tell: Tell) -> None:
+def load_files(paths: list[Path], report: Report) -> None:
     """Load files, compiling them in this order; files that another process is compiling come last."""
     left = list(paths)
     while left:
-        path = next((path for path in left if take(path, tell)), None)
+        path = next((path for path in left if load_file(path, report)), None)
         if path is None:
             path = left[0]
-            tell(path)
-            take(path, lambda _: None, wait=True)
+            report(path)
+            load_file(path, lambda _: None, wait=True)
         left.remove(path)
 
 
-def take(path: Path, tell: Tell, *, wait: bool = False) -> bool:
+def load_file(path: Path, report: Report, *, wait: bool = False) -> bool:
     """Load a file and return True; return False when another process has its lock and `wait` is False."""
-    if _fetched(path):
+    if _load_stored(path):
         return True
-    with claimed(path, wait=wait) as mine:
-        if mine and not _fetched(path):
-            tell(path)
-            set_aside(path)
+    with file_lock(path, wait=wait) as mine:
+        if mine and not _load_stored(path):
+            report(path)
+            remove_code(path)
             _compile(path)
     return mine
 
@@ -76,13 +76,13 @@ def compiled(path: Path) -> bool:
     return noted is not None and noted == _digests(path)
 
 
-def set_aside(path: Path) -> None:
+def remove_code(path: Path) -> None:
     """Remove the compiled code of a file."""
     for suffix in (".sum", CODE):
         path.with_suffix(suffix).unlink(missing_ok=True)
 
 
-def _fetched(path: Path) -> bool:
+def _load_stored(path: Path) -> bool:
     """Load a file whose code is on disk; return False when the code is missing or cannot be loaded."""
     if INTERPRETED or not compiled(path):
         return False
@@ -96,7 +96,7 @@ def _fetched(path: Path) -> bool:
     return True
 
 
-def of_another_build(path: Path) -> bool:
+def stored_by_another_build(path: Path) -> bool:
     """Return True when a file's code is undamaged but stored as by another build of the program, and so unused."""
     noted = read_checked(path.with_suffix(".sum"))
     return noted is not None and set(noted) != {path.name, path.with_suffix(CODE).name}
@@ -108,7 +108,7 @@ def _digests(path: Path) -> dict[str, str]:
     return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in there}
 
 
-def claimed(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
+def file_lock(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
     """Return a context: True when this process has the lock next to a file, which ends with it; wait: for another's."""
     return locked(path.with_suffix(".lock"), wait=wait)
 

@@ -16,13 +16,13 @@ from tempfile import TemporaryDirectory
 from flexclear.pipeline.core.artifacts.disk import sweep
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.platforms import others_can_write
-from flexclear.pipeline.dynamics.compile.files import CODE, claimed, set_aside
+from flexclear.pipeline.dynamics.compile.files import CODE, file_lock, remove_code
 
 #: kernels unused for this time [s] are removed, and the least recently used ones beyond this many bytes
 UNUSED, LARGEST = 90 * 86400.0, 2 << 30
 
 
-def writable(root: Path, tell: Callable[[str], None]) -> Path:
+def writable(root: Path, report: Callable[[str], None]) -> Path:
     """Return the folder for this processor below `root`; if it cannot be written, a temporary one of this process.
 
     Raises InputError when other users could write there.
@@ -34,7 +34,7 @@ def writable(root: Path, tell: Callable[[str], None]) -> Path:
     except OSError as error:
         problem = error.strerror or str(error)
     if problem:
-        tell(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
+        report(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
         return Path(_temporary().name)
     refuse_shared(folder)
     return folder
@@ -86,9 +86,9 @@ def _used(path: Path) -> float:
 
 def _removed(path: Path) -> bool:
     """Remove a kernel, unless another process is compiling it; return True if removed."""
-    with claimed(path, wait=False) as mine:
+    with file_lock(path, wait=False) as mine:
         if mine:
-            set_aside(path)
+            remove_code(path)
             path.unlink(missing_ok=True)
     return mine
 

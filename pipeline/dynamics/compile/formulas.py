@@ -11,7 +11,7 @@ FORMS |= {name: f"looks.np.{name}({{}})" for name in ("sqrt", "sin", "cos", "tan
 #: kernel of `loads.looks` that reads a leaf of this letter
 READERS = {"c": "constant", "p": "position", "v": "velocity", "o": "omega", "q": "coordinate", "r": "coordinate_rate"}
 #: code of leaves without an index
-ALONE = {"t": "looks.law(d, k, 0)", "l": "looks.line(d, k)[0]", "s": "looks.line(d, k)[1]"}
+UNINDEXED = {"t": "looks.law(d, k, 0)", "l": "looks.line(d, k)[0]", "s": "looks.line(d, k)[1]"}
 
 
 class Lines:
@@ -27,8 +27,8 @@ class Lines:
 
     def leaf(self, token: str) -> tuple[str, bool]:
         """Return the name of a leaf's value, and True for a vector."""
-        if token in ALONE:
-            return self.name(ALONE[token]), False
+        if token in UNINDEXED:
+            return self.name(UNINDEXED[token]), False
         read, _, component = token.partition(".")
         one = self.name(f"looks.{READERS[read[0]]}(d, k, {read[1:]})")
         return (self.name(f"{one}[{'xyz'.index(component)}]"), False) if component else (one, read[0] in VECTORS)

@@ -94,7 +94,7 @@ def load(stored: bytes) -> Code:
         raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))
     for name in facts["foreign"]:
-        _provide(llvm, name)
+        _register(llvm, name)
     engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
     engine.finalize_object()
     address = engine.get_function_address(facts["name"])
@@ -111,11 +111,11 @@ def _target() -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     if not sys.platform.startswith("linux"):  # elsewhere Numba registers further functions
-        _ask_numba()
+        _register_numba()
     return llvm.Target.from_default_triple()
 
 
-def _provide(llvm: Any, name: str) -> None:
+def _register(llvm: Any, name: str) -> None:
     """Register a name that code refers to with LLVM, which would end the process over an unknown one."""
     if llvm.address_of_symbol(name):
         return
@@ -124,13 +124,13 @@ def _provide(llvm: Any, name: str) -> None:
 
         llvm.add_symbol(name, ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value)
         return
-    _ask_numba()
+    _register_numba()
     if not llvm.address_of_symbol(name):
         raise ValueError(f"{name} is not known")
 
 
 @cache
-def _ask_numba() -> None:
+def _register_numba() -> None:
     """Make Numba register its own functions with LLVM, as it does before it compiles."""
     from numba import cfunc
 

@@ -28,7 +28,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapp
 IMPULSE_RANK = 1e-9
 
 
-class Blow(NamedTuple):
+class Impulses(NamedTuple):
     """State after the impulses; impulse [N s or N m s] on each coordinate; work of the drives and energy loss [J]."""
 
     y: np.ndarray
@@ -47,7 +47,7 @@ def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
     return rows_of(engine, states, t, modes, latched)
 
 
-def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Blow:
+def apply_impulses(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Impulses:
     """Bring coordinates, by their names in records, to rates [m/s or rad/s] in the state y at time t."""
     model = engine.model
     closure_rows.evaluate(engine, y, t)
@@ -63,4 +63,4 @@ def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) 
     after, s = y.copy(), C.T @ impulses
     after[model.speeds] += Z @ s
     work = float(np.array(list(targets.values())) @ impulses)
-    return Blow(after, dict(zip(targets, impulses.tolist(), strict=True)), work, 0.5 * float(s @ s))
+    return Impulses(after, dict(zip(targets, impulses.tolist(), strict=True)), work, 0.5 * float(s @ s))

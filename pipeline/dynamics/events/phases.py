@@ -17,7 +17,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.events.carried import carry, closed
 from flexclear.pipeline.dynamics.events.changes import driven, exchanged, freed, prescribed, rates, released
-from flexclear.pipeline.dynamics.events.impulse import blow, rows
+from flexclear.pipeline.dynamics.events.impulse import apply_impulses, rows
 from flexclear.pipeline.dynamics.events.joined import Happened, Phase, joined, stored
 from flexclear.pipeline.dynamics.events.watch import Watch
 from flexclear.pipeline.dynamics.record.dataset import warnings
@@ -169,7 +169,7 @@ class _Plan:
         for pause in PAUSES:
             try:
                 done = self._steps(engine, made, y, watch.stop, np.union1d(times, looks), pause)
-                watch.look(done[1].rows)
+                watch.examine(done[1].rows)
             except SolverError as error:
                 if isinstance(error, StoppedError) or (pause == PAUSES[-1] and watch.hit is None):
                     raise
@@ -224,7 +224,7 @@ class _Plan:
         free = freed(still, held)
         after = prescribed(free, event, held, phase.coordinates, t)
         other = maker(free, self.bundles, self.progress)()
-        struck = blow(other, consistent_start(other), t, rates(after, held, t))
+        struck = apply_impulses(other, consistent_start(other), t, rates(after, held, t))
         moved = moving(free, other, struck.y, t)
         after = after.model_copy(update={"body": moved.body, "start": moved.start})
         impulse = next(iter(struck.impulses.values())) if len(held) == 1 else np.nan

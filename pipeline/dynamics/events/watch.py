@@ -15,13 +15,13 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Blocks, by_name
 from flexclear.pipeline.dynamics.events.impulse import rows as rows_of
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.record.dataset import chosen
+from flexclear.pipeline.dynamics.record.dataset import variables_for
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
-from flexclear.pipeline.dynamics.run.horizon.periods import handed
+from flexclear.pipeline.dynamics.run.horizon.periods import handover
 from flexclear.pipeline.dynamics.run.pieces import Moment
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
@@ -62,10 +62,10 @@ class Watch:
         """Return True when an event has happened in the rows so far."""
         if len(rows) < GROWTH * len(self._rows):
             return False
-        self.look(rows)
+        self.examine(rows)
         return self.hit is not None
 
-    def look(self, rows: np.ndarray) -> None:
+    def examine(self, rows: np.ndarray) -> None:
         """Examine the new rows."""
         new = rows[len(self._rows) :]
         if len(new):
@@ -88,12 +88,12 @@ class Watch:
         for k in range(max(first, 1), (up[0] if up else len(values) - 1)):
             a, b, c = values[k - 1 : k + 2]
             if a < b >= c and b <= 0.0 and 2.0 * b - min(a, c) > 0.0:
-                time = self._located(name, k - 1, self._rows[k + 1, 0])
+                time = self._locate(name, k - 1, self._rows[k + 1, 0])
                 if time is not None:
                     return time
-        return self._located(name, up[0], self._rows[up[0] + 1, 0]) if up else None
+        return self._locate(name, up[0], self._rows[up[0] + 1, 0]) if up else None
 
-    def _located(self, name: str, k: int, end: float) -> float | None:
+    def _locate(self, name: str, k: int, end: float) -> float | None:
         """Return the time at which a condition becomes true between row k and a time; None where it does not."""
         row, known = self._rows[k : k + 1], self._head(k + 1)
         begin, found = float(row[0, 0]), False
@@ -127,7 +127,7 @@ class Watch:
         moment = Moment(first.state[0].copy(), modes, latched, watched, open_events)
         part = replace(engine, start=float(times[0]), end=float(times[-1]))
         closure_rows.select_rows(part, moment.y, part.start)
-        made = integrate(part, moment.y, silent, left=handed(part, moment), outputs=times)
+        made = integrate(part, moment.y, silent, left=handover(part, moment), outputs=times)
         return made.rows[np.minimum(np.searchsorted(made.time, times), len(made.rows) - 1)]
 
     def _observed(self, rows: np.ndarray, *, after: bool = False) -> Blocks:
@@ -144,7 +144,7 @@ class Watch:
             if not one.is_there(owners):
                 values[name] = np.full(len(time), np.nan)
                 continue
-            arrays = self._turned(chosen(model.scene, Motions(model, observed), one.terms(), time))
+            arrays = self._turned(variables_for(model.scene, Motions(model, observed), one.terms(), time))
             made = np.broadcast_to(quantities.series(arrays, one)[:, 0], len(time))
             values[name] = np.where(observed.status == m.OK, made, np.nan)
         return values

@@ -16,6 +16,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model import initial, selection
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.interface_basis import modes_of
@@ -111,7 +112,7 @@ def hold(
     first[:, 1] = 0.0
     bench = Bench(scene, engine, at, first, np.zeros(arrays.size(m.N_INTERNAL)))
     set_drives(bench, first)
-    q = carry(bench, closed(bench, start[: model.nq]), last[:, 0])
+    q = move_drives(bench, close(bench, start[: model.nq]), last[:, 0])
     set_drives(bench, last)
     return replace(bench, drives=last), q
 
@@ -143,7 +144,7 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
     bench.engine.select_pieces_after(bench.time)
 
 
-def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
+def move_drives(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Return the positions after the drives have moved to `target` in steps, with loops closed after each."""
     if not bench.model.closures:
         return q
@@ -152,7 +153,7 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     def at(fraction: float, start: np.ndarray) -> np.ndarray:
         set_drives(bench, np.stack([origin + fraction * (target - origin), 0.0 * target], axis=1))
-        return closed(bench, start)
+        return close(bench, start)
 
     return in_strides(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, SHORTEST_STRIDE)
 
@@ -197,7 +198,7 @@ def observe(bench: Bench, states: np.ndarray) -> Observed:
     return observation.observe(bench.engine, rows(bench, states), after=True)
 
 
-def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
+def close(bench: Bench, q: np.ndarray) -> np.ndarray:
     """Return the positions with closed loops and update internal angles; raise SolverError when closing fails."""
     seen = observe(bench, state(bench, q)[None, :])
     if seen.status[0] != m.OK:
@@ -248,5 +249,6 @@ def acting(bench: Bench) -> np.ndarray:
     contact alone, in the state evaluated last, as moments [N m]."""
     moments, forces = carried_wrenches(bench.engine)
     loads, touch = (bench.engine.table(table) for table in (m.LOAD, m.TOUCH))
-    pushes = [bench.model.length * rows for rows in (forces, loads["force"], touch["force"])]
+    length = bench.model.length
+    pushes = [length * forces, length * loads["force"], touch["force"] * (length / arms(bench.model))[:, None]]
     return np.concatenate([v.ravel() for v in [*pushes, moments, loads["moment"]]])

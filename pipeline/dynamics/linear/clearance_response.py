@@ -72,29 +72,29 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Ma
     rows = np.unique(np.linspace(0, len(seen.state) - 1, BOUND_TIMES).astype(int))
     clearance = {name: {q.name: 0.0 for q in asked} for name in loose}
     joints = constraints(model.mechanism)
-    whole = is_whole(model)
+    whole = knows_all_joints(model)
     for row in rows if asked else ():
         poses = [Placement(frame["origin"], frame["axes"]) for frame in seen.links[row]]
-        lever = lever_of(model, joints, poses)
+        lever = opening_map(model, joints, poses)
         for q in asked:
-            adjoint, free = lever.adjoint(shown(model, poses, q.owner, turning=q.kind == "orientation"))
+            adjoint, free = lever.adjoint(body_motion(model, poses, q.owner, turning=q.kind == "orientation"))
             if not whole or free > FREE:
                 for bound in clearance.values():
                     bound[q.name] = np.inf
                 continue
             for name in loose:
-                reach = lever.clearance(name, adjoint) * _play(full.contacts()[name], load[name])
+                reach = lever.clearance(name, adjoint) * _separation(full.contacts()[name], load[name])
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
     return clearance
 
 
-def is_whole(model: Model) -> bool:
+def knows_all_joints(model: Model) -> bool:
     """Return True when this module knows all constraints between links; it does not know gears, for instance."""
     tree = sum(link.branch.edge is not None and not link.massless for link in model.mechanism.links)
     return not model.scene.gear and len(constraints(model.mechanism)) == tree + len(model.mechanism.closures)
 
 
-def _play(joint: Clearance, force: float) -> float:
+def _separation(joint: Clearance, force: float) -> float:
     """Return how far the points may separate [m]: the clearance, and the penetration under a force."""
     law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
     exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
@@ -103,7 +103,7 @@ def _play(joint: Clearance, force: float) -> float:
 
 
 @dataclass(frozen=True)
-class Lever:
+class OpeningMap:
     """Map from openings of the joints to motions of the links, in one pose.
 
     gradient: rates of all joints' residuals, (rows, 6 (links - 1)).  normal: factored normal equations.
@@ -116,24 +116,24 @@ class Lever:
     joints: Mapping[str, tuple[Constraint, slice, np.ndarray]]
     length: float
 
-    def adjoint(self, shown: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return the adjoint solution of `shown`, (3, 6 (links - 1)): the joints' reactions to unit loads on it.
+    def adjoint(self, watched: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return the adjoint solution of `watched`, (3, 6 (links - 1)): the joints' reactions to unit loads on it.
 
-        It is the motion of `shown` per opening, (3, rows); also return the freedom that joints and drives leave it.
+        It is the motion of `watched` per opening, (3, rows); also return the freedom that joints and drives leave it.
         """
-        dual = self.normal.solve(np.ascontiguousarray(shown.T))
+        dual = self.normal.solve(np.ascontiguousarray(watched.T))
         rows = self.gradient @ dual
-        return -rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0))
+        return -rows.T, float(np.abs(watched - (self.gradient.T @ rows).T).max(initial=0.0))
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
         """Return the largest motion that an adjoint solution gives per metre of separation of a joint's points."""
-        constraint, mine, _ = self.joints[name]
+        constraint, range_of_rows, _ = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
-        first = rows[:, mine][:, :count] / self.length
+        first = rows[:, range_of_rows][:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
 
 
-def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
+def opening_map(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> OpeningMap:
     """Return the joints' rates in a pose of all links, with their factored normal equations."""
     G = sparse.csc_array(misfit(model.mechanism, list(joints), poses).gradient())
     normal = (G.T @ G).tocsc()
@@ -145,7 +145,7 @@ def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placeme
         unit = np.where(np.any(wrenches[:, 3:] != 0.0, axis=1), 1.0 / length, 1.0)
         where[joint.name] = joint, slice(row, row + len(wrenches)), unit[:, None] * wrenches
         row += len(wrenches)
-    return Lever(G, factored, where, length)
+    return OpeningMap(G, factored, where, length)
 
 
 def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
@@ -155,7 +155,7 @@ def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
     return np.vstack([demanded, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
 
 
-def shown(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
+def body_motion(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
     """Return the motion of a body, (3, 6 (links - 1)): of its centre of mass [m], or its rotation [rad]."""
     i = model.mechanism.link_of[body]
     matrix = np.zeros((3, 6 * (len(poses) - 1)))
@@ -206,7 +206,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
 
 
 def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
-    """What acts on a body at its frames: joints, paths, loads; moments about the kernels' origin."""
+    """Return the wrenches of joints, paths and loads on a body at its frames; moments about the kernels' origin."""
     model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
         moment, force = joints[joint]
@@ -217,7 +217,7 @@ def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[F
 
 
 def openings(
-    model: Model, poses: Sequence[Placement], lever: Lever, name: str, bundle: Labelled
+    model: Model, poses: Sequence[Placement], lever: OpeningMap, name: str, bundle: Labelled
 ) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Return the openings of joints per elastic coordinate of a body, (rows, mode), and motions of bodies fixed to it.
 
@@ -261,8 +261,8 @@ def _carried(scene: Scene, name: str) -> dict[str, str]:
     pairs = [(a.partition(".")[0], b.partition(".")[0]) for a, b in fixed]
     beyond, carriers = [pair for pair in pairs if name not in pair], dict[str, str]()
     for ends, pair in zip(fixed, pairs, strict=True):
-        for here, there in ((0, 1), (1, 0)):
-            if pair[here] == name:
-                carriers |= dict.fromkeys(reached(pair[there], beyond), ends[here].partition(".")[2])
+        for near, far in ((0, 1), (1, 0)):
+            if pair[near] == name:
+                carriers |= dict.fromkeys(reached(pair[far], beyond), ends[near].partition(".")[2])
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
     return carriers | {f"{name}.{frame}": frame for frame in own}

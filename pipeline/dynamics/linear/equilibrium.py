@@ -29,7 +29,7 @@ from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, closed, hold, in_strides, set_drives
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, close, hold, in_strides, set_drives
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, magnitude, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, vibrations
 from flexclear.pipeline.dynamics.model.model import Model
@@ -44,7 +44,7 @@ BALANCED, SHORT_MOVE = 1e-12, 1e-14
 #: relative unbalanced force that counts as rounding when iterations stop improving
 STALLED = 1e-8
 #: eigenvalues of the stiffness below this fraction of the largest count as zero
-LIMP = 1e-12
+NO_STIFFNESS = 1e-12
 #: largest fraction of the starting power that may act against the step at its end
 OVERSHOOT = 0.5
 #: corrections of one pose; each must be at most this fraction of the one before, else the step of the speed is halved
@@ -108,7 +108,7 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     K, _ = stiffness(bench, at, at.Z)
     k, axes = np.linalg.eigh(0.5 * (K + K.T))
     force = axes.T @ at.unbalanced
-    floor = max(LIMP * float(np.max(np.abs(k))), 1e-30)
+    floor = max(NO_STIFFNESS * float(np.max(np.abs(k))), 1e-30)
     along = np.where(np.abs(force) > negligible / len(k), -force / np.maximum(np.abs(k), floor), 0.0)
     size = bench.model.speed_scales[:, None]
     reach = np.max(np.abs(at.Z @ axes) / size, axis=0)
@@ -123,7 +123,7 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
     fraction, power = 1.0, -float(step @ at.unbalanced)
     for _ in range(80):
         try:
-            new = tangent(bench, closed(bench, at.q + fraction * (at.moves @ direction)))
+            new = tangent(bench, close(bench, at.q + fraction * (at.moves @ direction)))
         except SolverError:
             fraction *= 0.5
             continue
@@ -140,10 +140,10 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
     """
     energy, fractions = motion * (mass @ motion), dict[str, float]()
     for i, link in enumerate(model.links[1:], start=1):
-        edge, mine = link.branch.edge, model.numbering.coordinates[i]
+        edge, coordinates = link.branch.edge, model.numbering.coordinates[i]
         name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
         if not link.drives:
-            fractions[name] = fractions.get(name, 0.0) + float(energy[mine].sum())
+            fractions[name] = fractions.get(name, 0.0) + float(energy[coordinates].sum())
         if link.flexible:
             fractions[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
     return max(fractions, key=lambda name: fractions[name])
@@ -233,7 +233,7 @@ def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
             return Equilibrium(at, residual(bench, at), iteration)
         if not length <= min(LONGEST_MOVE, CONTRACTION * last):
             break
-        at, last = tangent(bench, closed(bench, at.q + at.moves @ step)), length
+        at, last = tangent(bench, close(bench, at.q + at.moves @ step)), length
     raise SolverError(
         f"at t = {bench.time:.6g} s: no steady motion was reached from this pose in {iteration} corrections; a force "
         f"of {residual(bench, at):.3g} N stays unbalanced"

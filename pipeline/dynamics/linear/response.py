@@ -38,14 +38,14 @@ from flexclear.pipeline.dynamics.run.run import Run
 #: number of poses at which the vibrations are computed
 RESPONSE_POSES = 8
 #: kinds of quantities by their dependence on elastic coordinates, rates or accelerations
-PLACES, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
+POSITIONS, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
 TURNS = ("orientation", "angular_velocity")
 #: singular values below this fraction of the largest count as zero; squared frequencies below this fraction belong to
 #: free motions
-FOLLOWED, LIMP = 1e-9, 1e-12
+FOLLOWED, NO_STIFFNESS = 1e-9, 1e-12
 #: least force on an excited vibration, as a fraction of the largest that loads of this size could have; loads along a
 #: rod leave 2e-14 across the rod
-FELT = 1e-10
+EXCITED = 1e-10
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def response(
     model, time = run.model, run.trajectory.time
     motions = Motions(model, run.observed)
     unknown = Response(np.nan, np.nan, np.nan, {q.name: np.inf for q in chosen})
-    if not bundles or not clearance_response.is_whole(model):
+    if not bundles or not clearance_response.knows_all_joints(model):
         return unknown
     once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both sides
     time = time[once]
@@ -84,15 +84,15 @@ def response(
     joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
-        assembled = _assembled(model, clearance_response.lever_of(model, joints, poses), poses, bundles)
+        assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
         responses.append(_at(assembled, forces, time, chosen))
     worst = {q.name: max(r.influence[q.name] for r in responses) for q in chosen}
-    felt = [r for r in responses if np.isfinite(r.excited)]
-    excited = min((r.excited for r in felt), default=np.nan)
+    responding = [r for r in responses if np.isfinite(r.excited)]
+    excited = min((r.excited for r in responding), default=np.nan)
     return Response(
-        min(r.first for r in responses), excited, max((r.amplification for r in felt), default=np.nan), worst
+        min(r.first for r in responses), excited, max((r.amplification for r in responding), default=np.nan), worst
     )
 
 
@@ -107,7 +107,7 @@ class _Assembled:
 
     model: Model
     poses: Sequence[Placement]
-    lever: clearance_response.Lever
+    lever: clearance_response.OpeningMap
     omega: np.ndarray
     modes: np.ndarray
     free: np.ndarray
@@ -116,22 +116,22 @@ class _Assembled:
 
     def moved(self, body: str, *, turning: bool) -> np.ndarray:
         """Return the motion of a body per (x, q), shape (3, 6 (links - 1) + n)."""
-        shown = clearance_response.shown(self.model, self.poses, body, turning=turning)
-        return np.hstack([shown, self.own[body][0 if turning else 1]])
+        rigid = clearance_response.body_motion(self.model, self.poses, body, turning=turning)
+        return np.hstack([rigid, self.own[body][0 if turning else 1]])
 
 
 def _assembled(
-    model: Model, lever: clearance_response.Lever, poses: Sequence[Placement], bundles: Mapping[str, Labelled]
+    model: Model, lever: clearance_response.OpeningMap, poses: Sequence[Placement], bundles: Mapping[str, Labelled]
 ) -> _Assembled | None:
     """Return the elastic mechanism in a pose; None without any vibration."""
     first = np.concatenate([[0], np.cumsum([int(b.sizes["mode"]) for b in bundles.values()])])
     opened = np.zeros((lever.gradient.shape[0], first[-1]))
     own = {name: (np.zeros((3, first[-1])), np.zeros((3, first[-1]))) for name in model.scene.body}
     for k, (name, bundle) in enumerate(bundles.items()):
-        mine = slice(first[k], first[k + 1])
-        opened[:, mine], carried = clearance_response.openings(model, poses, lever, name, bundle)
+        columns = slice(first[k], first[k + 1])
+        opened[:, columns], carried = clearance_response.openings(model, poses, lever, name, bundle)
         for body in own.keys() & carried.keys() - {name}:
-            own[body][0][:, mine], own[body][1][:, mine] = carried[body]
+            own[body][0][:, columns], own[body][1][:, columns] = carried[body]
     Z = scipy.linalg.null_space(np.hstack([lever.gradient.toarray(), opened]), rcond=FOLLOWED)
     M, momenta = _mass(model, poses, bundles, first, own)
     K = scipy.linalg.block_diag(*(b["modal_stiffness"].values for b in bundles.values()))
@@ -140,7 +140,7 @@ def _assembled(
         squares, shapes = scipy.linalg.eigh(inner.T @ K @ inner, Z.T @ M @ Z)
     except np.linalg.LinAlgError:
         return None
-    firm = squares > LIMP * squares.max(initial=0.0)
+    firm = squares > NO_STIFFNESS * squares.max(initial=0.0)
     if not firm.any():
         return None
     modes = Z @ shapes
@@ -164,20 +164,20 @@ def _mass(
             model.mechanism.links[model.mechanism.link_of[name]].places[name]
         )
         inertia = placement.R @ np.array(body.inertia) @ placement.R.T
-        rigid = [clearance_response.shown(model, poses, name, turning=turning) for turning in (True, False)]
+        rigid = [clearance_response.body_motion(model, poses, name, turning=turning) for turning in (True, False)]
         turn, shift = (np.hstack(parts) for parts in zip(rigid, own[name], strict=True))
         spin, push = inertia @ turn, body.mass * shift
         M += turn.T @ spin + shift.T @ push
         if name in bundles:
             k = list(bundles).index(name)
-            mine = slice(m + first[k], m + first[k + 1])
+            columns = slice(m + first[k], m + first[k + 1])
             push_q, spin_q = _momenta(bundles[name], placement, clearance_response.centre(model, poses, name))
             across = turn.T @ spin_q + shift.T @ push_q
-            M[:, mine] += across
-            M[mine, :] += across.T
-            M[mine, mine] += bundles[name]["modal_mass"].values
-            spin[:, mine] += spin_q
-            push[:, mine] += push_q
+            M[:, columns] += across
+            M[columns, :] += across.T
+            M[columns, columns] += bundles[name]["modal_mass"].values
+            spin[:, columns] += spin_q
+            push[:, columns] += push_q
         momenta += rigid[0].T @ spin + rigid[1].T @ push
     return 0.5 * (M + M.T), momenta
 
@@ -199,17 +199,17 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
     rate = np.gradient(still, time, axis=0) if len(time) > 1 else np.zeros(still.shape)
     influence = {}
     for q in chosen:
-        if q.kind in (*PLACES, *RATES) and q.owner in assembled.model.mechanism.link_of:
+        if q.kind in (*POSITIONS, *RATES) and q.owner in assembled.model.mechanism.link_of:
             moved = assembled.moved(q.owner, turning=q.kind in TURNS)
             if np.abs(moved @ assembled.free).max(initial=0.0) > FOLLOWED * np.abs(moved @ assembled.modes).max():
                 influence[q.name] = np.inf  # masses decide its effect along a freedom of its own
                 continue
-            shown = moved @ assembled.modes
-            size = np.linalg.norm(shown, axis=0)
-            if q.kind in PLACES:
-                sizes = np.linalg.norm(still @ shown.T, axis=1) + amplitude @ size
+            per_vibration = moved @ assembled.modes
+            size = np.linalg.norm(per_vibration, axis=0)
+            if q.kind in POSITIONS:
+                sizes = np.linalg.norm(still @ per_vibration.T, axis=1) + amplitude @ size
             else:
-                sizes = np.linalg.norm(rate @ shown.T, axis=1) + amplitude @ (size * omega)
+                sizes = np.linalg.norm(rate @ per_vibration.T, axis=1) + amplitude @ (size * omega)
             influence[q.name] = float(sizes.max())
         elif q.kind in FORCES and q.owner in assembled.lever.joints:
             size = np.linalg.norm(_reaction(assembled, q.owner), axis=0)
@@ -230,12 +230,12 @@ def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
     forces: (rows, n).  shapes: (n, vibrations).  A vibration's force is a sum of n products. For one orthogonal to
     all forces, such as bending across the plane of a planar mechanism, only rounding of products and loads remains: no
     fraction of it has any meaning.  By Schwarz' inequality the sum is at most the product of both lengths, so that what
-    is below `FELT` of that, over all rows, counts as zero.
+    is below `EXCITED` of that, over all rows, counts as zero.
     """
     size = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     most = np.abs(forces @ shapes).max(axis=0, initial=0.0)
-    felt = np.flatnonzero(most > FELT * size * np.linalg.norm(shapes, axis=0))
-    return int(felt[0]) if len(felt) else None
+    excited = np.flatnonzero(most > EXCITED * size * np.linalg.norm(shapes, axis=0))
+    return int(excited[0]) if len(excited) else None
 
 
 def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:

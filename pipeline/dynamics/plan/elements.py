@@ -43,16 +43,16 @@ def mesh(
     compliance = _compliance(bundle, finer)
     fraction = beyond * max(compliance, min(TURNED, phase))
     error = {name: fraction * bending.get(name, np.inf) for name in requested}
-    most = max(error[name] / (FRACTION * requested[name]) for name in requested)
-    called_for = given * max(most, np.finfo(float).tiny) ** (1.0 / ORDER) if np.isfinite(most) else given
+    largest = max(error[name] / (FRACTION * requested[name]) for name in requested)
+    called_for = given * max(largest, np.finfo(float).tiny) ** (1.0 / ORDER) if np.isfinite(largest) else given
     return Mesh(given, max(1, int(np.ceil(called_for))), beyond * frequency, beyond * compliance, error)
 
 
 def _frequencies(bundle: Labelled, finer: xr.Dataset, duration: float) -> tuple[float, float]:
     """Return the largest relative change of a frequency, and the final phase error of the lowest vibration [rad]."""
     one, two = (np.sort(b["frequency"].values) for b in (bundle, finer))
-    there = min(len(one), len(two))
-    one, two = one[:there], two[:there]
+    count = min(len(one), len(two))
+    one, two = one[:count], two[:count]
     firm = two > 0.0
     if not firm.any():
         return 0.0, 0.0

@@ -50,9 +50,9 @@ Key = tuple[frozenset[str], str]
 
 def longest(fraction: float, run: Callable[[float], Point]) -> tuple[float, Point]:
     """Return the largest part of the time, from a fraction down, whose run is not too long, and that run."""
-    while TAKES_LONG in (there := run(fraction)).refused and fraction > LEAST_PART:
+    while TAKES_LONG in (point := run(fraction)).refused and fraction > LEAST_PART:
         fraction = max(LEAST_PART, SHORTER * fraction)
-    return fraction, there
+    return fraction, point
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Extent:
 
 
 @dataclass
-class Pilots:
+class ScreeningRuns:
     """Variants of a scene that have been run.
 
     bundles: reduced flexible bodies.  fewer: those with fewer modes, where available, levels with the fewest
@@ -95,14 +95,14 @@ class Pilots:
         """All effects of the scene."""
         return effects(self.scene)
 
-    def _names(self, gone: Collection[Effect]) -> frozenset[str]:
+    def _names(self, dropped: Collection[Effect]) -> frozenset[str]:
         """Return the names of effects, and of the effects within them, which are dropped with them."""
-        names = {effect.name for effect in gone}
+        names = {effect.name for effect in dropped}
         return frozenset(names | {effect.name for effect in self.every if effect.within in names})
 
-    def variant(self, gone: Collection[Effect]) -> Scene:
+    def variant(self, dropped: Collection[Effect]) -> Scene:
         """Return the scene without some effects and those within them, with the integration of screening runs."""
-        names = self._names(gone)
+        names = self._names(dropped)
         if (names, self.refused_loose) not in self._variants:
             bare = without(self.scene, [effect for effect in self.every if effect.name in names])
             self._variants[names, self.refused_loose] = self._made(bare)
@@ -131,23 +131,23 @@ class Pilots:
         model = tabulate(build(placed(self.scene), self.bundles))
         return Extent(model.mechanism.length, model.nq + model.nv)
 
-    def part(self, gone: Collection[Effect]) -> float:
+    def part(self, dropped: Collection[Effect]) -> float:
         """Return the part of the time over which a variant is compared with others, so that it does not take too long.
 
         A run of the beginning from one start predicts that part; it shrinks where the part still takes too long.
         """
-        begun = self.must_run(gone, BEGINNING, 0)
-        fraction = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
-        fraction = LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
-        return longest(fraction, lambda part: self.must_run(gone, part))[0]
+        beginning = self.must_run(dropped, BEGINNING, 0)
+        fraction = BEGINNING * ALLOWED / (MEMBERS * max(beginning.evaluations, 1) * self.extent.variables)
+        fraction = LEAST_PART if beginning.refused else float(np.clip(fraction, LEAST_PART, 1.0))
+        return longest(fraction, lambda part: self.must_run(dropped, part))[0]
 
-    def whole(self, gone: Collection[Effect]) -> float:
+    def whole(self, dropped: Collection[Effect]) -> float:
         """Return the part of the time over which a variant with clearance is examined: all of it where affordable."""
-        return min(1.0, WHOLE_TIME * self.part(gone))
+        return min(1.0, WHOLE_TIME * self.part(dropped))
 
     def point(
         self,
-        gone: Collection[Effect],
+        dropped: Collection[Effect],
         *,
         level: int | None = None,
         fraction: float = 1.0,
@@ -159,23 +159,23 @@ class Pilots:
         level: of modes, for bodies with several levels; None: all modes.  members: number of starts, with
             contacts only.
         """
-        scene, names = self.variant(gone), self._names(gone)
+        scene, names = self.variant(dropped), self._names(dropped)
         key = (names, json.dumps([scene.solver.model_dump(mode="json") | solver, level, fraction, members]))
         if key not in self.points:
-            mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
+            own = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
             if level is not None:
-                mine |= {name: bundle for name, bundle in self.fewer[level].items() if name in mine}
-                scene = with_modes(scene, self.modes(level, mine))
+                own |= {name: bundle for name, bundle in self.fewer[level].items() if name in own}
+                scene = with_modes(scene, self.modes(level, own))
             end = scene.time.start + fraction * (scene.time.end - scene.time.start)
             scene = edited(scene, {f"solver.{k}": v for k, v in solver.items()} | {"time.end": end})
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
             place = names, level, scene.solver.integrator
-            runner = Runner(mine, recorded(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
+            runner = Runner(own, recorded(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
             measured = self.points[key] = runner.run(scene)
             self._engines[place] = runner.engine
             self.evaluations += measured.evaluations
-            self.work += measured.evaluations * self._variables(mine)
+            self.work += measured.evaluations * self._variables(own)
         return self.points[key]
 
     def modes(self, level: int, bodies: Collection[str]) -> dict[str, int]:
@@ -191,15 +191,15 @@ class Pilots:
         left_out = sum(b.sizes["mode"] for b in self.bundles.values()) - sum(b.sizes["mode"] for b in bundles.values())
         return max(self.extent.variables - 2 * int(left_out), 1)
 
-    def must_run(self, gone: Collection[Effect], fraction: float, members: int = MEMBERS) -> Point:
+    def must_run(self, dropped: Collection[Effect], fraction: float, members: int = MEMBERS) -> Point:
         """Return the point of a variant that the decisions need, at a tight tolerance where the loose one is refused.
 
         Raises SolverError where the tight one is refused too, for another reason than its cost.
         """
-        point = self.point(gone, fraction=fraction, members=members)
+        point = self.point(dropped, fraction=fraction, members=members)
         if point.refused and TAKES_LONG not in point.refused:
             self.refused_loose = True
-            point = self.point(gone, fraction=fraction, members=members, rtol=RTOL)
+            point = self.point(dropped, fraction=fraction, members=members, rtol=RTOL)
         if point.refused and TAKES_LONG not in point.refused:
             raise SolverError(f"{self.scene.name}: the scene cannot be run as it is: {point.refused}")
         return point

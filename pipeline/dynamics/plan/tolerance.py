@@ -10,7 +10,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import DEFAULT, STIFF
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect
-from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, Chosen, Search
+from flexclear.pipeline.dynamics.plan.budget import UNCHANGED, Chosen, Search
 from flexclear.pipeline.dynamics.plan.screening_runs import (
     MEMBERS,
     OF_TIGHT,
@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.plan.screening_runs import (
     SMOOTH,
     SMOOTH_RTOL,
     TAKES_LONG,
-    Pilots,
+    ScreeningRuns,
 )
 from flexclear.pipeline.dynamics.run.progress_rate import AFFORDABLE, UNVERIFIED
 
@@ -35,17 +35,17 @@ CHEAPER = 1.2
 TIGHTEST, AT_MOST = 1e-10, 4.0
 
 
-def smooth(pilots: Pilots, gone: Sequence[Effect], requested: Mapping[str, float], level: int | None) -> Chosen:
+def smooth(runs: ScreeningRuns, dropped: Sequence[Effect], requested: Mapping[str, float], level: int | None) -> Chosen:
     """Choose integrator and tolerance for the scene without its dropped effects, where it has no contacts.
 
     level: of modes of its flexible bodies; None: all modes.
     """
-    if not pilots.variant(gone).flexible():
-        return _loosest(pilots, gone, requested, DEFAULT, TRIED, RTOL, level)
-    choice = _loosest(pilots, gone, requested, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
+    if not runs.variant(dropped).flexible():
+        return _loosest(runs, dropped, requested, DEFAULT, TRIED, RTOL, level)
+    choice = _loosest(runs, dropped, requested, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
     if choice.rtol > SMOOTH_RTOL or _within(choice.error, requested):
         return choice
-    unknown, own = dict.fromkeys(requested, np.nan), own_method(pilots.scene)
+    unknown, own = dict.fromkeys(requested, np.nan), own_method(runs.scene)
     if own is None:
         return Chosen(DEFAULT, TIGHT, unknown, level)
     # no candidate was accurate enough, so use the method of the full scene
@@ -60,57 +60,57 @@ def own_method(scene: Scene) -> tuple[str, float] | None:
     return scene.solver.integrator, scene.solver.rtol
 
 
-def no_dearer(search: Search, chosen: Chosen) -> Chosen:
+def cheaper_method(search: Search, chosen: Chosen) -> Chosen:
     """Return the choice, or the scene's own method where that takes fewer evaluations at sufficient accuracy.
 
     Both integrate the scene without dropped effects, over the part of the time that screening runs with contacts cover.
     """
-    pilots, gone, own = search.pilots, search.gone, own_method(search.pilots.scene)
-    if own is None or chosen == AS_IT_IS or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
+    runs, dropped, own = search.runs, search.dropped, own_method(search.runs.scene)
+    if own is None or chosen == UNCHANGED or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
         return chosen
-    bare = pilots.variant(gone)
+    bare = runs.variant(dropped)
     loose = bool(bare.contacts() or bare.stop)
-    fraction = pilots.part(gone) if loose else 1.0
-    there = pilots.point(gone, level=chosen.level, fraction=fraction, integrator=chosen.integrator, rtol=chosen.rtol)
+    fraction = runs.part(dropped) if loose else 1.0
+    planned = runs.point(dropped, level=chosen.level, fraction=fraction, integrator=chosen.integrator, rtol=chosen.rtol)
     # no more evaluations of each member than the other run took
-    most = {} if there.refused else {"evaluations": there.evaluations // (MEMBERS if loose else 1) + 1}
-    mine = pilots.point(gone, level=chosen.level, fraction=fraction, integrator=own[0], rtol=own[1], **most)
-    if mine.refused or (not there.refused and mine.evaluations >= there.evaluations):
+    limit = {} if planned.refused else {"evaluations": planned.evaluations // (MEMBERS if loose else 1) + 1}
+    own_run = runs.point(dropped, level=chosen.level, fraction=fraction, integrator=own[0], rtol=own[1], **limit)
+    if own_run.refused or (not planned.refused and own_run.evaluations >= planned.evaluations):
         return chosen
-    differences = {name: i.difference for name, i in pilots.between(mine, there).items()}
+    differences = {name: i.difference for name, i in runs.between(own_run, planned).items()}
     known = all(np.isfinite(error) for error in chosen.error.values())
     good = search.fits(differences) if loose else _within(differences, search.requested)
-    if known and not there.refused and not good:
+    if known and not planned.refused and not good:
         return chosen
     return Chosen(*own, differences if known else chosen.error, chosen.level)
 
 
-def as_it_is(search: Search, chosen: Chosen) -> bool:
+def scene_is_cheaper(search: Search, chosen: Chosen) -> bool:
     """Return True when no planned run with contacts is accurate enough, or none is cheaper by the factor CHEAPER.
 
     Both are run over a part of the time; their costs are evaluations times variables.
     """
-    if chosen == AS_IT_IS:
+    if chosen == UNCHANGED:
         return True
-    pilots, gone, scene = search.pilots, search.gone, search.pilots.scene
-    bare = pilots.variant(gone)
+    runs, dropped, scene = search.runs, search.dropped, search.runs.scene
+    bare = runs.variant(dropped)
     if scene.solver.step is not None or not (bare.contacts() or bare.stop):
         return False
-    fewer = 1.0 if chosen.level is None else pilots.saved(chosen.level)
+    fewer = 1.0 if chosen.level is None else runs.saved(chosen.level)
     integrator, rtol = own_method(scene) or (DEFAULT, scene.solver.rtol)
     # the reference is the scene by its own method, at no tighter tolerance
-    known = not gone and integrator == DEFAULT and rtol <= TIGHTEST
+    known = not dropped and integrator == DEFAULT and rtol <= TIGHTEST
     dear = scene.by_need() and not chosen.reference < AFFORDABLE / AT_MOST
     if known and not dear and CHEAPER * chosen.evaluations / fewer <= chosen.reference:
         return False
-    fraction, most = pilots.part(gone), OF_TIGHT * pilots.extent.most
-    ways = {"integrator": chosen.integrator, "rtol": chosen.rtol, "evaluations": most}
-    planned = pilots.point(gone, level=chosen.level, fraction=fraction, members=0, **ways)
-    full = pilots.point((), fraction=fraction, members=0, integrator=integrator, rtol=rtol, evaluations=most)
-    taken = most if TAKES_LONG in full.refused else full.evaluations
+    fraction, limit = runs.part(dropped), OF_TIGHT * runs.extent.most
+    ways = {"integrator": chosen.integrator, "rtol": chosen.rtol, "evaluations": limit}
+    planned = runs.point(dropped, level=chosen.level, fraction=fraction, members=0, **ways)
+    full = runs.point((), fraction=fraction, members=0, integrator=integrator, rtol=rtol, evaluations=limit)
+    taken = limit if TAKES_LONG in full.refused else full.evaluations
     if scene.by_need() and taken > fraction * AFFORDABLE:
-        full = pilots.point((), fraction=fraction, members=0, integrator=STIFF, rtol=UNVERIFIED, evaluations=most)
-        taken = most if TAKES_LONG in full.refused else full.evaluations
+        full = runs.point((), fraction=fraction, members=0, integrator=STIFF, rtol=UNVERIFIED, evaluations=limit)
+        taken = limit if TAKES_LONG in full.refused else full.evaluations
     if planned.refused or not taken:
         return bool(planned.refused)
     return CHEAPER * planned.evaluations / fewer > taken
@@ -121,8 +121,8 @@ def _within(error: Mapping[str, float], requested: Mapping[str, float]) -> bool:
 
 
 def _loosest(
-    pilots: Pilots,
-    gone: Sequence[Effect],
+    runs: ScreeningRuns,
+    dropped: Sequence[Effect],
     requested: Mapping[str, float],
     integrator: str,
     tried: Sequence[float],
@@ -130,11 +130,11 @@ def _loosest(
     level: int | None,
 ) -> Chosen:
     """Return the loosest of the tolerances that agrees with the reference, or the reference itself."""
-    there = pilots.point(gone, level=level, integrator=integrator, rtol=reference)
+    reference_run = runs.point(dropped, level=level, integrator=integrator, rtol=reference)
     error = dict.fromkeys(requested, np.nan)
     tried = [rtol for rtol in tried if rtol > reference]
     for rtol in tried:
-        effect_sizes = pilots.between(pilots.point(gone, level=level, integrator=integrator, rtol=rtol), there)
+        effect_sizes = runs.between(runs.point(dropped, level=level, integrator=integrator, rtol=rtol), reference_run)
         error = {name: i.difference for name, i in effect_sizes.items()}
         if _within(error, requested):
             return Chosen(integrator, rtol, error, level)

@@ -16,7 +16,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.dynamics.record.dataset import dataset
+from flexclear.pipeline.dynamics.record.dataset import recorded
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -25,6 +25,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Followed, Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
+    from flexclear.pipeline.dynamics.equations.observation import Observed
     from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
 
 #: least number of repeats of an integration; short ones are repeated until they have taken this time [s] together, at
@@ -63,24 +64,28 @@ def measure(
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    begun, alone = process_time(), brief or not engine.model.contacts
-    last, trajectory, switched, perturbed = _followed(engine, start, progress, other, alone)
-    first = (process_time() - begun,) if alone else ()
+    begun, single = process_time(), brief or not engine.model.contacts
+    last, trajectory, switched, perturbed = _followed(engine, start, progress, other, single)
+    first = (process_time() - begun,) if single else ()
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
-    record = lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched))  # noqa: E731
-    recording = (_once(record),) if brief else _repeated(record, 0)
-    run = dataset(Run(scene, last, trajectory, seen, perturbed, switched))
+
+    def record(seen: Observed, perturbed: PerturbedRun | None = None) -> xr.Dataset:
+        return recorded(Run(scene, last, trajectory, seen, perturbed, switched)).to_xarray()
+
+    again = lambda: record(observed(last, trajectory))  # noqa: E731
+    recording = (_once(again),) if brief else _repeated(again, 0)
+    run = record(seen, perturbed)
     integration = _repeated(lambda: follow(engine, start, silent, other), MOST_REPEATS, first)
     return Cost(run, integration, recording, engine.model.length)
 
 
 def _followed(
-    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine], alone: bool
+    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine], single: bool
 ) -> tuple[Engine, Trajectory, str, PerturbedRun | None]:
-    """Return the run and, unless `alone`, the perturbed run, which follows so that it does not slow the run down."""
-    if alone:
+    """Return the run and, unless `single`, the perturbed run, which follows so that it does not slow the run down."""
+    if single:
         return *follow(engine, start, progress, other), None
     from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
 

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Collection, Iterator
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,14 +34,6 @@ from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-
-def dataset(run: Run) -> xr.Dataset:
-    """Return all recorded variables of a run (schema RUN), as a dataset."""
-    return recorded(run).to_xarray()
-
 
 def recorded(run: Run) -> LabelledArrays:
     """Return all recorded variables of a run (schema RUN)."""
@@ -52,7 +43,7 @@ def recorded(run: Run) -> LabelledArrays:
     parts = list(_motion(motions, motions.moving_bodies, joints, frames))
     parts += [_names(model), *(made() for _, made in _makers(run.scene, motions))]
     if model.contacts:
-        parts.append((_events(model, trajectory), {}))
+        parts.append((events_of(model, trajectory), {}))
     if run.perturbed is not None:
         horizon: Variables = {"horizon": ((), np.array(run.perturbed.horizon))}
         separation: Variables = {"separation": (("separation_time",), run.perturbed.separation)}
@@ -66,10 +57,13 @@ def recorded(run: Run) -> LabelledArrays:
     return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
 
 
-def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray) -> LabelledArrays:
+def variables_for(
+    scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray, events: Variables | None = None
+) -> LabelledArrays:
     """Return the run variables from which these quantities are computed (`core.artifacts.quantities.series`).
 
-    terms: terms of quantities, no expressions.  time: of the rows [s].
+    terms: terms of quantities, no expressions.  time: of the rows [s].  events: from `events_of`, for quantities of
+    events.
     """
     names: dict[str, list[str]] = {}
     for term in terms:
@@ -80,12 +74,12 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in requested)]
     parts.append(({"time": (("time",), time)}, {}))
     variables = {name: values for part in parts for name, values in part[0].items() if name in requested}
-    return labelled(variables, {name: values for part in parts for name, values in part[1].items()})
+    return labelled(variables | (events or {}), {name: values for part in parts for name, values in part[1].items()})
 
 
 def series(scene: Scene, motions: Motions, requested: Collection[Quantity], time: np.ndarray) -> dict[str, np.ndarray]:
     """Return quantities over time, (rows, components), by name; time: of the rows [s]."""
-    arrays = chosen(scene, motions, {term for one in requested for term in one.terms()}, time)
+    arrays = variables_for(scene, motions, {term for one in requested for term in one.terms()}, time)
     return {one.name: quantities.series(arrays, one) for one in requested}
 
 
@@ -351,7 +345,8 @@ def contact_names(model: Model) -> dict[str, object]:
     }
 
 
-def _events(model: Model, trajectory: Trajectory) -> Variables:
+def events_of(model: Model, trajectory: Trajectory) -> Variables:
+    """Return the events of a run, by variable."""
     events, names = trajectory.events, np.array([contact.name for contact in model.contacts], dtype=str)
     columns = {
         "event_time": events["time"],

@@ -23,6 +23,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
@@ -65,7 +66,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     requested = scene.ensemble or Ensemble()
     require_scatter(scene, "[ensemble]")
     engine, other = engines(scene, bundles, progress)
-    names = kept_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
+    names = recorded_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     select_rows(engine, start, engine.start)
     jacobian = offset_jacobian(engine, start)
@@ -78,7 +79,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, place: Place | None) -> Member:
+    def run_member(k: int, alive: Progress, place: Place | None) -> Member:
         """Run a member with an engine of its own, so that the result does not depend on previous members."""
         mine = another(engine)
         mine.straight.place = place
@@ -95,7 +96,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if stored is not None and (earlier := stored.find(name)) is not None:
             return earlier
         with places.place() if places else nullcontext() as place:
-            made = alone(k, alive, place)
+            made = run_member(k, alive, place)
         if stored is not None:
             stored.store(name, lambda: made)
         return made
@@ -142,12 +143,6 @@ def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
     return Ensemble(perturbation=min(max(least, FRACTION_OF_CLEARANCE * clearance), FRACTION_OF_CLEARANCE * pressed))
 
 
-def arms(model: Model) -> np.ndarray:
-    """Return the factor that makes each contact's gap a length: 1, or the size [m] for ends of angles."""
-    turning = [getattr(contact.joint, "coordinate", None) for contact in model.contacts]
-    return np.array([model.length if one is not None and one.turning else 1.0 for one in turning])
-
-
 def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np.ndarray]:
     """Yield the offset of the balls for each member's start [m], (3 contacts,): random directions, equal lengths."""
     random = np.random.default_rng(requested.seed)
@@ -156,7 +151,7 @@ def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np
         yield (offsets * (requested.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
 
 
-def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
+def recorded_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
     """Return the bodies to record: those requested, else those with contacts, or all where none has contacts."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
     if requested is None:

@@ -11,19 +11,17 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.points import Point, Values
-from flexclear.pipeline.core.artifacts.quantities import IMPACT, SAME_TIME, of_impacts, reduced, regular_times
-from flexclear.pipeline.core.scene.event_kinds import CLOSING
+from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.quantity import MAGNITUDES, Recorded
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
-from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.record.dataset import series
-from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
+from flexclear.pipeline.dynamics.model.contacts import arms
+from flexclear.pipeline.dynamics.record.dataset import events_of, series, variables_for
+from flexclear.pipeline.dynamics.record.ensemble import ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.alike import engines_alike
@@ -65,7 +63,7 @@ class Runner:
     engine: Engine | None = None
     _making: Lock = field(default_factory=Lock)
     #: the observed rows of a point are large: one thread at a time holds them in memory
-    _looking: Lock = field(default_factory=Lock)
+    _observing: Lock = field(default_factory=Lock)
 
     def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
         """Run one point; errors from physics or input of this point are reported in the result, not raised.
@@ -117,8 +115,8 @@ class Runner:
         rows, count, judges = list[Values](), 0, affordable(scene)
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other, judges and judges.run)
-            with self._looking:
-                rows.append(_kept(scene, last, trajectory, self.recorded))
+            with self._observing:
+                rows.append(_recorded_values(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         return rows, count
 
@@ -129,15 +127,7 @@ class Runner:
         run = lookup(EVENTS, "phases", where="[event]")(scene, self.bundles, alive, affordable(scene))
         time = run["time"].values
         after = np.searchsorted(time, regular_times(scene.time, scene.output) * (1.0 - SAME_TIME))
-        values: Values = {}
-        for one in self.recorded:
-            if one.quantity.over_time:
-                over_time = quantities.series(run, one.quantity)
-                values[one.name] = _recorded(one, time, over_time, np.minimum(after, len(time) - 1))
-            elif one.quantity.kind == "impact_times":
-                values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
-            else:
-                values[one.name] = np.asarray(quantities.events(run, one.quantity)[0])
+        values = _values(run, self.recorded, time, np.minimum(after, len(time) - 1))
         return [values], int(run.attrs["evaluations"])
 
     def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
@@ -188,19 +178,26 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
+def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, recorded: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    over_time = {one.quantity for one in kept if one.quantity.over_time}
-    known = series(scene, Motions(engine.model, seen), over_time, trajectory.time)
+    events = {} if all(one.quantity.over_time for one in recorded) else events_of(engine.model, trajectory)
+    terms = {term for one in recorded for term in one.quantity.terms()}
+    arrays = variables_for(scene, Motions(engine.model, seen), terms, trajectory.time, events)
+    return _values(arrays, recorded, trajectory.time, _regular(engine, trajectory.time))
+
+
+def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regular: np.ndarray) -> Values:
+    """Return the recorded values from the variables of a run; regular: rows of the regular output times."""
     values: Values = {}
-    for one in kept:
+    for one in recorded:
         if one.quantity.over_time:
-            regular = _regular(engine, trajectory.time)
-            values[one.name] = _recorded(one, trajectory.time, known[one.quantity.name], regular)
+            values[one.name] = _recorded(one, time, quantities.series(run, one.quantity), regular)
+        elif one.quantity.kind == "impact_times":
+            values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
         else:
-            values[one.name] = np.asarray(_of_contact(engine, trajectory, seen, one))
+            values[one.name] = np.asarray(quantities.events(run, one.quantity)[0])
     return values
 
 
@@ -230,19 +227,6 @@ def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive:
         if done.number + 1 == requested.transient + requested.periods:
             break
     return {name: np.array(rows) for name, rows in values.items()}, evaluations
-
-
-def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Recorded) -> float:
-    contact = [c.name for c in engine.model.contacts].index(one.quantity.owner)
-    if one.quantity.kind == "impulse":
-        ledger = seen.state[-1, engine.model.speeds.stop :]
-        slots = ledger[m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(engine.model.contacts)]
-        return float(m.named(m.CONTACT_LEDGER, slots[None])["impulse"][0, contact])
-    events = trajectory.events
-    closings = events[(events["contact"] == contact) & (events["kind"] == CLOSING)]
-    if one.quantity.kind == "peak_force":
-        return float(closings["peak_force"].max(initial=0.0))
-    return of_impacts(closings["time"][closings["speed"] > IMPACT], one.reduction)
 
 
 def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:

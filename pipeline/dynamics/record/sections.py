@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Variables
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
-from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
+from flexclear.pipeline.dynamics.record.ensemble import recorded_bodies
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -61,7 +61,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     period = section_period(scene)
     # only the states at waypoints are requested
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
-    names = kept_bodies(engine.model, requested.bodies, "[sections.bodies]")
+    names = recorded_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)
     parts = stretches(engine, period, requested.phase)
     require_periodic(parts, start)

@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 ZERO_ROW = 1e-9
 #: condition numbers below this leave no doubt about a row's rank, in any units, and leave ten digits to the eigenvalues
 #: of J J^T, the squares of the singular values: their roundings are 1e-16 of the largest one
-WELL = 1e3
+WELL_CONDITIONED = 1e3
 #: number of rows examined together: allocating the matrices of all rows takes longer than the computation
 ROWS_AT_ONCE = 256
 
@@ -34,7 +34,7 @@ def topology(run: Run) -> Series:
     if indicators.shape[1]:
         least = np.maximum(indicators[:, -1], indicators[:, 0] / INFINITE)
         condition = variables["condition"] = (("time",), np.minimum(indicators[:, 0] / least, INFINITE))
-        singular_rows = condition[1] > WELL
+        singular_rows = condition[1] > WELL_CONDITIONED
         if singular_rows.any():
             values = _singular_values(engine, trajectory, seen, closure_rows.natural)[singular_rows]
             rank[singular_rows] = np.sum(values > ZERO_ROW * values[:, :1], axis=1)
@@ -71,7 +71,7 @@ def _values(J: np.ndarray) -> np.ndarray:
         return np.zeros(J.shape[:2])
     squares = np.linalg.eigvalsh(J @ np.swapaxes(J, 1, 2))[:, ::-1]
     values = np.sqrt(np.maximum(squares, 0.0))
-    poor = ~(values[:, -1] * WELL > values[:, 0])
+    poor = ~(values[:, -1] * WELL_CONDITIONED > values[:, 0])
     if poor.any():
         values[poor] = np.linalg.svd(J[poor], compute_uv=False)
     return values

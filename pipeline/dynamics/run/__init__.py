@@ -13,6 +13,6 @@ NAMES = {
     "frames to a tolerance": ".model.fitting",
     "horizon": "horizon.horizon:Pair",
     "inverse dynamics": "inverse:actuated",
-    "method selection": "method_choice.method_selection:suit",
+    "method selection": "method_choice.method_selection:method_costs",
     "passing": "singular_poses.passing",
 }

@@ -48,9 +48,9 @@ def closed(effects: Sequence[Effect], gone: Names) -> Names:
     return gone | {effect.name for effect in effects if effect.within in gone}
 
 
-def closed_up(effects: Sequence[Effect], there: Names) -> Names:
+def closed_up(effects: Sequence[Effect], present: Names) -> Names:
     """Return the effects with those within which they exist."""
-    return there | {effect.within for effect in effects if effect.name in there and effect.within}
+    return present | {effect.within for effect in effects if effect.name in present and effect.within}
 
 
 def assemble(
@@ -76,13 +76,13 @@ def assemble(
             ground = every - (closed_up(effects, pair) - pair)
             bare, lost = points.get(ground, UNKNOWN), points[closed(effects, pair)]
             gained = points[every - closed_up(effects, pair)]
-            alone = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
+            single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
             independent = i != j and one.within != other.name and other.within != one.name
             for k, quantity in enumerate(chosen):
                 variables = {"dropped": _between(lost, full, quantity, members)}
                 variables["added"] = _between(gained, bare, quantity, members)
                 if independent:
-                    variables["interaction"] = _interaction(gained, alone, bare, quantity, members)
+                    variables["interaction"] = _interaction(gained, single, bare, quantity, members)
                 for name, value in variables.items():
                     data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty
     dims = ("effect", "other", "quantity")
@@ -108,9 +108,9 @@ def _between(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
     return Influence(np.nan, np.nan) if a.refused or b.refused else influence(a, b, quantity, members)
 
 
-def _interaction(both: Point, alone: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:
+def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:
     """Return the size of both - one - other + bare, for quantities whose values can be added."""
-    points = (both, *alone, bare)
+    points = (both, *single, bare)
     names = [name for name in both.values if name.rpartition(".")[0] == quantity.name]
     if any(p.refused for p in points) or quantity.kind in ("orientation", "impact_times"):
         return Influence(np.nan, np.nan)
@@ -187,8 +187,8 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
     from flexclear.pipeline.post.plotting import style
 
     if "other" in dataset.dims:
-        alone = xr.DataArray(np.arange(dataset.sizes["effect"]), dims="effect")
-        dataset = dataset.isel(effect=alone, other=alone)
+        diagonal = xr.DataArray(np.arange(dataset.sizes["effect"]), dims="effect")
+        dataset = dataset.isel(effect=diagonal, other=diagonal)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
     kinds = [kind for kind in ("dropped", "added") if kind in dataset]
@@ -197,18 +197,18 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
                 values = dataset[kind].values[:, k]
-                place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
+                rows = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-                panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
+                panel.barh(rows, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 if f"{kind}_uncertainty" in dataset:
-                    doubt = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
-                    below = np.minimum(doubt, WHISKER * shown)
-                    drawn = np.isfinite(shown) & (doubt > 0.0)
-                    ends = [below[drawn], doubt[drawn]]
+                    uncertainty = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
+                    below = np.minimum(uncertainty, WHISKER * shown)
+                    drawn = np.isfinite(shown) & (uncertainty > 0.0)
+                    ends = [below[drawn], uncertainty[drawn]]
                     panel.errorbar(
-                        shown[drawn], place[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
+                        shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                     )
-                for y, value in zip(place, values, strict=True):
+                for y, value in zip(rows, values, strict=True):
                     text = "none" if value == 0.0 else "not examined" if np.isnan(value) else "not comparable"
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)

@@ -27,7 +27,7 @@ IDEAL = "clearance and flexibility"
 SLIGHT = 0.01
 #: accuracies for which the answer names the effects, where the scene requests none
 LEVELS = (0.1, 0.01, 0.001)
-OF_WHAT = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
+PERCENTAGES = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
 #: number of members from which on Student's t does not change
 MANY = 1000
 #: changes above this multiple of the quantity's size are not given in per cent
@@ -108,14 +108,14 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
     """Return a sentence for each quantity, as HTML, on its change by clearance and flexibility."""
     if IDEAL not in result["effect"].values:
         return []
-    one, said = result.sel(effect=IDEAL), []
+    one, sentences = result.sel(effect=IDEAL), []
     for k, name in enumerate(str(q) for q in result["quantity"].values):
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
             unit, members = str(result["unit"].values[k]), int(one["members"])
             text = in_words(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
-            said.append(f"<b>{html.escape(name)}</b>: {text}.")
-    return said
+            sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return sentences
 
 
 def in_words(
@@ -167,33 +167,33 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     if requested:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
         levels = [("The requested accuracy", asked)]
-    said, before, calm = list[str](), list[str](), list[str]()
+    sentences, named, unchanged = list[str](), list[str](), list[str]()
     for name, limits in levels:
-        now, perhaps = _called_for(single, limits)
-        new = [effect for effect in now if effect not in before]
-        unsure = [effect for effect in perhaps if effect not in now]
-        open_ = f" (not decided: {listed(unsure)})" if unsure else ""
-        if new or unsure:
-            none = "no more for certain" if before else "none for certain"
-            said.append(f"{name} calls {'also ' if before and new else ''}for {listed(new or [none])}{open_}.")
+        certain, possible = _called_for(single, limits)
+        added = [effect for effect in certain if effect not in named]
+        uncertain = [effect for effect in possible if effect not in certain]
+        open_ = f" (not decided: {listed(uncertain)})" if uncertain else ""
+        if added or uncertain:
+            none = "no more for certain" if named else "none for certain"
+            sentences.append(f"{name} calls {'also ' if named and added else ''}for {listed(added or [none])}{open_}.")
         else:
-            calm.append(name)
-        before += new
-    more = "no more" if before else "none"
-    said += [f"{name} calls for {more}." for name in calm[:1]]
-    said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
-    said += [] if requested else [OF_WHAT]
-    return " ".join(said + undone)
+            unchanged.append(name)
+        named += added
+    more = "no more" if named else "none"
+    sentences += [f"{name} calls for {more}." for name in unchanged[:1]]
+    sentences += [f"So does {name[0].lower()}{name[1:]}." for name in unchanged[1:]]
+    sentences += [] if requested else [PERCENTAGES]
+    return " ".join(sentences + undone)
 
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
     """Return effects whose change certainly exceeds its limit, and effects whose change may exceed it by chance."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
-    now = np.any((change > limits) & (change >= REAL * chance), axis=1)
-    perhaps = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
+    certain = np.any((change > limits) & (change >= REAL * chance), axis=1)
+    possible = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
     words = [str(w) for w in single["words"].values]
-    return [w for w, hit in zip(words, now, strict=True) if hit], [
-        w for w, hit in zip(words, perhaps & ~now, strict=True) if hit
+    return [w for w, hit in zip(words, certain, strict=True) if hit], [
+        w for w, hit in zip(words, possible & ~certain, strict=True) if hit
     ]
 
 

@@ -40,7 +40,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     differ.
     """
     names, decisions, meshes = list(plan.requested), plan.decisions, list(plan.meshes.values())
-    doubts = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
+    uncertainties = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
     planned = {
         "gone": [effect.name for effect in plan.gone],
         "modes": dict(plan.modes),
@@ -50,7 +50,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     }
     values = {
         "influence": np.reshape([[d.estimate.get(n, np.nan) for n in names] for d in decisions], (-1, len(names))),
-        "uncertainty": np.reshape(doubts, (-1, len(names))),
+        "uncertainty": np.reshape(uncertainties, (-1, len(names))),
         "kept": np.array([d.kept for d in decisions], dtype=np.int8),
         "evidence": _texts(d.evidence for d in decisions),
         "reason": _texts(d.reason for d in decisions),
@@ -226,19 +226,19 @@ def agreement_of(planned: xr.Dataset, k: int) -> Agreement:
 def _verdict(planned: xr.Dataset, k: int) -> str:
     """Return the verdict on one quantity; beyond the horizon the scatter of single runs; members that decide it."""
     one, unit = agreement_of(planned, k), str(planned["unit"].values[k])
-    said, reasons = verdict(one), list[str]()
-    if said == MISSED:
-        return f"missed, {one.error / one.allowed:.2g} times" if one.allowed else said
+    result, reasons = verdict(one), list[str]()
+    if result == MISSED:
+        return f"missed, {one.error / one.allowed:.2g} times" if one.allowed else result
     if one.horizon < 1.0:
         reasons.append(
             f"beyond {one.horizon:.0%} of the time single runs of the full scene scatter by "
             f"{written(float(planned['scatter'][k]), 0.0, unit)}"
-            + (", and the means differ by less" if said == MET_TO_HORIZON else "")
+            + (", and the means differ by less" if result == MET_TO_HORIZON else "")
         )
     enough = one.enough(planned.attrs["members"])
-    if said == UNDECIDED and np.isfinite(enough):
+    if result == UNDECIDED and np.isfinite(enough):
         reasons.append(f"{int(np.ceil(enough))} members would decide")
-    return f"{said}: {'; '.join(reasons)}" if reasons else said
+    return f"{result}: {'; '.join(reasons)}" if reasons else result
 
 
 def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:

@@ -96,25 +96,25 @@ def _agreement(study: xr.Dataset) -> list[Check]:
     result = []
     for group, method, setting, one in methods(study):
         distance = one[f"distance_by_{group}"]
-        there = [float(s) for s in study[setting].values if np.isfinite(distance.sel({setting: s})).all()]
+        available = [float(s) for s in study[setting].values if np.isfinite(distance.sel({setting: s})).all()]
         if method == study.attrs["own_integrator"]:
             at = float(study.attrs[f"own_{setting}"])
-            shown = [s for s in there if 0.05 * at < s < 0.9 * at]
+            shown = [s for s in available if 0.05 * at < s < 0.9 * at]
         else:
-            shown = [min(there)] if there else []
+            shown = [min(available)] if available else []
         for s in shown:
             values = distance.sel({setting: s}).values
             worst = int(np.argmax(values))
             value, unit, which = (float(values[worst]), *(str(study[n].values[worst]) for n in ("unit", "quantity")))
             name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
-            said = f"{value:.1e} of the {size_of(unit)} of {which}"
-            result.append(Check(name, said, f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance"))
+            text = f"{value:.1e} of the {size_of(unit)} of {which}"
+            result.append(Check(name, text, f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance"))
     return result
 
 
 def _rejected(run: xr.Dataset) -> Check:
-    steps, again = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
-    fraction = again / max(steps + again, 1.0)
+    steps, rejected = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
+    fraction = rejected / max(steps + rejected, 1.0)
     remedy = "another integrator, or a tighter tolerance"
     return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
 

@@ -45,7 +45,7 @@ def _own(study: xr.Dataset) -> str:
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
         return f"{took} Its error cannot be said: other runs{until} have another number of impacts."
-    return f"{took} Its largest error{until} is {error:.1e} of the {of}."
+    return f"{took} Its largest error at the outputs{until} is {error:.1e} of the {of}."
 
 
 def _digit(study: xr.Dataset) -> str:
@@ -76,7 +76,7 @@ def _cause(study: xr.Dataset) -> str:
         return ""
     first = max(known, key=lambda cause: known[cause])
     others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first and value > 0.0)
-    size = f"{known[first]:.0e}" if np.isfinite(known[first]) else "other impacts"
+    size = f"{known[first]:.0e} of a quantity's size" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
     missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
     unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
@@ -108,9 +108,9 @@ def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
         _, error = _worst(study)
         if np.isfinite(error):
             panel.plot(study.attrs["own_seconds"], error, "*", color="#222222", ms=13, label="this scene", zorder=5)
-        unsure = float(study["reference_uncertainty"].max())
-        if np.isfinite(unsure) and unsure > 0.0:
-            panel.axhline(unsure, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
+        uncertain = float(study["reference_uncertainty"].max())
+        if np.isfinite(uncertain) and uncertain > 0.0:
+            panel.axhline(uncertain, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
         panel.set(xscale="log", yscale=style.scale_of(panel), xlabel="processor time of the integration (s)")
         panel.set_ylabel("largest relative error")
         style.plain(panel.xaxis)
@@ -163,16 +163,16 @@ def sections(scenes: tuple[Studied, ...]) -> str:
 def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     """Return one paragraph: cheapest way to each accuracy, cost of a digit, horizon, and limits of the scene."""
     choices = {target: cheapest(study, target) for target in TARGETS}
-    had = {target: choice for target, choice in choices.items() if choice is not None}
-    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in had.items())
-    said = [
-        f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."
+    met = {target: choice for target, choice in choices.items() if choice is not None}
+    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in met.items())
+    parts = [
+        f"{text}." if met else "None of the accuracies asked for can be had for all quantities; see the tables below."
     ]
-    if had:
-        said += [_digits(had)]
-    said += [_some(study, target) for target in TARGETS if target not in had]
-    said += [_horizon(study, tables), _limits(study)]
-    return " ".join(filter(None, said))
+    if met:
+        parts += [_digits(met)]
+    parts += [_some(study, target) for target in TARGETS if target not in met]
+    parts += [_horizon(study, tables), _limits(study)]
+    return " ".join(filter(None, parts))
 
 
 def _some(study: xr.Dataset, target: float) -> str:
@@ -183,9 +183,9 @@ def _some(study: xr.Dataset, target: float) -> str:
     return f"{target:g} can be had for {', '.join(able)}, not for {unable}." if able else f"{target:g} cannot be had."
 
 
-def _digits(had: Mapping[float, Choice]) -> str:
-    loose, tight = had[max(had)], had[min(had)]
-    digits = np.log10(max(had) / min(had))
+def _digits(met: Mapping[float, Choice]) -> str:
+    loose, tight = met[max(met)], met[min(met)]
+    digits = np.log10(max(met) / min(met))
     if not digits > 0.0 or tight.seconds <= loose.seconds:
         return ""
     return f"Each further digit multiplies the time by {(tight.seconds / loose.seconds) ** (1.0 / digits):.2f}."
@@ -293,11 +293,11 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 def choices(study: xr.Dataset) -> list[Choice]:
     """Return all ways to integrate whose error is known."""
     choices = []
-    unsure = study["reference_uncertainty"].fillna(0.0)
+    uncertain = study["reference_uncertainty"].fillna(0.0)
     for group, method, setting, mine in methods(study):
         for s in study[setting].values:
             one = mine.sel({setting: s})
-            error = one[f"error_by_{group}"] + unsure
+            error = one[f"error_by_{group}"] + uncertain
             if not np.isfinite(error).all():
                 continue
             worst = str(study["quantity"].values[int(np.argmax(error.values))])
@@ -337,27 +337,27 @@ def _notes(study: xr.Dataset) -> list[str]:
 
 
 def _confirmed(study: xr.Dataset) -> str:
-    unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
-    said = f"Reference: {study.attrs['reference']}. "
+    uncertain, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
+    reference = f"Reference: {study.attrs['reference']}. "
     if not by:
-        return f"{said}Not confirmed: no other run was made."
-    if np.isnan(unsure).any():
-        return f"{said}Not confirmed: {by} was refused."
-    if np.isinf(unsure).any():
-        return f"{said}Not confirmed: {by} finds another number of impacts."
-    worst = str(study["quantity"].values[int(np.argmax(unsure))])
-    return f"{said}Confirmed by {by}, which differs by at most {unsure.max():.1e} ({worst})."
+        return f"{reference}Not confirmed: no other run was made."
+    if np.isnan(uncertain).any():
+        return f"{reference}Not confirmed: {by} was refused."
+    if np.isinf(uncertain).any():
+        return f"{reference}Not confirmed: {by} finds another number of impacts."
+    worst = str(study["quantity"].values[int(np.argmax(uncertain))])
+    return f"{reference}Confirmed by {by}, which differs by at most {uncertain.max():.1e} ({worst})."
 
 
 def _why_not(study: xr.Dataset) -> str:
     """Return why an accuracy cannot be had: the tried settings end too early, or rounding decides."""
-    unsure = study["reference_uncertainty"].fillna(0.0)
+    uncertain = study["reference_uncertainty"].fillna(0.0)
     best = min(choices(study), key=lambda c: c.error, default=NOTHING)
-    if np.isinf(unsure).any():
+    if np.isinf(uncertain).any():
         return "the reference and its confirmation do not agree on the number of impacts"
     if best is NOTHING:
         return "every run is refused, or has another number of impacts than the reference"
-    if best.error <= ROUNDED * float(unsure.sel(quantity=best.worst)):
+    if best.error <= ROUNDED * float(uncertain.sel(quantity=best.worst)):
         agree = f"the reference and its confirmation, the tightest runs that were made, differ as much ({best.worst})"
         if not study.attrs.get("complete", 1):
             return f"{agree}; a larger budget allows tighter ones"

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
-from flexclear.pipeline.post.cost.study import Point, believed, relative
+from flexclear.pipeline.post.cost.study import Point, comparable_until, relative
 from flexclear.pipeline.post.plotting.style import INK, files, grid, heading, style
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -120,11 +120,11 @@ def causes_of(
     located: fraction of the clearance to which contact events are located.  ensemble: at the tightest tolerance, of a
     scene that has one; its spread is that of the whole run, all other errors are those up to the horizon.
     """
-    there = [p for p in points if "refused" not in runs[p.key].attrs]
-    asis = next((runs[p.key] for p in there if p.group == "sampling" and p.key == "as it is"), None)
-    reference = next(runs[p.key] for p in there if p.group == "reference")
+    accepted = [p for p in points if "refused" not in runs[p.key].attrs]
+    asis = next((runs[p.key] for p in accepted if p.group == "sampling" and p.key == "as it is"), None)
+    reference = next(runs[p.key] for p in accepted if p.group == "reference")
     growth = 0.0 if asis is None else float(asis.attrs.get("growth", 0.0))
-    until = believed(there, runs)
+    until = comparable_until(accepted, runs)
     size = quantities.scale(reference, quantity)
 
     def between(a: xr.Dataset | None, b: xr.Dataset | None) -> float:
@@ -132,13 +132,13 @@ def causes_of(
             return np.nan
         return relative(quantities.error(a, b, quantity, until), size)
 
-    models = _models([p for p in there if p.group == "model"])
+    models = _models([p for p in accepted if p.group == "model"])
     model = {cause: runs[point.key] for cause, point in models.items() if point is not None}
     return {
         **{of: between(model.get("own"), model.get(of)) for of in ("mesh", "beam theory", "modal truncation")},
         "time integration": between(asis, reference),
         "event location": _location(quantity, reference, located, size, growth),
-        "sampling of the output": _sampling(quantity, asis, there, runs, size),
+        "sampling of the output": _sampling(quantity, asis, accepted, runs, size),
         "ensemble spread": _spread(quantity, ensemble, size),
     }
 

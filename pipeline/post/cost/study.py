@@ -64,22 +64,22 @@ def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chos
     by other methods: its own error, which is not below the reference's, is part of their distance. Without another
     method, it is the best agreeing run by the same one. Raises SolverError where every run was refused.
     """
-    there = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
-    if not there:
+    accepted = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
+    if not accepted:
         reasons = "; ".join(dict.fromkeys(_reason(runs[p.key]) for p in points if "refused" in runs[p.key].attrs))
         raise SolverError(
             f"no run with chosen steps could be made, so that there is nothing to compare with: {reasons}"
         )
-    best = min(there, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
-    others = [p for p in there if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
-    others = others or [p for p in there if p is not best]
-    until, reference = believed(points, runs), runs[best.key]
+    best = min(accepted, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
+    others = [p for p in accepted if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
+    others = others or [p for p in accepted if p is not best]
+    until, reference = comparable_until(points, runs), runs[best.key]
 
-    def apart(point: Point) -> float:
+    def distance(point: Point) -> float:
         return max(relative_errors(runs[point.key], reference, chosen, until).values(), default=0.0)
 
     result = [*points, Point(best.key, "reference", {})]
-    return result + [Point(p.key, "confirmation", {}) for p in sorted(others, key=apart)[:1]]
+    return result + [Point(p.key, "confirmation", {}) for p in sorted(others, key=distance)[:1]]
 
 
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
@@ -94,7 +94,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
             f"nothing to compare with: the reference ({_described(points, 'reference')}) is refused: "
             f"{reference.attrs['refused']}"
         )
-    until = believed(points, runs)
+    until = comparable_until(points, runs)
     scales = {q: quantities.scale(reference, q) for q in chosen}
     data: dict[str, Any] = {"scale": (("quantity",), np.array([scales[q] for q in chosen]))}
     coordinates: dict[str, Any] = {
@@ -201,7 +201,7 @@ def relative_errors(
     }
 
 
-def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
+def comparable_until(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
     """Return the time up to which pointwise errors mean something [s]: the least horizon of the runs.
 
     Infinite where no run has a horizon.

@@ -239,7 +239,7 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
         figure, axes = style.grid(len(drawn), 2, (11.0, 1.0 + 2.3 * len(drawn)), width_ratios=[1.5, 1.0])
         for row, (quantity, lines) in zip(axes, drawn, strict=True):
             _overlay(row[0], runs, lines)
-            _apart(row[1], runs, quantity, lines)
+            _distance(row[1], runs, quantity, lines)
         pale = "beyond the predictability horizon of a run"
         if any(float(run["horizon"]) < float(run["time"][-1]) for run in runs.values() if "horizon" in run):
             axes[0, 0].plot([], [], color=style.SOFT, alpha=PALE, label=pale)
@@ -263,8 +263,8 @@ def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[
 
 
 def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[Curve | None]) -> None:
-    there = [curve for curve in lines if curve is not None]
-    factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in there), there[0].unit)
+    drawn = [curve for curve in lines if curve is not None]
+    factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in drawn), drawn[0].unit)
     own = colors(runs)
     for k, ((label, run), curve) in enumerate(zip(runs.items(), lines, strict=True)):
         if curve is None:
@@ -278,11 +278,11 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[C
         axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
         axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
         axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
-    time = there[0].time
-    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)", title=f"{there[0].title} ({unit})")
+    time = drawn[0].time
+    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)", title=f"{drawn[0].title} ({unit})")
 
 
-def _apart(
+def _distance(
     axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity, curves_drawn: Sequence[Curve | None]
 ) -> None:
     """Draw the distance of the whole quantity, all components, from the reference; for a force its difference."""

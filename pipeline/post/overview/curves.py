@@ -45,10 +45,10 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
     if quantity.kind == "orientation":
         return [_turned(run, quantity) if quantities.has(run, quantity) else None for run in runs]
     lines = [quantities.series(run, quantity) if quantities.has(run, quantity) else None for run in runs]
-    there = [values for values in lines if values is not None]
+    present = [values for values in lines if values is not None]
     k, title = 0, _title(runs, quantity)
-    if _by_component(quantity) and there:
-        k = int(first_largest(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
+    if _by_component(quantity) and present:
+        k = int(first_largest(np.max([np.ptp(values, axis=0) for values in present], axis=0)))
         title += f" {'about' if quantity.kind.startswith('angular') else 'along'} {'xyz'[k]}"
     return [
         None
@@ -181,8 +181,8 @@ ROUNDING = {"m": 1e-13, "m/s": 1e-13, "N": 1e-11, "N m": 1e-11}
 
 def impacts(count: int, closed: float = 0.0) -> str:
     """Return the number of impacts in words; closed: fraction of the time in contact."""
-    said = "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
-    return f"{said}; the contact hardly opens ({closed:.0%} of the time closed)" if closed >= CLOSED else said
+    text = "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
+    return f"{text}; the contact hardly opens ({closed:.0%} of the time closed)" if closed >= CLOSED else text
 
 
 def noise(run: xr.Dataset, values: np.ndarray, unit: str) -> float:

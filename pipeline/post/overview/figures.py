@@ -279,16 +279,16 @@ def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
 
 
 def _energy(run: xr.Dataset) -> dict[str, bytes]:
-    there: dict[str, Any] = {label: run[name].values for name, label in ENERGIES.items() if name in run}
-    largest = max(float(np.abs(values - values[0]).max()) for values in there.values()) or 1.0
-    there = {label: v for label, v in there.items() if float(np.abs(v).max(initial=0.0)) > UNSEEN * largest}
-    factor, unit = by_unit(there, "J")
+    energies: dict[str, Any] = {label: run[name].values for name, label in ENERGIES.items() if name in run}
+    largest = max(float(np.abs(values - values[0]).max()) for values in energies.values()) or 1.0
+    energies = {label: v for label, v in energies.items() if float(np.abs(v).max(initial=0.0)) > UNSEEN * largest}
+    factor, unit = by_unit(energies, "J")
     error = run["energy_error"].values
     small, small_unit = by_unit({"": error}, "J")
-    colors = zip(COLORS, there.items(), strict=False)
+    colors = zip(COLORS, energies.items(), strict=False)
     panels: list[Panel] = [
         (f"energies ({unit})", {label: (factor * values, {"color": color}) for color, (label, values) in colors}),
         (f"error of the energy balance ({small_unit})", {"": (small * error, {"color": style.INK, "lw": 0.9})}),
     ]
-    legend = 6 if there else 0
+    legend = 6 if energies else 0
     return _sheet("energy", run["time"].values, panels, 2, ("Energy", ""), 2.4, legend=legend, width_ratios=[1.8, 1.0])

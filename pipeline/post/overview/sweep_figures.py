@@ -88,9 +88,9 @@ def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
     """Return sentences on components without a panel."""
     constant = []
     for name in map(str, sweep.data_vars):
-        there = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
-        if there:
-            away = [str(axis) for axis in sweep["axis"].values if axis not in there]
+        drawn = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
+        if drawn:
+            away = [str(axis) for axis in sweep["axis"].values if axis not in drawn]
             constant += [f"{' and '.join(away)} of {name} {'are' if len(away) > 1 else 'is'} 0"] if away else []
     return constant
 

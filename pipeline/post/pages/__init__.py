@@ -94,7 +94,7 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
     )
     links = "".join(f"<li><a href='#{part.key}'>{html.escape(part.heading)}</a></li>" for part in shown)
     contents = f"<nav aria-label='Contents'><ul>{links}</ul></nav>\n" if len(shown) > 1 else ""
-    said = f"<div class='answer'>{answer}</div>\n" if answer else ""
+    top = f"<div class='answer'>{answer}</div>\n" if answer else ""
     below = f"<p class='lead'>{html.escape(lead)}</p>\n" if lead else ""
     scripts = [asset("page.js")] + ([asset("viewer.js")] if "class='viewer'" in body else [])
     text = (
@@ -102,7 +102,7 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
         "<meta name='viewport' content='width=device-width, initial-scale=1'><link rel='icon' href='data:,'>"
         f"<title>{html.escape(title)}</title><style>{asset('page.css')}</style></head>\n<body>"
         f"<a class='skip' href='#main'>To the content</a><main id='main'><h1>{html.escape(title)}</h1>\n"
-        f"{below}{said}{contents}{body}</main>{''.join(f'<script>{text}</script>' for text in scripts)}</body></html>\n"
+        f"{below}{top}{contents}{body}</main>{''.join(f'<script>{text}</script>' for text in scripts)}</body></html>\n"
     )
     return text.encode()
 

@@ -40,7 +40,7 @@ def still(drawn: mechanism.Mechanism, step: int, size: tuple[int, int] = (1200, 
     """Draw the mechanism at an output, shape (height, width, 3); margin: empty space at both sides [pixels]."""
     scene = plotter(size)
     actors = _build(scene, drawn)
-    _place(drawn, actors, step, glow=False)
+    _place(drawn, actors, step, impact=False)
     look(scene, drawn, margin)
     result = image(scene)
     scene.close()
@@ -77,8 +77,8 @@ def frames(
     with style.style():
         plots = panel(drawn.run, post, (SIDE, HEIGHT), watched, curves)
         for k, step in enumerate(steps):
-            struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
-            _place(drawn, actors, int(step), struck)
+            impact = _in_contact(drawn.run, int(steps[k - 1]) if k else 0, int(step))
+            _place(drawn, actors, int(step), impact)
             picture = image(scene)
             caption.onto(picture, f"{film_speed.speed_text(float(shown.slower[k]))}{larger}, bar: {in_unit(bar, 'm')}")
             picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
@@ -90,7 +90,7 @@ def frames(
     scene.close()
 
 
-def _struck(run: xr.Dataset, before: int, now: int) -> bool:
+def _in_contact(run: xr.Dataset, before: int, now: int) -> bool:
     """Return True when any contact was closed since the frame before: impacts are shorter than a frame."""
     return "contact_gap" in run and bool((run.contact_gap.values[before : now + 1] < 0.0).any())
 
@@ -128,12 +128,12 @@ def _flexible(scene: pv.Plotter, drawn: mechanism.Mechanism, body: mechanism.Fle
     return mesh
 
 
-def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, glow: bool) -> None:
+def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, impact: bool) -> None:
     for part, actor in zip(drawn.parts, actors.parts, strict=True):
         if part.owner is not None:
             actor.user_matrix = mechanism.part_pose(drawn.run, part, step)
         if part.contact is not None:
-            actor.prop.color = mechanism.IMPACT_COLOR if glow else mechanism.CLEARANCE_COLOR
+            actor.prop.color = mechanism.IMPACT_COLOR if impact else mechanism.CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
         mesh.points, mesh["shade"] = mechanism.placed(drawn.run, bent, step)[0], mechanism.shade(drawn.run, bent, step)
 

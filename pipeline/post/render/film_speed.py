@@ -42,18 +42,18 @@ def frame_times(
     time, seconds = run["time"].values, seconds or SECONDS
     start, span = float(time[0]), float(time[-1] - time[0])
     strong = strongest(run)
-    way = np.linspace(0.0, 1.0, 4001)
-    weight = np.ones_like(way)
+    run_fraction = np.linspace(0.0, 1.0, 4001)
+    weight = np.ones_like(run_fraction)
     factor = SLOWER if slower is None else slower
     for when in strong:
         # a smooth bump: the film slows down and speeds up without jumps
-        closeness = np.clip(1.0 - np.abs(way - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
+        closeness = np.clip(1.0 - np.abs(run_fraction - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
         weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * closeness, 1.0))
-    passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(way))])
+    passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(run_fraction))])
     total = max(round(seconds * rate * min(1.4, passed[-1])), 2)
-    fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
+    fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, run_fraction)
     length = total / rate
-    return FrameTimes(start + span * fraction, length / passed[-1] * np.interp(fraction, way, weight) / span)
+    return FrameTimes(start + span * fraction, length / passed[-1] * np.interp(fraction, run_fraction, weight) / span)
 
 
 def strongest(run: xr.Dataset) -> np.ndarray:

@@ -104,23 +104,23 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     bodies, so that flat links in one plane have different thicknesses and their faces do not coincide.
     """
     joined = [seat for seat in seats if seat.joint != "fixed"] or list(seats)
-    places = _apart([seat.origin for seat in (*joined, *seats)], NEAR * WIDTH * size)
-    if len(places) < 2:
-        return _lone(joined, places, com, solid, size)
-    spans = np.linalg.norm(places[:, None] - places[None], axis=-1)
+    points = _distinct([seat.origin for seat in (*joined, *seats)], NEAR * WIDTH * size)
+    if len(points) < 2:
+        return _lone(joined, points, com, solid, size)
+    spans = np.linalg.norm(points[:, None] - points[None], axis=-1)
     width = min(WIDTH * size, WIDEST * float(spans.max()))
     normal = _common_axis(joined)
-    if normal is not None and np.ptp(places @ normal) < width:
-        return _plate(places, normal, width, layer)
-    axis = _line(places, width)
+    if normal is not None and np.ptp(points @ normal) < width:
+        return _plate(points, normal, width, layer)
+    axis = _line(points, width)
     if axis is not None:
-        low, high = places[np.argmin(places @ axis)], places[np.argmax(places @ axis)]
+        low, high = points[np.argmin(points @ axis)], points[np.argmax(points @ axis)]
         return surfaces.bar(low, high, _thickness(solid, axis, width))
-    flat = _plane(places, width)
+    flat = _plane(points, width)
     if flat is not None:
-        return _plate(places, flat, 1.3 * width, layer)
-    middle = places.mean(axis=0)
-    bars = [surfaces.bar(middle, point, 0.8 * width) for point in places if np.linalg.norm(point - middle) > width]
+        return _plate(points, flat, 1.3 * width, layer)
+    middle = points.mean(axis=0)
+    bars = [surfaces.bar(middle, point, 0.8 * width) for point in points if np.linalg.norm(point - middle) > width]
     return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
 
 
@@ -145,10 +145,10 @@ def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
     return surfaces.merged(drawn)
 
 
-def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
+def _lone(seats: Sequence[Seat], points: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
     """Return the surface of a body without joints, or with all joints at one point."""
     width = WIDTH * size
-    point = places[0] if len(places) else com
+    point = points[0] if len(points) else com
     arm = com - point
     reach = float(np.linalg.norm(arm))
     kinds = [seat.joint for seat in seats]
@@ -221,10 +221,10 @@ def _slender(solid: Solid, axis: np.ndarray) -> bool:
     return float(solid.half.max()) > SLENDER * float(np.sort(solid.half)[1]) and abs(float(longest @ axis)) > 0.95
 
 
-def _plate(places: np.ndarray, normal: np.ndarray, width: float, layer: int) -> Surface:
+def _plate(points: np.ndarray, normal: np.ndarray, width: float, layer: int) -> Surface:
     axes = surfaces.along(normal)
-    middle = places.mean(axis=0)
-    flat = (places - middle) @ axes
+    middle = points.mean(axis=0)
+    flat = (points - middle) @ axes
     thickness = FLAT * width * (1.0 - 0.12 * (layer % 5))
     return surfaces.moved(surfaces.prism(surfaces.hull(flat[:, :2], width), thickness), middle, axes)
 
@@ -239,23 +239,23 @@ def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
     return None if others or any(abs(axis @ axes[0]) > 0.05 for axis in slides) else axes[0]
 
 
-def _line(places: np.ndarray, width: float) -> np.ndarray | None:
+def _line(points: np.ndarray, width: float) -> np.ndarray | None:
     """Return the direction of a line on which all points lie, or None."""
-    way = places - places.mean(axis=0)
-    _, size, axes = np.linalg.svd(way, full_matrices=False)
+    offsets = points - points.mean(axis=0)
+    _, size, axes = np.linalg.svd(offsets, full_matrices=False)
     return axes[0] if len(size) < 2 or size[1] < 0.5 * width else None
 
 
-def _plane(places: np.ndarray, width: float) -> np.ndarray | None:
+def _plane(points: np.ndarray, width: float) -> np.ndarray | None:
     """Return the normal of a plane in which all points lie, or None."""
-    _, size, axes = np.linalg.svd(places - places.mean(axis=0))
+    _, size, axes = np.linalg.svd(points - points.mean(axis=0))
     return axes[2] if len(size) < 3 or size[2] < 0.5 * width else None
 
 
-def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
+def _distinct(points: Sequence[np.ndarray], same: float) -> np.ndarray:
     """Return the points without those closer than `same` to an earlier one, shape (n, 3)."""
     offsets: list[np.ndarray] = []
-    for point in places:
+    for point in points:
         if all(np.linalg.norm(point - other) > same for other in offsets):
             offsets.append(point)
     return np.array(offsets).reshape(-1, 3)

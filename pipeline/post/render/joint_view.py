@@ -42,8 +42,8 @@ def shown(run: xr.Dataset, contact: int) -> JointView:
     room, half = _room(parameters(run)["joint"][str(run["contact"].values[contact])], offset)
     some = np.unique(np.linspace(0, len(offset) - 1, PLACES).astype(int))
     flat = np.ptp(room.points[:, 2]) < 0.1 * half
-    seen = View(ABOVE if flat else SLANTED, np.eye(3)[1 if flat else 2], False)
-    return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), seen)
+    view = View(ABOVE if flat else SLANTED, np.eye(3)[1 if flat else 2], False)
+    return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), view)
 
 
 def _room(given: dict, offset: np.ndarray) -> tuple[Surface, float]:

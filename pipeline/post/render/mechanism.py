@@ -176,13 +176,13 @@ def mechanism(
     flexible = tuple(
         _flexible(run, name, bundle, looks, stressed=stressed) for name, bundle in bundles.items() if name in at.bodies
     )
-    places = run.frame_position.values if at.frames else run.position.values
-    shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
+    positions = run.frame_position.values if at.frames else run.position.values
+    shown = np.concatenate([positions.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
     parts = (*_bodies(at, looks, size), *_joints(at, size))
-    seen = view(run, at.given, looks.direction, looks.up)
+    chosen_view = view(run, at.given, looks.direction, looks.up)
     top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
-    return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks, top)
+    return Mechanism(run, parts, flexible, chosen_view, size, _cloud(run, parts, flexible), looks, top)
 
 
 def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:

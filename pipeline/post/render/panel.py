@@ -151,8 +151,8 @@ def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
     name = _first(run.body.values, watch)
     if name is not None:
         return name
-    way = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
-    return int(np.argmax(way.max(axis=0)))
+    distance = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
+    return int(np.argmax(distance.max(axis=0)))
 
 
 def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> Cursor:

@@ -83,8 +83,8 @@ def _bodies(drawn: Mechanism, step: int) -> bytes:
 
 def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
     shapes, forces = [], []
-    for _, places, force in _forces(drawn.run):
-        for point, value in zip(places[step], force[step], strict=True):
+    for _, points, force in _forces(drawn.run):
+        for point, value in zip(points[step], force[step], strict=True):
             length = LONGEST * drawn.size * float(np.linalg.norm(value)) / largest
             if length > 0.01 * LONGEST * drawn.size:
                 shapes.append(arrow(point, value / np.linalg.norm(value) * length, THICK * drawn.size))
@@ -92,12 +92,12 @@ def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
     return vtp(surfaces.merged(shapes), {"force": np.concatenate(forces) if forces else np.empty((0, 3))})
 
 
-def arrow(point: np.ndarray, way: np.ndarray, thick: float) -> Surface:
-    """Return an arrow that begins at a point, as long and directed as `way`."""
-    length = float(np.linalg.norm(way))
+def arrow(point: np.ndarray, vector: np.ndarray, thick: float) -> Surface:
+    """Return an arrow that begins at a point, as long and directed as `vector`."""
+    length = float(np.linalg.norm(vector))
     head = min(6.0 * thick, 0.4 * length)
-    neck = point + (1.0 - head / length) * way
-    return surfaces.merged([surfaces.bar(point, neck, thick), surfaces.cone(neck, point + way, 2.4 * thick)])
+    neck = point + (1.0 - head / length) * vector
+    return surfaces.merged([surfaces.bar(point, neck, thick), surfaces.cone(neck, point + vector, 2.4 * thick)])
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
@@ -109,15 +109,15 @@ def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     for family, variable, dim in (("joint", "joint_force", "joint"), ("load", "load_force", "load")):
         if variable not in run:
             continue
-        places, forces = [], []
+        points, forces = [], []
         for k, name in enumerate(str(n) for n in run[dim].values):
             part = given.get(family, {}).get(name, {})
             frame = part["between"][1] if "between" in part else part.get("frame")
             if frame in frames:
-                places.append(run["frame_position"].values[:, frames[frame]])
+                points.append(run["frame_position"].values[:, frames[frame]])
                 forces.append(k)
         if forces:
-            yield family, np.stack(places, axis=1), run[variable].values[:, forces]
+            yield family, np.stack(points, axis=1), run[variable].values[:, forces]
 
 
 def vtp(shape: Surface, data: dict[str, np.ndarray]) -> bytes:

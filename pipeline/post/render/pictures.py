@@ -129,8 +129,8 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
 
 def _side(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Return the direction of view of a body, and the upward direction."""
-    seen = player.side(bundle)
-    return seen.direction, seen.up
+    view = player.side(bundle)
+    return view.direction, view.up
 
 
 def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:

@@ -32,8 +32,8 @@ def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     tracks: dict[tuple[int | None, int | None], int] = {}
     meshes = []
     for part in drawn.parts:
-        place = (part.owner, part.frame)
-        track = -1 if part.owner is None else tracks.setdefault(place, len(tracks))
+        key = (part.owner, part.frame)
+        track = -1 if part.owner is None else tracks.setdefault(key, len(tracks))
         meshes.append(_still(part.surface, part.color, part.opacity) | {"track": track})
     for body in drawn.flexible:
         track = tracks.setdefault((body.index, None), len(tracks))
@@ -194,12 +194,12 @@ def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
     return {"points": _floats(points), "triangles": _wholes(triangles), "color": mechanism.COLORS[0], "opacity": 1.0}
 
 
-def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
+def _camera(view: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
     """Return eye, focus, upward direction, and the reach of the scene across and upright over its distance."""
-    position, focus = eye(seen, cloud, ASPECT)
-    local = (cloud - position) @ axes_of(seen, position, focus)
+    position, focus = eye(view, cloud, ASPECT)
+    local = (cloud - position) @ axes_of(view, position, focus)
     reach = np.abs(local[:, :2] / local[:, 2:]).max(axis=0) / zoom
-    return {"eye": position.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
+    return {"eye": position.tolist(), "focus": focus.tolist(), "up": view.up.tolist(), "reach": reach.tolist()}
 
 
 def _floats(values: np.ndarray) -> str:

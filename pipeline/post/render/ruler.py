@@ -42,9 +42,9 @@ def exaggeration(drawn: Mechanism) -> list[str]:
     """Return sentences on exaggerated parts with their factors, and on the colours of deflection."""
     scale = max((body.scale for body in drawn.flexible), default=0.0)
     larger = "true deformation" if scale == 1.0 else f"deformation {rounded(scale, 3)} times larger"
-    said = [larger] if drawn.flexible else []
+    texts = [larger] if drawn.flexible else []
     if any(body.color is None and not body.stressed for body in drawn.flexible):
-        said.append("light where a body deflects most")
+        texts.append("light where a body deflects most")
     factors = []
     for joint in parameters(drawn.run).get("joint", {}).values():
         radius = joint.get("ball_radius", joint.get("pin_radius"))
@@ -52,8 +52,8 @@ def exaggeration(drawn: Mechanism) -> list[str]:
             factors.append((SOCKET - 1.0) * float(radius) / float(joint["clearance"]))
     if factors:
         low, high = (f"{value:.2g}" for value in (min(factors), max(factors)))
-        said.append(f"clearances drawn {low if low == high else f'{low} to {high}'} times larger")
-    return said
+        texts.append(f"clearances drawn {low if low == high else f'{low} to {high}'} times larger")
+    return texts
 
 
 def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarray:
@@ -65,9 +65,9 @@ def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarr
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.imshow(pixels, extent=(0, width, height, 0), aspect="auto", interpolation="nearest")
-    if said := exaggeration(drawn):
+    if texts := exaggeration(drawn):
         pale = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 3.0}
-        text = axes.text(20, height - 18, "\n".join(said), va="bottom", bbox=pale, parse_math=False)
+        text = axes.text(20, height - 18, "\n".join(texts), va="bottom", bbox=pale, parse_math=False)
         text.set(fontsize=10.5, color=style.SOFT)
     ruler(axes, drawn, (width, height), margin)
     axes.set(xlim=(0, width), ylim=(height, 0))

@@ -50,7 +50,7 @@ class Missing:
     angle: float
 
     @property
-    def said(self) -> str:
+    def words(self) -> str:
         """Distance and angle in words, as in a picture."""
         distance = float(np.linalg.norm(self.end - self.start))
         turned = f"{np.degrees(self.angle):.3g}° off" if self.angle > 1e-7 else ""
@@ -104,13 +104,13 @@ def _still(body: mechanism.Flexible, opacity: float) -> mechanism.Part:
     )
 
 
-def page_view(seen: StartView) -> dict[str, Any]:
+def page_view(start: StartView) -> dict[str, Any]:
     """Return the pose with its names, for the viewer of a page."""
     labels = [
         {"text": mark.text, "detail": mark.detail, "at": mark.point.tolist(), "color": mark.color}
-        for mark in seen.marks
+        for mark in start.marks
     ]
-    return player.motion(seen.drawn) | {"labels": labels, "state": " · ".join(seen.notes)}
+    return player.motion(start.drawn) | {"labels": labels, "state": " · ".join(start.notes)}
 
 
 def _normal(text: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray | None:
@@ -150,8 +150,8 @@ def _turning(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     """Return a round arrow about the axis, in the sense in which the joint's coordinate grows."""
     angle = np.linspace(0.2, 1.5 * np.pi, 40)[:, None]
     ring = where + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
-    way = ring[-1] - ring[-2]
-    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], way, size)])
+    direction = ring[-1] - ring[-2]
+    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], direction, size)])
 
 
 def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
@@ -161,9 +161,9 @@ def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _head(end, axes[:, 2], size)])
 
 
-def _head(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
+def _head(base: np.ndarray, direction: np.ndarray, size: float) -> Surface:
     """Return the head of an arrow."""
-    return surfaces.cone(base, base + 12.0 * THIN * size * way / np.linalg.norm(way), 5.0 * THIN * size)
+    return surfaces.cone(base, base + 12.0 * THIN * size * direction / np.linalg.norm(direction), 5.0 * THIN * size)
 
 
 def _marks(
@@ -174,9 +174,9 @@ def _marks(
     gaps: Sequence[Missing],
 ) -> Iterator[Mark]:
     """Yield names, the most important ones first."""
-    used, places = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
+    used, positions = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
     for gap in gaps:
-        yield Mark(gap.joint, f"does not fit: {gap.said}", 0.5 * (gap.start + gap.end), GAP)
+        yield Mark(gap.joint, f"does not fit: {gap.words}", 0.5 * (gap.start + gap.end), GAP)
     for name, body in text.get("body", {}).items():
         if body["type"] != "ground":
             index = list(run["body"].values).index(name)
@@ -184,8 +184,8 @@ def _marks(
     for name, joint in text.get("joint", {}).items():
         used |= set(joint["between"])
         clear = joint.get("clearance")
-        played = f" {in_unit(clear, 'm')}" if clear else ""
-        detail = f"{joint['type']}{played}: {' – '.join(joint['between'])}"
+        clearance = f" {in_unit(clear, 'm')}" if clear else ""
+        detail = f"{joint['type']}{clearance}: {' – '.join(joint['between'])}"
         yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
     for name, drive in text.get("drive", {}).items():
         if "joint" in drive:
@@ -193,14 +193,14 @@ def _marks(
             where = joints[drive["joint"]][0]
             yield Mark(name, f"drives {which}: {drive['law']['type']}", where, DRIVE)
         else:
-            yield Mark(name, f"drives {drive['frame']}", places[drive["frame"]], DRIVE)
+            yield Mark(name, f"drives {drive['frame']}", positions[drive["frame"]], DRIVE)
             used.add(drive["frame"])
     for name, load in text.get("load", {}).items():
         at = load.get("between", [load["frame"]] if "frame" in load else [])
         if at:
             used |= set(at)
-            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([places[f] for f in at], axis=0), LOAD)
-    for name, where in places.items():
+            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([positions[f] for f in at], axis=0), LOAD)
+    for name, where in positions.items():
         if name not in used:
             yield Mark(name, "frame", where, FRAME)
 
@@ -237,7 +237,7 @@ LINES, TOP, BOTTOM = (33.0, 17.0), 70.0, 90.0
 LETTERS = 56
 
 
-def picture(seen: StartView, title: str) -> np.ndarray:
+def picture(start: StartView, title: str) -> np.ndarray:
     """Draw the mechanism in the middle, its names in columns left and right; pixels, shape (height, width, 3)."""
     from flexclear.pipeline.post.render import film
 
@@ -245,16 +245,16 @@ def picture(seen: StartView, title: str) -> np.ndarray:
     canvas = style.canvas(SIZE)
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    axes.imshow(film.still(seen.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
+    axes.imshow(film.still(start.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
     with style.style():
-        points = project(seen.drawn, np.array([mark.point for mark in seen.marks]).reshape(-1, 3), SIZE, MARGIN)
-        shown = _columns(axes, seen.marks, points)
+        points = project(start.drawn, np.array([mark.point for mark in start.marks]).reshape(-1, 3), SIZE, MARGIN)
+        shown = _columns(axes, start.marks, points)
         axes.text(20, 26, title, fontsize=13, fontweight="bold", color=style.INK, va="center", parse_math=False)
-        left_out = [] if shown == len(seen.marks) else [f"{shown} of {len(seen.marks)} names; the page has all"]
-        notes = " · ".join([*seen.notes, *left_out])
+        left_out = [] if shown == len(start.marks) else [f"{shown} of {len(start.marks)} names; the page has all"]
+        notes = " · ".join([*start.notes, *left_out])
         axes.text(20, 49, notes, fontsize=9.5, color=style.SOFT, va="center", parse_math=False)
-        _directions(axes, seen.drawn, seen.gravity)
-        ruler(axes, seen.drawn, SIZE, MARGIN)
+        _directions(axes, start.drawn, start.gravity)
+        ruler(axes, start.drawn, SIZE, MARGIN)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
     return style.pixels(canvas)
@@ -311,13 +311,13 @@ def heights(requested: np.ndarray, line: float, top: float, bottom: float) -> np
 def _directions(axes: style.Axes, drawn: Mechanism, gravity: np.ndarray) -> None:
     """Draw the world's axes and gravity, as projected in the picture."""
     middle = drawn.cloud.mean(axis=0)
-    ways = [(np.eye(3)[k], "xyz"[k], style.SOFT) for k in range(3)]
+    directions = [(np.eye(3)[k], "xyz"[k], style.SOFT) for k in range(3)]
     size = float(np.linalg.norm(gravity))
     if size > 0.0:
-        ways.append((gravity / size, f"gravity {size:.4g} m/s²", LOAD))
-    for way, text, color in ways:
+        directions.append((gravity / size, f"gravity {size:.4g} m/s²", LOAD))
+    for direction, text, color in directions:
         origin = np.array([70.0, SIZE[1] - 75.0]) + (np.array([95.0, -20.0]) if color == LOAD else 0.0)
-        ends = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * way]), SIZE, MARGIN)
+        ends = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * direction]), SIZE, MARGIN)
         unit = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * drawn.view.up]), SIZE, MARGIN)
         arrow = 46.0 * (ends[1] - ends[0]) / float(np.linalg.norm(unit[1] - unit[0]))
         tip, beyond = origin + arrow, 11.0 / max(float(np.linalg.norm(arrow)), 11.0)

@@ -68,11 +68,11 @@ def prism(outline: np.ndarray, thickness: float) -> Surface:
     return merged([walls, *(_cap(outline, centre, side * h, side) for side in (1.0, -1.0))])
 
 
-def hull(places: np.ndarray, margin: float) -> np.ndarray:
+def hull(positions: np.ndarray, margin: float) -> np.ndarray:
     """Return the outline, anticlockwise, (m, 2), at a distance `margin` from points in a plane, (n, 2)."""
     turn = np.linspace(0.0, 2.0 * np.pi, ROUND, endpoint=False)
     circle = margin * np.column_stack([np.cos(turn), np.sin(turn)])
-    spread = (places[:, None, :] + circle).reshape(-1, 2)
+    spread = (positions[:, None, :] + circle).reshape(-1, 2)
     return spread[ConvexHull(spread).vertices]
 
 
@@ -116,8 +116,8 @@ def sphere(radius: float) -> Surface:
 
 def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
     """Return a round bar with flat ends."""
-    way = end - start
-    return moved(cylinder(radius, float(np.linalg.norm(way))), 0.5 * (start + end), along(way))
+    axis = end - start
+    return moved(cylinder(radius, float(np.linalg.norm(axis))), 0.5 * (start + end), along(axis))
 
 
 def cone(base: np.ndarray, tip: np.ndarray, radius: float) -> Surface:
@@ -126,25 +126,25 @@ def cone(base: np.ndarray, tip: np.ndarray, radius: float) -> Surface:
     return moved(side, base, along(tip - base))
 
 
-def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:
+def tube(positions: np.ndarray, radius: float, corners: int = 6) -> Surface:
     """Return a thin round tube through points, shape (n, 3), open at its ends; repeated points are left out."""
-    distinct = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])
-    places = places[distinct]
-    if len(places) < 2:
-        return moved(sphere(radius), places[0])
-    way = np.gradient(places, axis=0)
-    across = np.empty_like(places)
-    side = along(way[0])[:, 0]
-    for k, tangent in enumerate(_unit(way)):  # the side is transported along the path, so that the tube does not twist
+    distinct = np.concatenate([[True], np.linalg.norm(np.diff(positions, axis=0), axis=1) > 1e-3 * radius])
+    positions = positions[distinct]
+    if len(positions) < 2:
+        return moved(sphere(radius), positions[0])
+    tangents = np.gradient(positions, axis=0)
+    across = np.empty_like(positions)
+    side = along(tangents[0])[:, 0]
+    for k, tangent in enumerate(_unit(tangents)):  # the side is carried along, so that the tube does not twist
         rest = side - (side @ tangent) * tangent
         size = float(np.linalg.norm(rest))
         side = rest / size if size > 1e-6 else along(tangent)[:, 0]
         across[k] = side
-    other = np.cross(_unit(way), across)
+    other = np.cross(_unit(tangents), across)
     turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)[None, :, None]
     normals = across[:, None] * np.cos(turn) + other[:, None] * np.sin(turn)
-    points = places[:, None] + radius * normals
-    return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(places), corners + 1)[:, ::-1])
+    points = positions[:, None] + radius * normals
+    return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(positions), corners + 1)[:, ::-1])
 
 
 def grid(rows: int, columns: int) -> np.ndarray:

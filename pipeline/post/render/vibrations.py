@@ -172,8 +172,8 @@ def _cloud(modes: Vibrations) -> np.ndarray:
     clouds = []
     for piece in modes.pieces:
         for k in range(min(len(modes.labels), SHOWN)):
-            way = modes.scale[k] * piece.moved[k, 0, ::5]
-            clouds += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
+            displacement = modes.scale[k] * piece.moved[k, 0, ::5]
+            clouds += [piece.surface.points[::5] + displacement, piece.surface.points[::5] - displacement]
     return np.concatenate(clouds)
 
 
@@ -200,10 +200,10 @@ def _stage(
     def picture(vibration: int, phase: float) -> np.ndarray:
         scale, largest = modes.scale[vibration], modes.largest[vibration] or 1.0
         for piece, mesh in zip(modes.pieces, skins, strict=True):
-            way = np.cos(phase) * piece.moved[vibration, 0] - np.sin(phase) * piece.moved[vibration, 1]
-            mesh.points = piece.surface.points + scale * way
+            displacement = np.cos(phase) * piece.moved[vibration, 0] - np.sin(phase) * piece.moved[vibration, 1]
+            mesh.points = piece.surface.points + scale * displacement
             if not piece.plain:
-                mesh["displacement"] = np.linalg.norm(way, axis=1) / largest
+                mesh["displacement"] = np.linalg.norm(displacement, axis=1) / largest
         pixels = film.image(stage)
         caption.onto(pixels, f"{modes.labels[vibration]}; drawn larger than it is")
         return pixels

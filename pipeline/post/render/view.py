@@ -57,13 +57,13 @@ def flat(normal: np.ndarray, given: Mapping[str, Any], upwards: Sequence[float] 
     return View(np.linalg.norm(SPATIAL) * (normal + TILT * (0.6 * above - 0.5 * right)), above, True)
 
 
-def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def eye(camera: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return position and focus of the eye, so that all points of a cloud (n, 3) are in the picture.
 
     aspect: width of the picture over its height; the angle of vision is ANGLE upright.
     """
-    towards_eye = seen.direction / np.linalg.norm(seen.direction)
-    up = _across(seen.up, towards_eye)
+    towards_eye = camera.direction / np.linalg.norm(camera.direction)
+    up = _across(camera.up, towards_eye)
     axes = np.array([np.cross(up, towards_eye), up, towards_eye])
     local = cloud @ axes.T
     middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
@@ -74,10 +74,10 @@ def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tupl
     return focus + MARGIN * distance / zoom * towards_eye, focus
 
 
-def axes_of(seen: View, position: np.ndarray, focus: np.ndarray) -> np.ndarray:
+def axes_of(camera: View, position: np.ndarray, focus: np.ndarray) -> np.ndarray:
     """Return right, up and back of an eye (`eye`), columns of shape (3, 3)."""
     back = (position - focus) / np.linalg.norm(position - focus)
-    right = np.cross(seen.up, back) / np.linalg.norm(np.cross(seen.up, back))
+    right = np.cross(camera.up, back) / np.linalg.norm(np.cross(camera.up, back))
     return np.column_stack([right, np.cross(back, right), back])
 
 

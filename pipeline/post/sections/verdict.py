@@ -144,9 +144,9 @@ def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:
             continue
         values, orbit = (sections[which].values for which in (name, f"orbit_{name}"))
         for k in range(values.shape[1]):
-            here, way = (x[:, k] if form is None else form(x[:, k]).reshape(len(x), 9) for x in (values, orbit))
-            size = float(np.linalg.norm(way - way.mean(axis=0), axis=1).max())
-            if size > chaos.STANDING * max(float(np.abs(way).max()), 1e-300):
+            here, path = (x[:, k] if form is None else form(x[:, k]).reshape(len(x), 9) for x in (values, orbit))
+            size = float(np.linalg.norm(path - path.mean(axis=0), axis=1).max())
+            if size > chaos.STANDING * max(float(np.abs(path).max()), 1e-300):
                 columns.append(here / size)
     if not columns:
         return np.zeros((sections.sizes["section"], 1)), 1.0

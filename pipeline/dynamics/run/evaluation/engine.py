@@ -15,6 +15,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile.functions import function, place
 from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, WHOLE
 from flexclear.pipeline.dynamics.effects import INTEGRATORS, scheme_of
 from flexclear.pipeline.dynamics.integrate.method import Method
@@ -28,6 +29,8 @@ from flexclear.pipeline.dynamics.run.evaluation.straight_code import Straight, a
 
 #: selections of closure rows with specialised steps, per integration
 SELECTIONS = 4
+#: without steps: no output times, no rows, no events
+NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 #: two breaks closer than this fraction of the run are the same instant, computed in two ways
 SHORTEST_SEGMENT = 1e-12
 
@@ -151,14 +154,24 @@ class Engine:
         if self.has_straight_code:
             self.h[m.DESCRIBE] = address(self.model, self.h, self.straight, self.selected.tobytes(), DESCRIBED)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
-        pieces = pieces.reshape(len(rows), self.model.arrays.size(m.N_LAWS))
-        self.entry.observe(self.h, self.model.arrays.f, self.w, self.n, rows, pieces, tolerance, out)
+        given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
+        function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
-        group = self.straight.group
-        by = group.advance if group is not None and self.n[m.TOGETHER] else None
-        self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
+        group, record = self.straight.group, _record(outputs, rows, events)
+        if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
+            group.advance(self.entry.addresses["advance"], [*self._arrays(), *record])
+        else:
+            function("advance", self.entry.addresses["advance"])(*self._arrays(), 0, -1, *record)
+
+    def evaluate(self, t: float, repeat: int = 1) -> None:
+        """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
+        function("advance", self.entry.addresses["advance"])(*self._arrays(), t, repeat, *_record(*NO_RECORD))
+
+    def _arrays(self) -> tuple[Any, ...]:
+        """Return the addresses of h, f, w and n for compiled functions."""
+        return place(self.h, np.int64), place(self.model.arrays.f), place(self.w), place(self.n, np.int64)
 
     def view(self, index: int) -> np.ndarray:
         """Return a section of the work array, not copied."""
@@ -203,13 +216,13 @@ class Engine:
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
         """Evaluate f(t, y) in the work array; return True on success."""
         self.view(m.Y)[:] = y
-        self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, t, repeat)
+        self.evaluate(t, repeat)
         return bool(self.n[m.EVALUATION] == m.OK)
 
     def complete(self) -> None:
         """Evaluate the state at the end of the last step again, unless the work array has all intermediate results."""
         if self.n[m.ABRIDGED]:
-            self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, float(self.control[m.TIME]))
+            self.evaluate(float(self.control[m.TIME]))
 
     def independence(self) -> np.ndarray:
         """Return the independence of each selected closure row from those before it, at the state evaluated last."""
@@ -220,6 +233,10 @@ class Engine:
     def rows(self, stored: int) -> np.ndarray:
         """Return JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
         return selection.dense(self.model, self.h, self.view(stored))
+
+
+def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[Any, ...]:
+    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
 
 
 def prepare(model: Model, progress: Progress) -> Engine:

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, separated
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, askew, moved_start
+from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, asymmetric, moved_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
@@ -49,7 +49,7 @@ def start_direction(engine: Engine, y: np.ndarray) -> Direction:
         return Direction(nothing, moved_start(engine, y) - y)
     end = model.speeds.stop
     change = np.zeros(len(y))
-    change[:end] = STATE_CHANGE * engine.magnitudes[:end] * askew(end)
+    change[:end] = STATE_CHANGE * engine.magnitudes[:end] * asymmetric(end)
     return Direction(
         nothing, PERTURBATION / STATE_CHANGE * 0.5 * (project(engine, y + change) - project(engine, y - change))
     )

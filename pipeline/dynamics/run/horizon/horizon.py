@@ -60,7 +60,7 @@ class PerturbedRun:
 
 
 @dataclass
-class _Seen:
+class _Side:
     """Rows and motion so far of one of the two runs; motion: at the times of comparison, (times so far, entries)."""
 
     rows: np.ndarray
@@ -78,15 +78,15 @@ class Pair:
         self.added = _between(engine, requested)
         self.outputs = np.union1d(requested, self.added)
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
-        self._engine, self._looking = another(engine), another(engine)
+        self._engine, self._observer = another(engine), another(engine)
         self._metric = Metric(engine)
-        self._run, self._complete, self._ended = self._unseen(), False, Event()
+        self._run, self._complete, self._ended = self._no_rows(), False, Event()
 
     def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
         """Return the result of the run that takes these steps, without the rows that only serve comparisons."""
         try:
-            engine, trajectory, switched = steps(self._hear, self.outputs)
-            self._hear(trajectory.rows)
+            engine, trajectory, switched = steps(self._store_rows, self.outputs)
+            self._store_rows(trajectory.rows)
             self._complete = True
         except StoppedError as stopped:
             if stopped.partial is not None:
@@ -105,7 +105,7 @@ class Pair:
         steps: takes the same steps as the run, with an engine from a start.  alive: called while the perturbed run
         waits for the run; an exception from it ends the work.
         """
-        engine, other, failed = self._engine, self._unseen(), False
+        engine, other, failed = self._engine, self._no_rows(), False
 
         def enough(rows: np.ndarray) -> bool:
             other.rows = rows
@@ -117,48 +117,48 @@ class Pair:
         except SolverError:
             failed = True
         self._await_run(alive)
-        time, separation, horizon = self._compared(other)
+        time, separation, horizon = self._comparison(other)
         if failed and horizon is None:
             # a perturbed run that fails without separation: no value of the run counts as predictable
             return PerturbedRun(np.array([engine.start]), np.zeros(1), engine.start)
         return PerturbedRun(time, separation, engine.end if horizon is None else horizon)
 
-    def _hear(self, rows: np.ndarray) -> bool:
+    def _store_rows(self, rows: np.ndarray) -> bool:
         """Store the rows that the run has so far, and return False: it continues."""
         self._run.rows = rows
         return False
 
-    def _enough(self, other: _Seen, alive: Progress) -> bool:
+    def _enough(self, other: _Side, alive: Progress) -> bool:
         """Return True when the two have diverged, so that the horizon is known.
 
         The criterion depends on the largest motion of the whole run. Once the two have diverged relative to the largest
         motion so far, the perturbed run waits for the end of the run, since further steps seldom change the result.
         """
-        if not self._beyond(other):
+        if not self._have_diverged(other):
             return False
         self._await_run(alive)
-        return self._complete and self._beyond(other)
+        return self._complete and self._have_diverged(other)
 
-    def _beyond(self, other: _Seen) -> bool:
+    def _have_diverged(self, other: _Side) -> bool:
         """Return True when the two have diverged for long enough, relative to the run so far."""
-        self._look(self._run)
-        self._look(other)
+        self._update(self._run)
+        self._update(other)
         first = self._diverged(self._separation(other))
-        return first is not None and bool(other.rows[-1, 0] >= self._judged(first))
+        return first is not None and bool(other.rows[-1, 0] >= self._examined_until(first))
 
     def _await_run(self, alive: Progress) -> None:
         """Wait for the end of the run; a run that fails before its first step has no end."""
         while not self._ended.wait(TICK):
             alive(None, "")
 
-    def _compared(self, other: _Seen) -> tuple[np.ndarray, np.ndarray, float | None]:
+    def _comparison(self, other: _Side) -> tuple[np.ndarray, np.ndarray, float | None]:
         """Return times of comparison [s], separation, and horizon [s] or None, when both runs have ended."""
-        self._look(self._run)
-        self._look(other)
+        self._update(self._run)
+        self._update(other)
         separation = self._separation(other)
         time, diverged = self.times[: len(separation)], self._diverged(separation)
         if diverged is not None:
-            shown = time <= self._judged(diverged)
+            shown = time <= self._examined_until(diverged)
             time, separation = time[shown], separation[shown]
         k = separated_from(time, separation, self._span)
         if k is None:
@@ -174,7 +174,7 @@ class Pair:
         """Return the index of the comparison from which on the two diverge."""
         return divergence(self.times[: len(separation)], separation, self._span)
 
-    def _judged(self, k: int) -> float:
+    def _examined_until(self, k: int) -> float:
         """Return the time [s] up to which a divergence that begins at comparison k is examined."""
         return min(float(self.times[k]) + LASTING * self._span, float(self.times[-1]))
 
@@ -182,11 +182,11 @@ class Pair:
     def _span(self) -> float:
         return self._engine.end - self._engine.start
 
-    def _unseen(self) -> _Seen:
-        model = self._looking.model
-        return _Seen(recording.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
+    def _no_rows(self) -> _Side:
+        model = self._observer.model
+        return _Side(recording.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
 
-    def _look(self, seen: _Seen) -> None:
+    def _update(self, seen: _Side) -> None:
         """Add the motion at the times of comparison that a run has reached since the last call."""
         rows = seen.rows
         if len(rows):
@@ -196,9 +196,9 @@ class Pair:
 
     def _motion(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return the motion at times that are times of rows, shape (time, entries)."""
-        return self._metric.motion(self._looking, rows[np.searchsorted(rows[:, 0], times)])
+        return self._metric.motion(self._observer, rows[np.searchsorted(rows[:, 0], times)])
 
-    def _separation(self, other: _Seen) -> np.ndarray:
+    def _separation(self, other: _Side) -> np.ndarray:
         """Return the separation at the times of comparison that both have reached."""
         both = min(len(self._run.motion), len(other.motion))
         return self._metric.distance(self._run.motion[:both], other.motion[:both], self._largest())
@@ -231,7 +231,7 @@ class Metric:
 
     def motion(self, engine: Engine, rows: np.ndarray) -> np.ndarray:
         """Return the entries of all bodies in rows of the record [sqrt(J)], shape (row, entries)."""
-        seen = frames(engine, rows).links
+        seen = frames(engine, rows)
         speeds = recording.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
         entries = [np.zeros((len(rows), 0))]
         for i, mass, com, turning, modes in self._bodies:
@@ -301,6 +301,6 @@ def moved_start(engine: Engine, y: np.ndarray) -> np.ndarray:
     return perturbed(engine, y, offset_jacobian(engine, y), np.concatenate(offsets))
 
 
-def askew(count: int) -> np.ndarray:
+def asymmetric(count: int) -> np.ndarray:
     """Return numbers from -1 to 1 as a direction that no symmetry of a mechanism has, shape (count,)."""
     return np.asarray(np.sin(1.0 + np.arange(count) * 2.399963))

@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.horizon.horizon import askew
+from flexclear.pipeline.dynamics.run.horizon.horizon import asymmetric
 from flexclear.pipeline.dynamics.run.pieces import Handover, Moment, Tape
 from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, integrate
 
@@ -137,10 +137,10 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
         if number not in followed:
             neighbour = None
         for part in parts:
-            trajectory, there = _go(part, y, here)
+            trajectory, there = _integrated(part, y, here)
             if neighbour is not None:
                 after = _follow(part, neighbour)
-                neighbour, grown = brought_back(part, scales, there, after, separation)
+                neighbour, grown = rescaled(part, scales, there, after, separation)
                 growth, lost = growth + grown[0], lost + grown[1]
             elif number in followed:
                 neighbour = _set_neighbour(part, scales, there, separation)
@@ -159,9 +159,9 @@ def state_scales(engine: Engine, period: float) -> np.ndarray:
     return floors
 
 
-def _go(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
+def _integrated(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
     """Integrate over one stretch, from the run's start where no moment exists; return the trajectory and its end."""
-    left = None if here is None else handed(part, here)
+    left = None if here is None else handover(part, here)
     trajectory = integrate(part, y, silent, left=left)
     return trajectory, _moment(part, trajectory)
 
@@ -169,12 +169,12 @@ def _go(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, M
 def _follow(part: Engine, here: Moment) -> Moment | None:
     """Return the neighbour at the end of a stretch; None where it cannot be followed."""
     try:
-        return _go(part, here.y, here)[1]
+        return _integrated(part, here.y, here)[1]
     except SolverError:
         return None
 
 
-def handed(part: Engine, here: Moment) -> Handover:
+def handover(part: Engine, here: Moment) -> Handover:
     """Return a moment as the handover of another method at the start of this stretch, with one row."""
     counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
     for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.events))):
@@ -209,16 +209,16 @@ def _earlier(moment: Moment, period: float) -> Moment:
 
 def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: float) -> Moment:
     """Return a neighbour in a direction that no symmetry of a mechanism has."""
-    direction = np.where(np.isfinite(scales), askew(len(scales)), 0.0)
+    direction = np.where(np.isfinite(scales), asymmetric(len(scales)), 0.0)
     unit = direction / np.linalg.norm(direction)
     moved = here.y + separation * unit * np.where(np.isfinite(scales), scales, 0.0)
     return replace(here, y=_closed(part, moved))
 
 
-def brought_back(
+def rescaled(
     part: Engine, scales: np.ndarray, here: Moment, neighbour: Moment | None, separation: float
 ) -> tuple[Moment, tuple[float, int]]:
-    """Return the neighbour at its distance again, the logarithm of its growth, and 1 if the growth was not linear.
+    """Return the neighbour at its distance again, the logarithm of its growth, and 1 if it failed or was not linear.
 
     Where the closed contacts of the two differ, both stay as they are until they agree: a state between them would have
     surfaces that overlap without an impact.

@@ -122,14 +122,14 @@ def _widened(arrays: Arrays, f: np.ndarray, count: int) -> Arrays:
     groups, floors = tables[m.GROUPS], tables[m.FLOORS]
     tables[m.GROUPS] = np.concatenate([groups + k * len(floors) for k in range(1 + count)])
     coarser = floors.copy()
-    coarser[np.unique(groups[_summed_up(arrays)]), :2] *= COARSER
+    coarser[np.unique(groups[_accumulated(arrays)]), :2] *= COARSER
     coarser[:, 2] *= LOOSER
     tables[m.FLOORS] = np.concatenate([floors, *[coarser] * count])
     own = (m.NY, m.N_GROUPS)
     return pack({k: arrays.size(k) for k in range(m.ADDRESSES[0]) if k not in own}, tables, arrays.columns)
 
 
-def _summed_up(arrays: Arrays) -> np.ndarray:
+def _accumulated(arrays: Arrays) -> np.ndarray:
     """Return True for each state variable that is an accumulated one of the ledger, on which no rate depends, (NY,)."""
     first, end = arrays.size(m.NQ) + arrays.size(m.NV), arrays.size(m.NY) - arrays.size(m.N_INTERNAL)
     summed = (np.arange(arrays.size(m.NY)) >= first) & (np.arange(arrays.size(m.NY)) < end)
@@ -212,7 +212,7 @@ class _Jumps:
     def _evaluate(self, engine: Engine, t: float) -> np.ndarray:
         """Return rates of the state with its changes, by the code that steps use."""
         generic, engine.h[m.EVALUATE] = int(engine.h[m.EVALUATE]), engine.h[m.RATES]
-        engine.entry.evaluate(engine.h, engine.model.arrays.f, engine.w, engine.n, t)
+        engine.evaluate(t)
         engine.h[m.EVALUATE] = generic
         return engine.slope.copy()
 

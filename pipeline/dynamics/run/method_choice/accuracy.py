@@ -27,7 +27,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.method_choice.method_selection import Suit
+    from flexclear.pipeline.dynamics.run.method_choice.method_selection import Costs
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 #: tolerance of the run that serves the error estimate, as a fraction of the run's
@@ -70,8 +70,8 @@ class Search:
     """
 
     scene: Scene
-    once: Callable[[Scene, Judges | None], xr.Dataset]
-    suit: Suit | None = None
+    make: Callable[[Scene, Judges | None], xr.Dataset]
+    costs: Costs | None = None
     runs: dict[float, xr.Dataset] = field(default_factory=dict)
     predictable: bool = False
 
@@ -82,11 +82,11 @@ class Search:
         return self.runs[rtol]
 
     def _made(self, rtol: float) -> xr.Dataset:
-        if self.suit is None:
-            return self.once(edited(self.scene, {"solver.rtol": rtol}), None)
-        name, why = self.suit.best(rtol), self.suit.why(rtol)
-        run = self.once(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.suit.judges(rtol))
-        self.suit.learn(rtol, name, run)
+        if self.costs is None:
+            return self.make(edited(self.scene, {"solver.rtol": rtol}), None)
+        name, why = self.costs.best(rtol), self.costs.why(rtol)
+        run = self.make(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.costs.judges(rtol))
+        self.costs.learn(rtol, name, run)
         return run.assign_attrs(method_reason=why)
 
     def attempt(self, rtol: float) -> Attempt:
@@ -172,22 +172,22 @@ class Search:
 
 
 def deliver(
-    scene: Scene, once: Callable[[Scene, Judges | None], xr.Dataset], progress: Progress, suit: Suit | None = None
+    scene: Scene, make: Callable[[Scene, Judges | None], xr.Dataset], progress: Progress, costs: Costs | None = None
 ) -> xr.Dataset:
     """Return the cheapest run whose estimated errors meet the request, or the most accurate one with an explanation.
 
-    once: makes the run of a scene, under judges of its integrators.  suit: costs for method selection; None where the
+    make: makes the run of a scene, under judges of its integrators.  costs: costs for method selection; None where the
     scene names an integrator.  The dataset's attributes state requested and estimated errors, the verdict, and the
     reason of the method.
     """
-    return _delivered(Search(scene, once, suit), progress)
+    return _delivered(Search(scene, make, costs), progress)
 
 
 def by_default(
     scene: Scene,
-    once: Callable[[Scene, Judges | None], xr.Dataset],
+    make: Callable[[Scene, Judges | None], xr.Dataset],
     progress: Progress,
-    suit: Callable[[Scene], Suit],
+    costs: Callable[[Scene], Costs],
 ) -> xr.Dataset:
     """Return the run of a scene that requests no accuracy and leaves its integration open.
 
@@ -197,7 +197,7 @@ def by_default(
     names = [q.name for q in scene.requested() if q.over_time]
     request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
     wanting = edited(scene, {"accuracy": request})
-    return _delivered(Search(wanting, once, suit(wanting), predictable=True), progress)
+    return _delivered(Search(wanting, make, costs(wanting), predictable=True), progress)
 
 
 def _delivered(search: Search, progress: Progress) -> xr.Dataset:

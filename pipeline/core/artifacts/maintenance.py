@@ -81,10 +81,10 @@ def remove(store: Store, artifact: Artifact) -> None:
     record = artifact.record
     with store.lock(record.stage, record.key):
         for name in ("json", *record.files):
-            take_away(store.path(record.stage, record.key, name))
+            remove_file(store.path(record.stage, record.key, name))
 
 
-def take_away(path: Path) -> None:
+def remove_file(path: Path) -> None:
     """Remove a file; a folder of its name is renamed."""
     platforms.set_aside(path)
     path.unlink(missing_ok=True)
