@@ -19,8 +19,9 @@ from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.adaptive import LEAST_NORM
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.record import ensemble
-from flexclear.pipeline.dynamics.record.ensemble import arms, difference_of_starts
+from flexclear.pipeline.dynamics.record.ensemble import difference_of_starts
 from flexclear.pipeline.dynamics.run import trajectory
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine

@@ -276,6 +276,16 @@ def test_clearance_joints_keep_the_ledger_the_loops_and_the_laws(scene: str, cou
 # The flexible rod, against sums over mass points, and its own rigid limit --------------------------------------------
 
 
+def test_ideal_joints_platform_and_reaction_are_those_of_the_second_derivation() -> None:
+    """A millionth of the deviations from ideal, which are 3e-7 m and 0.7 mm/s, and of the reaction, which rings."""
+    known = second_derivation("far_cb")
+    dataset = run("sps4/variants/first_far_cb", (("time.end", "20 ms"),))
+    found = dataset.sel(time=known["time"], method="nearest", tolerance=1e-9).sel(body="platform", joint="A1")
+    assert found.position.values[:, 2] == pytest.approx(known["height"], abs=3e-13)
+    assert found.velocity.values[:, 2] == pytest.approx(known["speed"], abs=7e-10)
+    assert np.abs(found.joint_force.values - known["force"]).max() <= 1e-6 * np.abs(known["force"]).max()
+
+
 def test_clearance_first_impacts_are_those_of_the_second_derivation() -> None:
     """Errors grow a thousandfold in a few impacts without damping; the first two are sharp."""
     known, found = second_derivation("far_csj_cb"), impacts(run("sps4/variants/first_far_csj_cb", BRIEFLY))

@@ -14,7 +14,7 @@ from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, shape_funct
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry, check
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.sparse.dissection import dissect
-from flexclear.pipeline.structure.sparse.multifrontal import cholesky, negative_pivots
+from flexclear.pipeline.structure.sparse.multifrontal import Front, cholesky, negative_pivots
 from tests.analytic.solid_models import block, build
 
 LAME, SHEAR = lame_parameters(7.17e10, 0.33)
@@ -160,6 +160,20 @@ def test_solutions_are_those_of_superlu(clamped: tuple[sp.csr_array, np.ndarray]
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=rounding * np.abs(expected).max())
     alone = cholesky(K, place).solve(loads[:, 0])
     np.testing.assert_allclose(alone, found[:, 0], rtol=0.0, atol=rounding * np.abs(alone).max())
+
+
+def test_what_a_child_hands_up_is_added_where_its_rows_are() -> None:
+    rng = np.random.default_rng(11)
+    k, rows = 6, 20
+    for at in ([0, 1, 2, 5, 6, 7, 12, 13, 19], [3, 4, 5], [6, 8, 10, 11], list(range(rows)), [0, 2, 4, 19]):
+        whole, theirs = rng.normal(size=(rows, rows)), rng.normal(size=(len(at), len(at)))
+        front = Front(0, np.arange(k, rows), whole[:k, :k].copy(), whole[k:, :k].copy(), whole[k:, k:].copy())
+        front.add(np.array(at), theirs)
+        whole[np.ix_(at, at)] += theirs
+        # one sum for each entry, so to the last bit
+        np.testing.assert_array_equal(np.tril(front.diagonal), np.tril(whole[:k, :k]))
+        np.testing.assert_array_equal(front.under, whole[k:, :k])
+        np.testing.assert_array_equal(np.tril(front.rest), np.tril(whole[k:, k:]))
 
 
 def test_negative_eigenvalues_are_counted(clamped: tuple[sp.csr_array, np.ndarray]) -> None:

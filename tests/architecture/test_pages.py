@@ -129,9 +129,9 @@ def test_the_way_of_the_data_leads_through_modules_that_exist(root: Path) -> Non
 FILE = re.compile(r"[\w.*<>-]+(/[\w.*<>-]+)+/?|[\w*<>]+\.(py|md|toml|json|jsonl)")
 MODULE = re.compile(r"(pipeline|stages|tests|benchmarks)(\.\w+)+")
 #: folders that names below begin in: `model/tree` is `pipeline/dynamics/model/tree.py`
-FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs")
-#: first parts of names that are no sources: written by runs, quantities, units, scenes by name, symbols
-ELSEWHERE = {".venv", "results", "sps4", "checks", "mesh", "modes", "bundle", "figures", "tables", "report"}
+FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs", "scenes")
+#: first parts of names that are no sources: written by runs, quantities, units, symbols
+ELSEWHERE = {".venv", "results", "mesh", "modes", "bundle", "figures", "tables", "report"}
 #: files that runs or users make
 MADE = {"slider_crank.toml", "rod.toml", "run.nc", "cost.json", "timing.nc"}
 
@@ -149,7 +149,7 @@ def exists(root: Path, name: str) -> bool:
     return any(
         next(root.joinpath(folder).glob(pattern + ending), None) is not None
         for folder in FROM
-        for ending in ("", ".py")
+        for ending in ("", ".py", ".toml")
     )
 
 

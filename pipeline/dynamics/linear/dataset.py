@@ -71,15 +71,15 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     if numbering.flexible:
         shapes = np.concatenate([w[modes] for modes in numbering.modal_coordinates.values()])
         data["modal_shape"] = (("vibration", "part", "mode"), _split(shapes.T))
-    made = still.assign({n: xr.Variable(*v) for n, v in data.items()})
-    made = made.assign_coords(
+    result = still.assign({n: xr.Variable(*v) for n, v in data.items()})
+    result = result.assign_coords(
         vibration=np.arange(1, len(value) + 1),
         part=list(PARTS),
         moving_body=parts,
         frame=list(bench.model.mechanism.frames),
     )
     facts = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
-    return conform(made, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth)
+    return conform(result, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth)
 
 
 def motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:

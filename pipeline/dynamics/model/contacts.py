@@ -20,6 +20,7 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
+    from flexclear.pipeline.dynamics.model.model import Model
 
 #: default impact floor, far below approach speeds in common machines [m/s or rad/s]; and its ratio to the size of a
 #: mechanism of 10 cm [1/s]: in a mechanism of micrometres 1 um/s would be fast
@@ -119,3 +120,9 @@ def _reduced_mass(masses: Sequence[float]) -> float | None:
     """Return the reduced mass of the links on both sides [kg]; 0 means the ground, infinite. None when both are."""
     inverse = sum(1.0 / mass for mass in masses if mass > 0.0)
     return 1.0 / inverse if inverse > 0.0 else None
+
+
+def arms(model: Model) -> np.ndarray:
+    """Return the factor that makes each contact's gap a length: 1, or the size [m] for ends of angles."""
+    turning = [getattr(contact.joint, "coordinate", None) for contact in model.contacts]
+    return np.array([model.length if one is not None and one.turning else 1.0 for one in turning])

@@ -346,7 +346,7 @@ def contact_names(model: Model) -> dict[str, object]:
 
 
 def events_of(model: Model, trajectory: Trajectory) -> Variables:
-    """The events of a run, by variable."""
+    """Return the events of a run, by variable."""
     events, names = trajectory.events, np.array([contact.name for contact in model.contacts], dtype=str)
     columns = {
         "event_time": events["time"],

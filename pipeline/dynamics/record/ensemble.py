@@ -23,6 +23,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
@@ -140,12 +141,6 @@ def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
     clearance = min((joint.clearance for joint in model.scene.contacts().values()), default=0.0)
     pressed = max(least, depths[depths > 0.0].min(initial=np.inf))
     return Ensemble(perturbation=min(max(least, FRACTION_OF_CLEARANCE * clearance), FRACTION_OF_CLEARANCE * pressed))
-
-
-def arms(model: Model) -> np.ndarray:
-    """Return the factor that makes each contact's gap a length: 1, or the size [m] for ends of angles."""
-    turning = [getattr(contact.joint, "coordinate", None) for contact in model.contacts]
-    return np.array([model.length if one is not None and one.turning else 1.0 for one in turning])
 
 
 def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np.ndarray]:
