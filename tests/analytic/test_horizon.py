@@ -36,12 +36,11 @@ def test_rigid_clearance_converges_over_the_whole_stroke():
 def test_frames_by_which_runs_are_compared_are_those_of_full_rows_but_for_open_loops():
     engine = engine_of(load_scene(TREE / "scenes/sps4/variants/first_csj.toml"), {}, silent)
     trajectory = integrate(engine, consistent_start(engine), silent)
-    seen, alone = observed(engine, trajectory), frames(engine, trajectory.rows)
-    for what in ("links", "sites"):
-        for field in ("origin", "axes", "omega", "velocity"):
-            here, known = getattr(alone, what)[field], getattr(seen, what)[field]
-            # rtol is 1e-10, at which loops drift; rates count per second, so that they are open by more
-            assert np.abs(here - known).max() < 1e-7 * np.abs(known).max(), (what, field)
+    seen, alone = observed(engine, trajectory).links, frames(engine, trajectory.rows)
+    for field in ("origin", "axes", "omega", "velocity"):
+        here, known = alone[field], seen[field]
+        # rtol is 1e-10, at which loops drift; rates count per second, so that they are open by more
+        assert np.abs(here - known).max() < 1e-7 * np.abs(known).max(), field
 
 
 def test_the_perturbed_run_of_a_motion_that_does_not_return_starts_where_the_run_does():
