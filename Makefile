@@ -29,10 +29,10 @@ check: $(TOOLS) ## Format, lint, types and import rules
 	$(VENV)/$(BIN)/lint-imports
 
 test: $(TOOLS) ## Tests, except those marked slow
-	$(RUN) -m pytest -q -n auto --dist loadfile
+	$(RUN) -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 test-slow: $(TOOLS) ## The tests marked slow
-	$(RUN) -m pytest -q -n auto --dist loadfile -m slow
+	$(RUN) -m pytest -q -n auto --dist loadfile --no-loadscope-reorder -m slow
 
 # other Pythons that this machine may have; each gets an environment of its own and runs what `doctor` computes
 OTHERS := python3.12 python3.13 python3.14 $(wildcard $(HOME)/.pyenv/versions/3.1[2-9]*/bin/python)

@@ -1,8 +1,8 @@
 """flexclear from Python: ``import flexclear as fc``.
 
 ``flexclear.pipeline``, ``stages`` and ``papers`` are the folders of these names at the top of the repository: links in
-a checkout, plain folders where flexclear is installed. Where a checkout has no links, as on Windows, the top itself is
-looked through.
+a checkout, plain folders where flexclear is installed. Where a checkout has no links, as on Windows, Python also
+searches the top of the repository.
 """
 
 import os
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> object:
-    """What `public` lists, which is imported when it is asked for, that module itself, and the version."""
+    """Return a name of `public`, imported at its first use, that module itself, or the version."""
     listed = name in ("public", "__all__", "__version__")
     public = import_module("flexclear.public") if listed or not name.startswith("__") else None
     if name == "public":

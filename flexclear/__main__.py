@@ -1,4 +1,4 @@
-"""``python -m flexclear``: the command."""
+"""Entry point of ``python -m flexclear``."""
 
 import sys
 

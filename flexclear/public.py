@@ -1,6 +1,6 @@
-"""The public functions: from an FE mesh to a converged answer about a mechanism with flexible bodies and clearance.
+"""Public functions: from an FE mesh to a converged answer about a mechanism with flexible bodies and clearance.
 
-The same things that the command ``flexclear`` does, from Python::
+They do what the command ``flexclear`` does, from Python::
 
     import flexclear as fc
 
@@ -60,10 +60,10 @@ __version__ = version()
 
 
 def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
-    """The scene in a TOML file, with everything that it extends, or in a table of the same keys.
+    """Load a scene from a TOML file, with everything that it extends, or from a table of the same keys.
 
-    override: dotted path -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
-    Raises InputError (exit code 2 of the command) with all mistakes at once.
+    override: dotted path -> value.  A scene may be built part by part, too: ``Scene(title=..., time=..., body=...)``.
+    Raises InputError (exit code 2 of the command) with all errors at once.
 
     >>> import flexclear as fc
     >>> fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
@@ -73,7 +73,7 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
 
 
 def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted paths changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
+    """Return a copy of a scene with dotted paths changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a part as a table.
 
     Raises InputError.
 
@@ -85,7 +85,7 @@ def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
 
 
 def run(scene: Scene | str | Path) -> xr.Dataset:
-    """Dataset of the simulate stage (schema RUN), from the cache when fresh.
+    """Run a scene and return the dataset of the simulate stage (schema RUN), from the cache when fresh.
 
     Raises FlexclearError: InputError, SolverError or ResourceError.
 
@@ -98,21 +98,21 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
 
 
 def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
-    """What accuracy costs: error against cost over integrators, tolerances and steps; cached point by point.
+    """Measure what accuracy costs: error against cost over integrators, tolerances and steps; cached point by point.
 
-    The quantities are those of the scene's `[accuracy]`, else the usual ones.  budget: processor time that the runs may
-    take [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets.
-    In a notebook the dataset shows the answer first.  Raises FlexclearError.
+    The quantities are those of the scene's `[accuracy]`, else the watched ones.  budget: processor time of the runs
+    [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets. In a
+    notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     return answers.dataset("cost", _loaded(scene), budget, models=models)
 
 
 def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
-    """Whether the run of a scene is stable: value, limit, verdict and remedy over `check`.
+    """Judge whether the run of a scene is stable: value, limit, verdict and remedy over `check`.
 
-    Energy balance, closed loops, agreement with tighter runs and with another method, rejected and stiff steps,
-    singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
-    the dataset shows the answer first.  Raises FlexclearError.
+    The checks: energy balance, closed loops, agreement with tighter runs and with another method, rejected and stiff
+    steps, singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a
+    notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     return answers.dataset("stability", _loaded(scene), budget)
 
@@ -126,10 +126,10 @@ def sweep(
     scheduler: str | None = None,
     **more: object,
 ) -> xr.Dataset:
-    """Many points of one scene, as ``flexclear sweep`` makes them; finished points come from the cache.
+    """Run many points of one scene, as ``flexclear sweep`` does; finished points come from the cache.
 
-    vary: path in the scene -> its values (a list), or what else a sweep file says of a parameter.
-    keep: what is recorded of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
+    vary: path in the scene -> its values (a list), or a parameter's table as in a sweep file. keep: recorded quantities
+    of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
     workers: processes of this machine, its cores by default; scheduler: address of a Dask cluster instead.
     more: `set`, `combine`, `sample`, `members` and `error` of a sweep file.
     The result has the parameters as dimensions.  Raises FlexclearError.
@@ -149,15 +149,16 @@ def sweep(
 
 
 def _plain(values: Any) -> Any:
-    """Arrays as lists of Python's own numbers, which are what a sweep file can say."""
+    """Return arrays as lists of Python's own numbers, the form of values in a sweep file."""
     return values.tolist() if hasattr(values, "tolist") else values
 
 
 def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
-    """A motion that its laws repeat, sampled once in each period (schema SECTIONS), and the verdict on it.
+    """Sample a periodically driven motion once in each period (schema SECTIONS), and judge it.
 
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
-    why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
+    why.  The scene's `[sections]` has the number of periods.  Raises FlexclearError: InputError if the laws do not
+    repeat.
     """
     one = _loaded(scene)
     graph = Graph(one, shown=scenes.as_in_its_file(one))
@@ -167,13 +168,13 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
 
 
 def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
-    """Derivatives of quantities by numbers of a scene, through its impacts; from the cache when fresh.
+    """Return derivatives of quantities by numbers of a scene, through its impacts; from the cache when fresh.
 
-    of: quantities over time, ``slider.position``, or reduced as a sweep keeps them, ``pin.peak_force``,
+    of: quantities over time, ``slider.position``, or reduced as in a sweep, ``pin.peak_force``,
     ``slider.velocity.largest``.  to: dotted paths of numbers, ``joint.pin.clearance``, of lists by index, ``com.0``.
-    Each variable has the dimension `parameter`; its unit is that of the quantity per SI unit of the parameter.
-    Values are NaN beyond the predictability horizon.  Raises FlexclearError: InputError for what is no number or
-    changes how the mechanism is built, SolverError where the motion has no derivative.
+    Each variable has the dimension `parameter`; its unit is that of the quantity per SI unit of the parameter. Values
+    are NaN beyond the predictability horizon.  Raises FlexclearError: InputError for a path that is no number or
+    changes the mechanism's structure, SolverError where the motion has no derivative.
 
     >>> import flexclear as fc
     >>> short = fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
@@ -186,11 +187,11 @@ def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str
 
 
 def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
-    """A quantity of a run over time, in SI units with the attribute `units`.
+    """Evaluate a quantity of a run over time, in SI units with the attribute `units`.
 
     name: ``slider.acceleration``, a component, ``slider.position.x``, or an expression, ``force(A1) - force(A2)``.
-    Vectors have the dimension `axis`, x y z of the world.  Quantities that contacts have per event (`peak_force`,
-    `impact_times`, `impulse`) have no time.  Raises InputError for what the run lacks, with the nearest name.
+    Vectors have the dimension `axis`, x y z of the world.  Quantities of single contact events (`peak_force`,
+    `impact_times`, `impulse`) have no time.  Raises InputError for a quantity that the run lacks.
     """
     from flexclear.pipeline.core.artifacts.quantities import evaluate
 
@@ -204,12 +205,12 @@ def equilibrium(
     *,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium of a mechanism close to its start pose, the drives held (schema EQUILIBRIUM).
+    """Return the static equilibrium of a mechanism close to its start pose, the drives held (schema EQUILIBRIUM).
 
     time: at which the drives' laws give their positions [s], the scene's start when None.
     drives: positions [m or rad] by drive, instead of the law's.
-    moving: the drives keep the speed of that moment; the pose is then one of steady motion, as of a rotor.
-    A drive that does not hold the mechanism leaves it free to settle: a ball falls onto its socket's floor.
+    moving: the drives keep their speed at that time; the pose is then one of steady motion, as of a rotor. Loose bodies
+    settle: a ball falls onto its socket's floor where no drive holds it.
     Raises FlexclearError: InputError, SolverError (also when nothing balances the loads) or ResourceError.
 
     >>> import flexclear as fc
@@ -229,10 +230,10 @@ def frequencies(
     speeds: Sequence[float] | None = None,
     drive: str | None = None,
 ) -> xr.Dataset:
-    """Natural frequencies, damping and shapes of the assembled mechanism about `equilibrium` (schema LINEAR).
+    """Return natural frequencies, damping and shapes of the assembled mechanism about `equilibrium` (schema LINEAR).
 
-    Arguments and errors as there.  speeds: of a drive [rad/s, or m/s]; the result is then a Campbell diagram, the
-    vibrations about steady motion at each of them (schema CAMPBELL).  drive: its name, where several drives move.
+    Arguments, errors: see `equilibrium`.  speeds: of a drive [rad/s, or m/s]; the result is then a Campbell diagram,
+    the vibrations about steady motion at each speed (schema CAMPBELL).  drive: its name, where several drives move.
 
     >>> import flexclear as fc
     >>> result = fc.frequencies("scenes/checks/oscillator.toml")
@@ -245,24 +246,24 @@ def frequencies(
 def compare(
     *scenes: Scene | str | Path, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False
 ) -> xr.Dataset:
-    """Scenes next to each other, or next to their ideal mechanisms: differences, the error of each run, events and
+    """Compare scenes with each other, or with their ideal mechanisms: differences, errors of the runs, events and
     costs.
 
     ideal: compare each scene with itself without clearance and flexibility (True or "both"), without one of them, or
-    with each of these.  The first run is the reference; its variables are reported in
-    `pipeline.post.overview.comparison`. Raises FlexclearError.
+    with each of these.  The first run is the reference; `pipeline.post.overview.comparison` describes the variables.
+    Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
     return compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
 
 
 def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
-    """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
+    """Return the effect size of each effect of a scene on each quantity, by removal, alone and in pairs.
 
     Variables and meanings: `pipeline.post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
-    `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is taken away alone, the most
-    important ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows
-    the answer first.  Raises FlexclearError.
+    `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is removed alone, the most important
+    ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows the answer
+    first.  Raises FlexclearError.
     """
     if budget is not None:
         return answers.dataset("matters", _loaded(scene), budget)
@@ -272,30 +273,30 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
 def plan(
     scene: Scene | str | Path, budget: str | float | None = None, *, accuracy: str = "1 %"
 ) -> tuple[Scene, xr.Dataset]:
-    """Which of a scene's effects the requested accuracy calls for: the planned scene, and the evidence.
+    """Plan which of a scene's effects the requested accuracy calls for: the planned scene, and the evidence.
 
-    The dataset (`pipeline.post.answers.plan.dataset`) holds the estimated influence of each effect on each quantity of
-    `[accuracy]`, what was decided, and why.  accuracy: of all watched quantities, as a fraction of their sizes, for a
-    scene without `[accuracy]`.  budget: time in which members of the full and the planned scene are compared [s], or
-    text such as "1min"; the dataset then has the plan's true `error` where it is decided, its `chance`, what is
-    `allowed` there, the `horizon` as a fraction of the run and the `scatter` of single runs.
-    In a notebook the dataset shows the answer first.  Raises FlexclearError.
+    The dataset (`pipeline.post.answers.plan.dataset`) holds the estimated effect size of each effect on each quantity
+    of `[accuracy]`, the decisions and their reasons.  accuracy: of all watched quantities, as a fraction of their
+    sizes, for a scene without `[accuracy]`.  budget: time in which members of the full and the planned scene are
+    compared [s], or text such as "1min"; the dataset then has the plan's true `error` where it is decided, its
+    `chance`, the `allowed` error, the `horizon` as a fraction of the run and the `scatter` of single runs. In a
+    notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     return plan_command.dataset(_loaded(scene), accuracy, budget)
 
 
 def render(scene: Scene | str | Path) -> Path:
-    """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
+    """Return the folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
     scenes.require_names(one := _loaded(scene))
     return open_workplace().made(*Graph(one).render.values(), jobs=1)[0].folder
 
 
 def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
-    """The start pose of a scene with all names, in seconds: nothing is run or compiled.
+    """Return the start pose of a scene with all names, in seconds: nothing is run or compiled.
 
-    folder: also write picture and page there, as ``flexclear show`` does.  In a notebook the result shows the page
-    that turns; `gaps` lists the joints that do not fit, `refused` says why (None where all fit).  Raises InputError
-    where no pose can be drawn.
+    folder: also write picture and page there, as ``flexclear show`` does.  In a notebook the result shows the
+    interactive page; `gaps` lists the joints that do not fit, `refused` says why (None where all fit).  Raises
+    InputError where no pose can be drawn.
 
     >>> import flexclear as fc
     >>> seen = fc.show("scenes/checks/pendulum.toml")
@@ -306,10 +307,10 @@ def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
 
 
 def report(scene: Scene | str | Path, budget: str | float | None = None, *, answers: bool = True) -> Path:
-    """The page with everything about a scene, one file, brought up to date.
+    """Return the page with everything about a scene, one file, brought up to date.
 
     budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
-    whether those are there that take further runs.  Raises FlexclearError.
+    False leaves out those that take further runs.  Raises FlexclearError.
     """
     given = None if budget is None else seconds(budget, "budget")
     scenes.examine(one := _loaded(scene))
@@ -318,15 +319,15 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:
-    """What there is of a scene below results/runs, as a tree: mesh, modes, bundle by body; run, post, ensemble.
+    """Return the stored datasets of a scene as a tree: mesh, modes, bundle by body; run, post, ensemble.
 
-    `post` is left out while it is derived from another run than `run`, which `fc.run` of a changed scene makes alone.
-    The path of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that one, under the file's name.
-    Nothing is run.  Raises InputError when there is nothing yet, or the file is no dataset of a scene.
+    `post` is left out while it is derived from another run than `run`, as after `fc.run` of a changed scene. The path
+    of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that dataset, under the file's name.
+    Nothing is run.  Raises InputError when nothing is stored, or the file is no dataset of a scene.
     """
     return scenes.results(scene)
 
 
 def _loaded(scene: Scene | str | Path) -> Scene:
-    """A scene, or the one in a file, or of a name below scenes/."""
+    """Return a scene: as given, from a file, or by its name below scenes/."""
     return load_scene(scenes.find_scene(str(scene))) if isinstance(scene, (str, Path)) else scene

@@ -1,1 +1,1 @@
-"""The stages from recipe to pictures and verdicts, and the tasks of a scene (`graph`); `sweeps` of many points."""
+"""Stages from mesh recipe to pictures and verdicts, the tasks of a scene (`graph`), and sweeps of many points."""

@@ -1,4 +1,4 @@
-"""Next to stage 4: scene and bundles -> an ensemble, sections, derivatives, vibrations."""
+"""Analyses next to stage 4: scene and bundles -> ensemble, sections, derivatives, linear vibrations."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
+    """Run all members of the scene's ensemble (schema ENSEMBLE); inputs are ``bundle/<body>``."""
     scene = rebuild(params, inputs)
     check_run(scene, results_root())
     with in_time(scene):
@@ -25,16 +25,16 @@ def ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progre
 
 
 def sections(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Sections of a periodic motion (schema SECTIONS); inputs are ``bundle/<body>``."""
+    """Sample a periodic motion once per period (schema SECTIONS); inputs are ``bundle/<body>``."""
     scene = rebuild(params, inputs)
     with in_time(scene):
         return {"nc": analyses.sections(scene, bundles(inputs), progress)}
 
 
 def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Derivatives of quantities `of` by numbers of the scene, `to`.
+    """Differentiate the quantities `of` with respect to the numbers `to` of the scene.
 
-    inputs: ``bundle/<body>``, and ``run`` of a scene with contacts, which has the horizon.
+    inputs: ``bundle/<body>``; for a scene with contacts also ``run``, which contains the predictability horizon.
     """
     from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
 
@@ -47,8 +47,8 @@ def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], p
 
 
 def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The equilibrium in a `pose` (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); over the speeds of a
-    drive these alone (schema CAMPBELL).  Inputs are ``bundle/<body>``."""
+    """Find the equilibrium in a `pose` (schema EQUILIBRIUM), with natural vibrations if requested (schema LINEAR); with
+    `speeds` of a drive, compute only vibrations at these speeds (schema CAMPBELL). Inputs are ``bundle/<body>``."""
     from flexclear.pipeline.dynamics.linear.campbell import campbell
 
     pose, scene, reduced = params["pose"], rebuild(params, inputs), bundles(inputs)

@@ -1,6 +1,6 @@
-"""One point of a cost study: a run of an edited scene, what it took, and of its result what errors need.
+"""One point of a cost study: a run of an edited scene, its costs, and the quantities that errors are computed from.
 
-The cost of a point is that of its integration: the record is of as many rows at every tolerance and step.
+The cost of a point is that of its integration: the record has the same number of rows at every tolerance and step.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from flexclear.stages.simulation import bundles, rebuild
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The recorded part of the run with ``cpu_repeat(repeat)`` of the integration and the other costs as attributes,
-    the median time of the recording among them.
+    """Run the scene; return the recorded quantities, ``cpu_repeat(repeat)`` of the integration, and other costs as
+    attributes, among them the median time of the recording.
 
-    params: `simulate`, as of the simulate stage, the `quantities` of the study, and whether the point is `brief`, as of
-    `analyses.cost`.  inputs: bundles, and `kernels`, the artifact of `stages.kernels`.  A run that the solver refuses
-    leaves an empty dataset whose attribute `refused` says why: that, too, is a result of the study.
+    params: `simulate`, the parameters of the simulate stage; `quantities` of the study; `brief`, as in `analyses.cost`.
+    inputs: bundles, and `kernels`, the artifact of `stages.kernels`. Where the solver refuses the run, the dataset is
+    empty and its attribute `refused` holds the reason: that, too, is a result of the study.
     """
     scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
@@ -49,10 +49,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The contacts' statistics of an ensemble, ``standard_error(quantity)`` of the means of the series it has, and its
-    ``cpu_seconds`` of the integration of one as an attribute; or `refused`.
+    """Run an ensemble; return the contacts' statistics, ``standard_error(quantity)`` of the means of the series, and
+    the attribute ``cpu_seconds``, the processor time of the integration of one run; or the attribute `refused`.
 
-    params: `simulate`, with the ensemble, and `quantities`.  inputs: as of `run`.
+    params: `simulate`, with the ensemble, and `quantities`. inputs: as in `run`.
     """
     scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)
@@ -70,7 +70,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
 
 
 def _growth(run: xr.Dataset) -> dict[str, float]:
-    """Growth of a fraction of the clearance into a fraction of the velocities up to the horizon, with contacts."""
+    """Return the largest separation up to the horizon over the initial perturbation; empty without contacts."""
     if "separation" not in run:
         return {}
     before = run["separation_time"].values <= float(run["horizon"])
@@ -78,6 +78,6 @@ def _growth(run: xr.Dataset) -> dict[str, float]:
 
 
 def _contacts(scene: Scene) -> dict[str, float]:
-    """Largest clearance [m], of scenes with contacts."""
+    """Return the largest clearance [m] of a scene with contacts; empty without contacts."""
     clearances = [joint.clearance for joint in scene.contacts().values()]
     return {"clearance": max(clearances)} if clearances else {}

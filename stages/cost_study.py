@@ -1,4 +1,4 @@
-"""All points of a cost study -> its dataset, the price list, the work-precision figure and the causes of the error."""
+"""All points of a cost study -> dataset, price list, work-precision figure, and the causes of the error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
 from flexclear.pipeline.post.cost.causes import causes_of
-from flexclear.pipeline.post.cost.study import Point, assemble, believed, cost, relative_errors, with_reference
+from flexclear.pipeline.post.cost.study import Point, assemble, comparable_until, cost, relative_errors, with_reference
 from flexclear.pipeline.post.cost.work_precision import Mark
 from flexclear.pipeline.post.plotting.table import files
 
@@ -20,12 +20,12 @@ LOCATED = 1e-12
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``cost.nc`` and its tables and figures.
+    """Assemble ``cost.nc`` and its tables and figures.
 
-    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the `own` setting of
-    the scene (own_integrator, own_rtol or own_step), in words what the budget left `undone` and what was `given_up`
-    with its method, whether the study is `complete`, and `peers`, as of `flexclear.commands.cost.read_peers`.  The
-    reference is the tightest run among the points, and a run by another method confirms it.
+    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the scene's `own`
+    setting (own_integrator, own_rtol or own_step), in words what the budget left `undone` and what was `given_up` with
+    its method, whether the study is `complete`, and `peers`, as in `flexclear.commands.cost.read_peers`. The reference
+    is the tightest run among the points; a run by another method confirms it.
     """
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
@@ -41,15 +41,15 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         for name, data in inputs.items()
         if name.startswith("ensemble:") and "refused" not in data.attrs
     }
-    # the last one is that at the tightest tolerance
+    # the last ensemble is the one at the tightest tolerance
     tightest = next(reversed(ensembles.values()), None)
     split = {q.name: causes_of(q, points, runs, LOCATED, tightest) for q in chosen}
     title = params["title"]
-    said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
-    said += (*answer.undone(study),)
+    notes = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
+    notes += (*answer.undone(study),)
     study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
-    result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", said))
+    result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", notes))
     result |= files("quantities", answer.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")
@@ -65,11 +65,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> tuple[Any, ...]:
-    """The scene as it is and the paper's choice of method and step, as marked points."""
+    """Return the scene as it is and the paper's choice of method and step as marked points of the figure."""
     reference, marks = runs[next(p.key for p in points if p.group == "reference")], []
     for name, group in (("this scene", "sampling"), ("paper's choice", "paper")):
         run = next((runs[p.key] for p in points if p.group == group and "refused" not in runs[p.key].attrs), None)
         if run is not None:
-            errors = relative_errors(run, reference, chosen, believed(points, runs))
+            errors = relative_errors(run, reference, chosen, comparable_until(points, runs))
             marks.append(Mark(name, cost(run, "cpu_seconds"), errors))
     return tuple(marks)

@@ -1,4 +1,4 @@
-"""Stage 5: a run (and its ensemble) -> the series and tables derived from it."""
+"""Stage 5: a run (and its ensemble) -> derived series and tables."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ if TYPE_CHECKING:
 
 @given_arrays
 def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progress: Progress) -> dict[str, Any]:
-    """The post dataset (schema POST), with what the scene says of where its values come from."""
+    """Derive the post dataset (schema POST); its attributes hold the provenance of the scene's values."""
     from flexclear.pipeline.post.single_run.series import derived
 
     return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["attributes"])}
 
 
 def params(scene: Scene) -> dict[str, Any]:
-    """Attributes that no run depends on: `sources` and `assumptions`, path in the scene -> text, as JSON."""
+    """Return the attributes that no run depends on: `sources` and `assumptions`, key path -> text, as JSON."""
     return {"attributes": origins(scene)}
 
 
 def origins(scene: Scene) -> dict[str, str]:
-    """Where values come from, as attributes of datasets."""
+    """Return the provenance of the scene's values as attributes of datasets."""
     texts = sources(scene)
     origin = {"sources": texts, "assumptions": assumed(texts)}
     return {name: json.dumps(by_place, sort_keys=True) for name, by_place in origin.items()}
 
 
 def sources(scene: Scene) -> dict[str, str]:
-    """Where values come from, those of mesh recipes included: path -> text."""
+    """Return the provenance of the scene's values, including those of mesh recipes: key path -> text."""
     by_path = scene.sources()
     for body, recipe in scene.recipes().items():
         by_path |= meshing.sources(Path(recipe), f"body.{body}.recipe")

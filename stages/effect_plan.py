@@ -1,4 +1,4 @@
-"""Next to stage 4: a scene with `[accuracy]` -> which of its effects that calls for."""
+"""Next to stage 4: a scene with `[accuracy]` -> the effects that the requested accuracy requires."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
 
-#: inputs that are bundles of fewer modes: this, the level, the body
+#: inputs ``fewer/<level>/<body>`` are bundles of fewer modes
 FEWER = "fewer/"
-#: inputs that are bundles from twice as many elements
+#: inputs ``finer/<body>`` are bundles from twice as many elements
 FINER, TWICE = "finer/", 2
-#: reference condition with static modes between interfaces, six for each but one, and those without any
+#: reference condition with static modes, six for each interface but one; reference conditions without static modes
 WITH_STATIC, DIRECTIONS = "craig-bampton", 6
 NORMAL = ("free-free", "fixed-fixed", "cantilever")
-#: modes of rods come in pairs; so many at least have a half that is worth a look
+#: modes of rods come in pairs; halving the number of modes is tried only from this number on
 PAIR, LEAST_HALVED = 2, 4
 
 
 def task(scene: Scene) -> Task:
-    """The plan of a scene; shown as ``plan.nc``."""
+    """Return the task that plans a scene; its artifact is shown as ``plan.nc``."""
     rigid = edited(
         variants.without(scene, [effect for effect in variants.effects(scene) if effect.name.startswith("body.")]),
         {"accuracy": None},
@@ -40,8 +40,8 @@ def task(scene: Scene) -> Task:
     whole = Graph(edited(scene, {"accuracy": None}), shown=False)
     inputs = whole.bodies() | Graph(rigid, shown=False).bodies()
     for k, counts in enumerate(levels(scene)):
-        less = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
-        inputs |= {f"{FEWER}{k}/{body}": less.bundle[body] for body in counts}
+        with_fewer = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
+        inputs |= {f"{FEWER}{k}/{body}": with_fewer.bundle[body] for body in counts}
     counts = elements(scene)
     if counts:
         finer = Graph(edited(scene, {"accuracy": None}), shown=False, recipe={"elements": TWICE})
@@ -66,23 +66,23 @@ def task(scene: Scene) -> Task:
 
 
 def elements(scene: Scene) -> dict[str, int]:
-    """Numbers of finite elements of flexible bodies whose recipe says one, and which may have twice as many."""
+    """Return the number of finite elements by flexible body, if a recipe has one and the limits allow twice as many."""
     counts = {body: read_toml(Path(part.mesh)).get("elements") for body, part in scene.flexible().items()}
     most = scene.limits.cells // TWICE
     return {body: n for body, n in counts.items() if isinstance(n, int) and n <= most}
 
 
 def levels(scene: Scene) -> tuple[dict[str, int], ...]:
-    """Numbers of modes that bodies with more may do with, by body, the fewest first.
+    """Return reduced numbers of modes to try, by body, the fewest first; bodies without fewer modes are absent.
 
-    Of a basis with static modes these alone, and half of the others, in pairs, as rods bend in two planes; of normal
-    modes alone half of them.
+    A basis with static modes is tried with these alone, and with half of the others, in pairs, as rods bend in two
+    planes; a basis of normal modes alone with half of them.
     """
     fewest, half = dict[str, int](), dict[str, int]()
     for name, body in scene.flexible().items():
         count, static = body.modes.count, _static(body)
         if isinstance(body.damping, RatioPerMode):
-            continue  # a ratio for each mode fits one number of modes only
+            continue  # one damping ratio per mode fits one number of modes only
         if static and not (isinstance(count, int) and count <= static):
             fewest[name] = static
         if isinstance(count, int) and static is not None and count - static >= LEAST_HALVED:
@@ -91,7 +91,7 @@ def levels(scene: Scene) -> tuple[dict[str, int], ...]:
 
 
 def _static(body: FlexibleBody) -> int | None:
-    """How many static modes its basis has; None where that is not known beforehand."""
+    """Return the number of static modes in a body's basis; None where it is not known beforehand."""
     if body.modes.reference in NORMAL:
         return 0
     if body.modes.reference != WITH_STATIC:
@@ -101,7 +101,7 @@ def _static(body: FlexibleBody) -> int | None:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``plan.nc`` with all decisions, the table of them and the chart; inputs are bundles, as of `task`."""
+    """Return ``plan.nc`` with all decisions, its table and its chart; inputs are bundles, as in `task`."""
     from flexclear.pipeline.post.answers import plan as shown
     from flexclear.pipeline.post.answers.effect_sizes import chart
 
@@ -113,26 +113,26 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:
-    """The plan (`core.scene.plan_decisions.Plan`)."""
+    """Search the plan of the scene (`core.scene.plan_decisions.Plan`)."""
     from flexclear.pipeline.dynamics.plan.search import plan
 
     rigid = {name: data for name, data in inputs.items() if name.startswith(simulation.RIGID)}
-    fewer = less(inputs)
+    fewer = fewer_modes(inputs)
 
     def filled(scene: Scene) -> Scene:
-        """With the rigid bodies that recipes describe."""
-        mine = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
-        return simulation.rebuild(simulation.params(scene), mine)
+        """Return the scene with the numbers of the rigid bodies that recipes describe."""
+        of_scene = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
+        return simulation.rebuild(simulation.params(scene), of_scene)
 
-    bodies = params["simulate"]["scene"]["body"]  # those that are rigid in the scene itself
+    bodies = params["simulate"]["scene"]["body"]  # types as in the scene itself, before any body is made rigid
     own = {name: data for name, data in rigid.items() if bodies[name.removeprefix(simulation.RIGID)]["type"] == "rigid"}
     scene = simulation.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
     meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
     return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress)
 
 
-def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
-    """Bundles of fewer modes, by level, the fewest first, and body; those that have no fewer are left out."""
+def fewer_modes(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
+    """Return the bundles of fewer modes by level, the fewest first, and body; bodies without fewer modes are absent."""
     fewer: dict[int, dict[str, xr.Dataset]] = {}
     for name, data in inputs.items():
         if name.startswith(FEWER):

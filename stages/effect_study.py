@@ -1,4 +1,4 @@
-"""Stage 8: variants of a scene -> what each effect does to each quantity, and which effects matter."""
+"""Stage 8: variants of a scene -> the effect size per quantity, and the effects that matter."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def task(
     watched: Mapping[Names, Task],
     members: int,
 ) -> Task:
-    """The task of all differences.  variants, watched: the scenes by the effects that they lack, and their tasks."""
+    """Return the task of all effect sizes. variants, watched: scenes and their tasks, by the effects that they lack."""
     params = {
         "effects": [[effect.name, effect.kind, effect.within] for effect in effects],
         "variants": [sorted(gone) for gone in watched],
@@ -47,11 +47,11 @@ def ranking(
     pairs: Mapping[str, int],
     undone: Sequence[str],
 ) -> Task:
-    """The task of the answer to which effects matter, each taken away alone.
+    """Return the task that ranks the effects, each removed alone.
 
-    words: of the effects.  variants: the scene without each effect, by its name (the full one by the empty name).
-    tasks: of these by name and number of members (`stages.watched_quantities`).  pairs: members with which each effect
-    is compared.
+    words: description of each effect. variants: the scene without each effect, by its name (the full scene by the empty
+    name). tasks: their tasks by name and number of members (`stages.watched_quantities`). pairs: number of members with
+    which each effect is compared.
     """
     params = {
         "words": dict(words),
@@ -68,7 +68,7 @@ def ranking(
 def _task(
     stage: str, scene: Scene, chosen: Sequence[Quantity], params: Mapping[str, Any], inputs: Mapping[str, Task]
 ) -> Task:
-    """stage: called as the function of this module, and its files."""
+    """Return a task of this module. stage: name of the function to call and of its files."""
     watched = {"quantities": [q.written() for q in chosen], "units": [q.unit for q in chosen]}
     return Task(
         stage=stage,
@@ -86,25 +86,25 @@ def _owners(scene: Scene) -> dict[str, list[str]]:
 
 
 def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of
+    """Assemble ``effects.nc``, its table and its chart. params: see `task`. inputs: ``variant<k>``, as in
     `watched_quantities`."""
     from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.post.answers import effect_sizes
 
-    there = [Effect(*three) for three in params["effects"]]
+    all_effects = [Effect(*three) for three in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
     points = {
         frozenset(gone): watched(inputs[f"variant{k}"], params["owners"][k], chosen)
         for k, gone in enumerate(params["variants"])
     }
     progress(None, "comparing")
-    dataset = effect_sizes.assemble(there, chosen, points, params["members"], params["units"])
+    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
     return result | effect_sizes.chart("effects", dataset, f"What each effect does: {params['title']}")
 
 
 def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``matters.nc``, its table and its chart.  params: see `ranking`.  inputs: ``<effect>:<members>``."""
+    """Assemble ``matters.nc``, its table and its chart. params: see `ranking`. inputs: ``<effect>:<members>``."""
     from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.post.answers import effect_sizes, matters
 

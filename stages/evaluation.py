@@ -1,4 +1,4 @@
-"""Stages 5 to 8: what is drawn and judged of runs: a verdict on sections, general figures, comparisons, stability."""
+"""Stages 5 to 8: drawings and judgements of runs: verdict on sections, general figures, comparisons, stability."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flexclear.pipeline.post.plotting.table import files
 
 
 def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Verdict (schema VERDICT) and its figure; the input is ``sections``, and `params` names their scene."""
+    """Classify the motion (schema VERDICT) and draw its figure; the input is ``sections``, `params` names its scene."""
     from flexclear.pipeline.post.sections import verdict_page
     from flexclear.pipeline.post.sections.verdict import derive
 
@@ -26,16 +26,16 @@ def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
 
 def overview(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """PNG and SVG by file name; inputs are ``run`` and ``post``, and `params` says what is `watched`."""
+    """Draw the general figures (PNG and SVG by file name) of ``run`` and ``post``; params: `watched` quantities."""
     progress(None, "figures")
     return dict(figures.make(inputs["run"], [Quantity.read(data) for data in params["watched"]], inputs["post"]))
 
 
 def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``compare.nc``, its tables and its figures.
+    """Assemble ``compare.nc``, its tables and its figures.
 
-    params: `labels` of the runs, the reference first; `quantities` (owner, kind).  inputs: ``run<k>``, and ``tight<k>``
-    where there is one.
+    params: `labels` of the runs, the reference first; `quantities` (owner, kind). inputs: ``run<k>``, and optionally
+    ``tight<k>``.
     """
     runs = {label: inputs[f"run{k}"] for k, label in enumerate(params["labels"])}
     tighter = {label: inputs[f"tight{k}"] for k, label in enumerate(params["labels"]) if f"tight{k}" in inputs}
@@ -49,10 +49,10 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
 
 
 def stability(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``stability.nc`` (value, limit, verdict, remedy over `check`; the answer as an attribute) and a figure.
+    """Assemble ``stability.nc`` (value, limit, verdict, remedy over `check`; attribute `answer`) and its figure.
 
-    params: `by_need`, whether the program chose the integrator.
-    inputs: ``run``, ``study`` where there is one, and ``post`` where the scene has an ensemble.
+    params: `by_need`, True when the program chose the integrator. inputs: ``run``, and where they exist ``study`` and,
+    for a scene with an ensemble, ``post``.
     """
     members = float(inputs["post"]["ensemble_horizon"]) if "post" in inputs else None
     result = checked.checks(inputs["run"], inputs.get("study"), members, by_need=params["by_need"])

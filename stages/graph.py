@@ -1,4 +1,4 @@
-"""From a scene to its tasks: which artifact is made by which stage from which others."""
+"""Tasks of a scene: the artifact that each stage produces, and the artifacts that it reads."""
 
 from __future__ import annotations
 
@@ -24,29 +24,27 @@ from flexclear.stages import (
     simulation,
 )
 
-#: stages in order, as `--to` names them
+#: stages in order, by the names that `--to` takes
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
-#: artifacts as figures refer to them, ``<scene>:<artifact>[/<body>]``, and the stage that makes each
+#: stage that produces each artifact, by the name in references ``<scene>:<artifact>[/<body>]`` of figures
 ARTIFACTS = {name: name for name in (*STAGES, "sections", "verdict", "tight")}
 ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
-#: how much tighter the tolerance of `tight` is, and how many times more elements `fine-modes` has
+#: factor of `tight` on the tolerance, factor of `fine-modes` on the number of elements
 TIGHTER, FINER = 1e-2, 4
-#: the tightest tolerance that makes a difference: beyond, rounding does
+#: tightest useful tolerance: below it, rounding dominates the error
 TIGHTEST = 1e-13
-#: a comparison run may take so many times the evaluations of the run that it is compared with, and at least so many
+#: evaluations allowed to a comparison run: a multiple of those of the compared run, and at least the second number
 TIGHTER_EVALUATIONS, FEWEST_EVALUATIONS = 4, 100_000
 
 
 @dataclass(frozen=True)
 class Graph:
-    """All tasks of one scene; each is built when it is first asked for.
+    """All tasks of one scene; each is built at its first use.
 
-    A scene without flexible bodies has no mesh, modes and bundle; one without an ensemble has no
-    such task. Raises InputError for names that no family lists and recipes that cannot be read.
-
-    shown: whether the artifacts are shown below results/runs; an edited copy of a scene
-    must not take that of its original.
-    recipe: edits of all mesh recipes: `theory`, and a factor for the number of `elements`.
+    A scene without flexible bodies has no tasks `mesh`, `modes` and `bundle`; one without an ensemble has no task
+    `ensemble`. Raises InputError for names that no family lists and for recipes that cannot be read. shown: whether
+    artifacts are shown below results/runs; an edited copy of a scene must not replace those of its original. recipe:
+    edits of all mesh recipes: `theory`, and a factor for the number of `elements`.
     """
 
     scene: Scene
@@ -55,7 +53,7 @@ class Graph:
 
     @cached_property
     def mesh(self) -> dict[str, Task]:
-        """By body with a recipe."""
+        """Meshing tasks of the bodies with a recipe, by body."""
         recipes = {body: Path(recipe) for body, recipe in self.scene.recipes().items()}
         for recipe in recipes.values():
             meshing.check_size(recipe, self.scene.limits, self.recipe)
@@ -74,7 +72,7 @@ class Graph:
 
     @cached_property
     def modes(self) -> dict[str, Task]:
-        """By flexible body."""
+        """Modal analyses of the flexible bodies, by body."""
         where = self.scene.path or self.scene.name
         return {
             body: self._task(
@@ -90,7 +88,7 @@ class Graph:
 
     @cached_property
     def bundle(self) -> dict[str, Task]:
-        """By flexible body."""
+        """Reductions of the flexible bodies, by body."""
         kinds = {body: meshing.kind_of(Path(part.mesh)) for body, part in self.scene.flexible().items()}
         return {
             body: self._task(
@@ -106,7 +104,7 @@ class Graph:
 
     @cached_property
     def rigid(self) -> dict[str, Task]:
-        """By rigid body with a recipe."""
+        """Tasks for mass and inertia of the rigid bodies with a recipe, by body."""
         return {
             body: self._task(
                 "rigid",
@@ -121,12 +119,12 @@ class Graph:
 
     @cached_property
     def simulate(self) -> Task:
-        """One run; shown as ``run.nc``."""
+        """Task of one run; shown as ``run.nc``."""
         return self._simulation("simulate", simulation.params(self.scene), "run")
 
     @cached_property
     def ensemble(self) -> Task | None:
-        """Members of the ensemble, if the scene asks for one."""
+        """Task of the ensemble; None when the scene requests none."""
         if self.scene.ensemble is None:
             return None
         require_scatter(self.scene, "[ensemble]")
@@ -134,12 +132,12 @@ class Graph:
 
     @cached_property
     def sections(self) -> Task:
-        """The motion sampled once in each period of its laws; shown as ``sections.nc``."""
+        """Task that samples the motion once in each period of its laws; shown as ``sections.nc``."""
         params = simulation.params(self.scene, sections=True, without=("output", "accuracy"))
         return self._simulation("sections", params)
 
     def sensitivities(self, of: Sequence[str], to: Sequence[str]) -> Task:
-        """Derivatives of quantities by numbers of the scene, up to the horizon of its run."""
+        """Return the task that differentiates quantities `of` by numbers `to`, up to the horizon of the run."""
         params = {**simulation.params(self.scene), "of": list(of), "to": list(to)}
         task = self._simulation("sensitivities", params)
         run = {"run": self.simulate} if self.scene.contacts() or self.scene.stop else {}
@@ -147,26 +145,26 @@ class Graph:
 
     @cached_property
     def verdict(self) -> Task:
-        """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""
-        # the figure is headed by the name, which is a fact for once
+        """Task that classifies the sections (periodic, quasi-periodic, chaotic); shown as ``verdict.nc``."""
+        # the name of the scene is in the figure's title, so the key must depend on it here
         params = {"scene": self.scene.name}
         return self._task("verdict", "evaluation:verdict", params, {"sections": self.sections}, shown="verdict")
 
     @cached_property
     def post(self) -> Task:
-        """What is derived from the run."""
+        """Task of the series derived from the run."""
         inputs = {"run": self.simulate} | ({"ensemble": self.ensemble} if self.ensemble else {})
         return self._task("post", "derived_series:run", derived_series.params(self.scene), inputs, shown="post")
 
     @cached_property
     def render(self) -> dict[str, Task]:
-        """Picture, film and page of the motion, and the page of the modes; by what is shown and how."""
+        """Picture, film and page of the motion, and the page of the modes, by subject and format."""
         pairs = [("motion", "png"), ("motion", "mp4"), ("motion", "html")]
         pairs += [("modes", "html")] if self.scene.flexible() else []
         return {f"{what} {kind}": self.picture(what, kind) for what, kind in pairs}
 
     def picture(self, what: str, kind: str, time: float | None = None) -> Task:
-        """One of what `rendering.FORMATS` lists; `time`: of vibrations, as of `linear`."""
+        """Return the task of one subject and format of `rendering.FORMATS`; `time`: of vibrations, as in `linear`."""
         inputs = {f"bundle/{body}": task for body, task in self.bundle.items()}
         if what == "vibrations":
             inputs["linear"] = self.linear(time)
@@ -186,9 +184,9 @@ class Graph:
         speeds: Sequence[float] | None = None,
         drive: str | None = None,
     ) -> Task:
-        """Equilibrium in one pose; with its natural vibrations shown as ``linear.nc``, else as ``equilibrium.nc``.
+        """Return the task of the equilibrium in one pose (``equilibrium.nc``), or with vibrations (``linear.nc``).
 
-        speeds: of a drive; vibrations about steady motion at each of them, shown as ``campbell.nc``.
+        speeds: of a drive; vibrations about the steady motion at each of them, shown as ``campbell.nc``.
         """
         pose = {"time": time, "drives": dict(drives or {}), "moving": moving, "vibrations": vibrations}
         stage, params = "linear" if vibrations else "equilibrium", simulation.params(self.scene, without=("output",))
@@ -197,17 +195,17 @@ class Graph:
         return self._simulation(stage, {**params, "pose": pose}, function="linear")
 
     def up_to(self, stage: str) -> list[Task]:
-        """All tasks of the scene up to a stage, that stage included."""
+        """Return all tasks of the scene up to and including a stage."""
         requested = STAGES[: STAGES.index(stage) + 1]
         return [task for name in requested for task in self.of(name).values()]
 
     def of(self, stage: str) -> dict[str, Task]:
-        """Tasks of one stage by body; by the empty name where there is one for the whole scene."""
+        """Return the tasks of one stage by body; a task of the whole scene has the empty name."""
         tasks = getattr(self, stage)
         return tasks if isinstance(tasks, dict) else {"": tasks} if tasks is not None else {}
 
     def artifact(self, reference: str) -> Task:
-        """The task behind ``run``, ``post``, ``modes/rod1`` ...; InputError when there is none."""
+        """Return the task of ``run``, ``post``, ``modes/rod1`` ...; raise InputError for an unknown reference."""
         name, _, body = reference.partition("/")
         where = f"{self.scene.name}:{reference}"
         if name not in ARTIFACTS:
@@ -220,11 +218,11 @@ class Graph:
 
     @cached_property
     def tight(self) -> Task:
-        """The same run at a tighter tolerance, or of half the step where steps are fixed, to determine its error."""
+        """Task of the same run at a tighter tolerance, or at half of a fixed step, which determines the run's error."""
         return self._tighter(self.scene.solver.integrator, self.scene.solver.rtol, {"accuracy": None})
 
     def tighter(self, run: Mapping[str, Any]) -> Task:
-        """`tight` for a run, given by the attributes of its dataset, with a limit of some times its evaluations."""
+        """Return task `tight` for a run with these attributes, limited to a multiple of the run's evaluations."""
         solver = self.scene.solver
         most = min(max(TIGHTER_EVALUATIONS * int(run["evaluations"]), FEWEST_EVALUATIONS), solver.evaluations)
         change = {"solver.evaluations": most, "accuracy": None}
@@ -237,18 +235,18 @@ class Graph:
         else:
             change["solver.step"] = 0.5 * solver.step
         task = Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
-        # progress and messages name it, else the scene would seem to be run twice
+        # without a name of its own in progress and messages, the scene would seem to be run twice
         how = "a tighter tolerance" if solver.step is None else "half the step"
         return replace(task, scene=f"{task.scene} at {how}")
 
     @property
     def has_tighter(self) -> bool:
-        """Whether there is a tighter tolerance that gives the error of a run."""
+        """True when a tighter tolerance or step can determine the error of a run."""
         return self.scene.solver.step is not None or self.scene.solver.rtol > 10.0 * TIGHTEST
 
     @cached_property
     def overview(self) -> Task:
-        """General figures of the run."""
+        """Task of the general figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
         watched = {"watched": [quantity.written() for quantity in self.scene.watched()]}
         task = self._task("overview", "evaluation:overview", watched, inputs)
@@ -256,22 +254,22 @@ class Graph:
 
     @cached_property
     def fine_modes(self) -> dict[str, Task]:
-        """The modes on a finer mesh, which gives the error of `modes`; by flexible body."""
+        """Modal analyses on a finer mesh, which determine the error of `modes`, by flexible body."""
         return Graph(self.scene, shown=False, recipe={**self.recipe, "elements": FINER}).modes
 
     def bodies(self) -> dict[str, Task]:
-        """The tasks of bodies that runs need, as these call them: ``bundle/<body>``, ``rigid/<body>``."""
+        """Return the tasks of the bodies that runs need, by name of the input: ``bundle/<body>``, ``rigid/<body>``."""
         return {f"bundle/{body}": task for body, task in self.bundle.items()} | {
             f"{simulation.RIGID}{body}": task for body, task in self.rigid.items()
         }
 
     def _simulation(self, stage: str, params: Mapping[str, Any], shown: str = "", function: str = "") -> Task:
-        """A task of `stages.simulation`, or of `stages.analyses`; function, shown: where they are not called as it."""
-        alone = shown == "run"
-        run = "simulation:run" if alone else f"analyses:{function or stage}"
-        modules = simulation.modules(self.scene, alone=alone)
+        """Return a task of `simulation` or `analyses`; function, shown: names that differ from the stage's."""
+        single_run = shown == "run"
+        run = "simulation:run" if single_run else f"analyses:{function or stage}"
+        modules = simulation.modules(self.scene, alone=single_run)
         task = self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
-        return replace(task, met=simulation.met(self.scene)) if alone else task
+        return replace(task, met=simulation.met(self.scene)) if single_run else task
 
     def _folder(self, below: str = "") -> str:
         return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""
@@ -289,9 +287,9 @@ class Graph:
         context: Mapping[str, Any] | None = None,
         files: Mapping[str, Path] | None = None,
     ) -> Task:
-        """run: ``module:function`` of `stages`.  part: of a body, which then has its files in a folder of the stage.
+        """Return a task. run: ``module:function`` of `stages`. part: body with its files in a folder of the stage.
 
-        shown: name of the dataset, without its ending, where it is not the store's.
+        shown: name of the dataset, without its ending, where it differs from the store's.
         """
         names = {"nc": f"{part}.nc", "vtu": f"{part}.vtu"} if part else {"nc": f"{shown}.nc"} if shown else {}
         of_scene = {} if part else {"name": self.scene.name, "limits": self.scene.limits.written()}

@@ -1,4 +1,4 @@
-"""Kernels compiled ahead, side by side, of runs that are measured one at a time."""
+"""Kernels compiled ahead, concurrently, for runs that are measured one at a time."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
-    """Compiles what a scene and all that `shared` equates with it run on.
+    """Return the task that compiles the kernels of a scene and of all scenes with equal `shared`.
 
-    bundles: tasks by the names that the simulate stage knows them by.
+    bundles: tasks by the names of the simulate stage's inputs.
     """
     return Task(
         stage="kernels",
@@ -36,8 +36,8 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
 
 
 def shared(scene: Scene) -> tuple[str, ...]:
-    """Equal for scenes that run on the same kernels: numbers are not compiled, and code for one wiring is left to
-    the runs, a second of the processor each."""
+    """Return a tuple that is equal for scenes that run on the same kernels: numbers are not compiled, and code
+    specialised for one topology is left to the runs, a second of processor time each."""
     from flexclear.pipeline.dynamics.effects import RUNS
     from flexclear.pipeline.dynamics.run import NAMES
 
@@ -46,9 +46,9 @@ def shared(scene: Scene) -> tuple[str, ...]:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Compile, unless it is on disk already; the attribute `compile_seconds` is the processor time that it took.
+    """Compile the kernels unless they are on disk; the attribute `compile_seconds` is the processor time spent [s].
 
-    params: `simulate`, as of the simulate stage.  inputs: bundles.
+    params: `simulate`, the parameters of the simulate stage. inputs: bundles.
     """
     import xarray as xr
 
@@ -58,12 +58,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def processor_time() -> float:
-    """Return the processor time of this process and of the ended ones that it started [s], which may compile, too."""
+    """Return the processor time [s] of this process and of its ended child processes, which may compile, too."""
     return sum(os.times()[:4])
 
 
 def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> Engine:
-    """Compile or fetch what a run calls and call it, so that no measurement contains it; the engine."""
+    """Compile or fetch what a run calls and call it, so that no measurement contains it; return the engine."""
     from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
     from flexclear.pipeline.dynamics.run.run import engine_of
 

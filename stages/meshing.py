@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.system.progress import Progress
 
 KINDS = "flexclear.pipeline.structure.kinds"
-#: what kinds of bodies call a recipe, whose file they do not know
+#: place in errors of the kinds of bodies, which do not know the recipe's file
 PLACE = "mesh recipe"
 #: keys of a recipe's shape that name files
 FILES = ("file", "stiffness", "mass", "unknowns")
 
 
 def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The recipe's content; its name and folder do not matter, nor do its sources, which `sources` returns.
+    """Return the recipe's content, without its name, its folder, and its sources (see `sources`).
 
-    Raises InputError when it cannot be read, or a source is no text.
-    edits: values that replace the recipe's; of `elements` a factor, which recipes without them go without.
+    Raises InputError when the recipe cannot be read, or a source is not text. edits: values that replace the recipe's;
+    for `elements` a factor, without effect on recipes that have none.
     """
     table = read_toml(recipe)
     require_kind(table, recipe, RECIPE)
@@ -47,7 +47,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
 
 
 def sources(recipe: Path, where: str = "") -> dict[str, str]:
-    """Where the values of a recipe come from: path of the part or value -> text; InputError for what is no text."""
+    """Return the provenance of a recipe's values: key path -> text; raise InputError for a source that is not text."""
     table = read_toml(recipe)
     wrong = provenance.mistaken(table)
     if wrong is not None:
@@ -57,35 +57,35 @@ def sources(recipe: Path, where: str = "") -> dict[str, str]:
 
 
 def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:
-    """ResourceError when the mesh would have more cells than it may; files are judged when they are read."""
+    """Raise ResourceError when a mesh would have too many cells; meshes in files are checked on reading."""
     table = params(recipe, edits)["recipe"]
     check_cells(table.get("shape"), table.get("elements"), limits, recipe)
 
 
 def modules(recipe: Path) -> tuple[str, ...]:
-    """Module of the kind of body that a recipe describes."""
+    """Return the module of the kind of body that a recipe describes."""
     return (module_of(KINDS, kind_of(recipe), where=str(recipe)),)
 
 
 def kind_of(recipe: Path) -> str:
-    """Name of the kind of body that a recipe describes."""
+    """Return the name of the kind of body that a recipe describes."""
     return str(import_module(KINDS).name_of(read_toml(recipe)))
 
 
 def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:
-    """The files that a recipe names, and those that their formats read with them, by their paths from the recipe."""
+    """Return the files that a recipe names, and those read with them, by their paths relative to the recipe."""
     opened = [file for path in named(table, folder) for file in (path, *companions(path))]
     return {_relative(path, folder): path for path in opened}
 
 
 def named(table: Mapping[str, Any], folder: Path) -> list[Path]:
-    """The files that a recipe names itself."""
+    """Return the paths of the files that a recipe itself names."""
     shape = table.get("shape")
     return [folder / str(shape[key]) for key in FILES if key in shape] if isinstance(shape, Mapping) else []
 
 
 def _relative(path: Path, folder: Path) -> str:
-    """A path from a folder; on another drive there is no way from there."""
+    """Return a path relative to a folder; on another drive, where no relative path exists, the path as it is."""
     try:
         return os.path.relpath(path, folder)
     except ValueError:
@@ -93,14 +93,14 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def in_recipe(error: InputError, path: Path) -> InputError:
-    """The error of a mesh with the file of its recipe instead of the word for it."""
+    """Return the error of a mesh with the recipe's file in place of the words "mesh recipe"."""
     return InputError(error.place.replace(PLACE, str(path), 1), error.problem, error.remedy)
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The mesh (schema MESH or SOLID) as ``nc``, and for other programs as ``vtu``.
+    """Build the mesh (schema MESH or SOLID) as ``nc``, and for other programs as ``vtu``.
 
-    params: besides the recipe its file, and its folder, which the files that it names are relative to.
+    params: the recipe; its file; its folder, to which the paths of the files in it are relative.
     """
     from flexclear.pipeline.structure.kinds import kind
 

@@ -19,18 +19,18 @@ CONDITIONS = "flexclear.pipeline.structure.modes.reference"
 
 
 def params(body: FlexibleBody) -> dict[str, Any]:
-    """The selected coordinates; nothing else of the body."""
+    """Return the selected modal coordinates; nothing else of the body decides its modes."""
     return body.modes.model_dump(mode="json", exclude={"source"}, exclude_none=True)
 
 
 def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
-    """Modules of the reference conditions and of the kind of body; InputError when there is none of that name."""
+    """Return the modules of the reference conditions and of the kind of body; raise InputError for an unknown name."""
     names = [body.modes.reference, *([body.modes.of] if body.modes.of else [])]
     return (*(module_of(CONDITIONS, name, where=where) for name in names), *meshing.modules(Path(body.mesh)))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
+    """Compute the modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
     from flexclear.pipeline.structure.fe.vtu import of_modes
     from flexclear.pipeline.structure.modes.basis import ModeRequest
     from flexclear.pipeline.structure.modes.solution import solve

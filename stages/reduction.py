@@ -1,4 +1,4 @@
-"""Stage 3: mesh and modes -> the reduced modal bundle, all that the dynamics needs of the body."""
+"""Stage 3: mesh and modes -> the reduced modal bundle, which contains all that the dynamics needs of the body."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ WHERE = "[output] stress"
 
 
 def params(scene: Scene, body: str) -> dict[str, Any]:
-    """Whether and where stresses are to be recovered, and whether bending shortens the body; what is asked for only."""
-    asked: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
+    """Return whether and where stresses, and whether shortening by bending, are requested; else no entry."""
+    requested: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
     if gauges := scene.output.on(body):
-        asked["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
-    return asked | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
+        requested["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
+    return requested | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
 
 
 def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
-    """Module that recovers stresses of this kind of body; InputError when there is none."""
-    asked = params(scene, body)
-    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in asked else ()
-    return (*stress, *((SHORTENING,) if "stiffening" in asked else ()))
+    """Return the modules for the requested stresses and shortening; raise InputError when there is none."""
+    requested = params(scene, body)
+    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in requested else ()
+    return (*stress, *((SHORTENING,) if "stiffening" in requested else ()))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The bundle (schema BUNDLE)."""
+    """Reduce the body to a bundle (schema BUNDLE)."""
     from flexclear.pipeline.structure.modes import bundle
 
     progress(None, "inertia integrals")

@@ -1,4 +1,4 @@
-"""Stage 6: a run, its reduced bodies or its vibrations -> pictures, films, pages to turn, files for other programs."""
+"""Stage 6: run, reduced bodies or vibrations -> pictures, films, interactive pages, files for other programs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
 
-#: what can be shown, as what; repeated here, because asking the modules that draw takes their import
+#: subjects and their formats; repeated here, because the modules that draw take long to import
 FORMATS: dict[str, tuple[str, ...]] = {
     "motion": ("png", "gif", "mp4", "html", "gltf", "pvd"),
     "stress": ("png", "gif", "mp4", "html"),
@@ -28,14 +28,14 @@ FORMATS: dict[str, tuple[str, ...]] = {
     "joint": ("png", "gif", "mp4", "html"),
     "vibrations": ("png", "gif", "mp4", "html"),
 }
-#: films of what have curves next to them
+#: subjects whose films show curves next to them
 FILMED = ("motion", "stress")
 
 
 def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
-    """What is shown and how: what the scene says of its pictures, what is watched, the GL libraries where they matter.
+    """Return subject, format, the scene's view, the watched parts, and the GL libraries where pictures depend on them.
 
-    Raises InputError for files of shapes that are not there.
+    Raises InputError for missing files of shapes.
     """
     values: dict[str, Any] = {"what": what, "format": kind}
     if what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4"):
@@ -45,8 +45,8 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     if what != "modes":
         values["bodies"] = _looks(scene)
     if scene.view is not None and what != "modes":
-        asked = scene.view.model_dump(mode="json", exclude={"watch", "source"}, exclude_none=True)
-        values |= {"view": asked} if asked else {}
+        view = scene.view.model_dump(mode="json", exclude={"watch", "source"}, exclude_none=True)
+        values |= {"view": view} if view else {}
     if (what == "joint" and kind in ("png", "html")) or (what in FILMED and kind in ("gif", "mp4")):
         terms = [term for quantity in scene.watched() for term in quantity.terms()]
         values["watched"] = list(dict.fromkeys(term.owner for term in terms if term.owner))
@@ -56,7 +56,7 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
 
 
 def _looks(scene: Scene) -> dict[str, Any]:
-    """Shapes and colours of bodies, where the scene gives some; files by their names, since their content counts."""
+    """Return shapes and colours of bodies that have some; files by name, since the key contains their content."""
     looks = {}
     for name, body in scene.body.items():
         look = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
@@ -73,14 +73,14 @@ def _looks(scene: Scene) -> dict[str, Any]:
 
 
 def files(scene: Scene, what: str) -> dict[str, Path]:
-    """The files of shapes that are shown, with those that their formats read with them, by their paths."""
+    """Return the files of the shapes shown, and those that their formats read with them, by path."""
     looks = _looks(scene).values() if what != "modes" else ()
     named = [Path(shape["file"]) for look in looks for shape in look.get("geometry", ()) if shape["type"] == "file"]
     return {str(file): file for path in named for file in (path, *companions(path))}
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Files by name; inputs are ``run`` or ``linear``, and ``bundle/<body>``."""
+    """Draw the files, by name; inputs are ``run`` or ``linear``, and ``bundle/<body>``."""
     from flexclear.pipeline.post.render.mechanism import Looks
     from flexclear.pipeline.post.render.pictures import Shown, make
 

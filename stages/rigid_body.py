@@ -1,4 +1,4 @@
-"""Next to stage 3: mesh -> mass, inertia and frames of the body as a rigid one."""
+"""Next to stage 3: mesh -> mass, inertia and frames of the body taken as rigid."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The rigid body (schema RIGID)."""
+    """Compute the rigid body (schema RIGID)."""
     from flexclear.pipeline.structure.modes import bundle
 
     progress(None, "mass and inertia")

@@ -1,4 +1,4 @@
-"""Stage 4: scene and bundles -> a run; `stages.analyses` makes what is next to it."""
+"""Stage 4: scene and bundles -> a run; `stages.analyses` contains the other analyses of a scene."""
 
 from __future__ import annotations
 
@@ -24,33 +24,33 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
 
-#: of one kind: datasets or labelled arrays
+#: either datasets or labelled arrays
 Data = TypeVar("Data")
-#: limits of a scene that is made again without its own: what it asks for was judged when it was read
-JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
+#: limits of a scene rebuilt without its own: its requests were checked when the scene was read
+UNLIMITED = {"rows": sys.maxsize, "members": sys.maxsize}
 
-#: bytes of a row of a run, fitted to runs of 1 to 24 bodies: always, of a body, joint, contact, load, coordinate
+#: bytes of a row of a run, fitted to runs of 1 to 24 bodies: constant, per body, joint, contact, load, modal coordinate
 ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
-#: a run is in memory so many times at its end, measured 3.5 to 4.4; and on disk, in the cache and shown
+#: copies of a run in memory at its end, measured 3.5 to 4.4; copies on disk, in the cache and shown
 TIMES_IN_MEMORY, TIMES_ON_DISK = 4.5, 2.0
-#: of a member of an ensemble only some bodies' motion is recorded, at most as often as this
+#: largest number of rows recorded of an ensemble member, which holds only some bodies' motion
 MEMBER_ROWS = 2000
-#: how inputs are called that hold rigid bodies of recipes, before the body's name
+#: prefix of the inputs that hold rigid bodies of recipes; the body's name follows
 RIGID = "rigid/"
-#: how well a mesh determines where its frames are, as a fraction of their distance: the middle of a hole is the mean of
-#: its nodes, and with sixteen of them around, a chord leaves the circle by two percent of a radius of a twentieth of it
-LEFT_BY_MESHES = 1e-3
-SPEND = "choose a longer output.interval, or say more in [limits]"
+#: error of the frame positions from a mesh, as a fraction of their distance: the centre of a hole is the mean of its
+#: nodes; with sixteen around a hole of a twentieth of that distance, a chord is off the circle by 2 % of the radius
+FRAME_ERROR = 1e-3
+REMEDY = "choose a longer output.interval, or say more in [limits]"
 
 
 def params(
     scene: Scene, *, ensemble: bool = False, sections: bool = False, without: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, views, shapes, limits, sources, and paths of files are not
-    part of it, nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run,
-    nor whether that may be missed.
+    """Return the part of a scene that the engine sees. It excludes titles, views, shapes, limits, sources and paths of
+    files. A single run excludes ensemble and sections; an ensemble excludes the accuracy of a single run, and a run
+    excludes whether that accuracy may be missed.
 
-    without: further settings that what is computed does not depend on.
+    without: further settings that the result does not depend on.
     """
     unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble", *without)
     left_out: dict[str, Any] = dict.fromkeys(unseen, True)
@@ -61,14 +61,14 @@ def params(
         left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.recipes():
-        table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
+        table["body"][body]["mesh"] = ""  # the reduced body comes as an input, whose digest is in the key
     return {"scene": provenance.without(table)}
 
 
 @given_arrays
 def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Progress) -> dict[str, Any]:
-    """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is reported, and
-    kept."""
+    """Run the scene once (schema RUN); inputs are ``bundle/<body>``. Compliance that bundles lack where joints use it
+    is reported, and stored as a warning."""
     scene, reduced = rebuild(params, inputs), bundles(inputs)
     check_run(scene, results_root())
     lacks = missing_compliance(scene, reduced)
@@ -81,12 +81,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Pro
 
 
 def check_run(scene: Scene, results: Path) -> None:
-    """ResourceError when a run or an ensemble of the scene would need more memory or disk than it may."""
+    """Raise ResourceError when a run or an ensemble would need more memory or disk than the limits allow."""
     rows = (scene.time.end - scene.time.start) / scene.output.interval + 1.0
     need = rows * row(scene)
     what = f"a run of {rows:.3g} rows"
-    machine.require_memory(TIMES_IN_MEMORY * need, what, SPEND, scene.limits.memory)
-    machine.require_disk(TIMES_ON_DISK * need, what, results, SPEND, scene.limits.disk)
+    machine.require_memory(TIMES_IN_MEMORY * need, what, REMEDY, scene.limits.memory)
+    machine.require_disk(TIMES_ON_DISK * need, what, results, REMEDY, scene.limits.disk)
     if scene.ensemble is not None:
         n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
         need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
@@ -103,7 +103,7 @@ def check_run(scene: Scene, results: Path) -> None:
 
 
 def row(scene: Scene) -> int:
-    """Bytes of a row of the scene's run, about."""
+    """Return the estimated size of a row of the scene's run [bytes]."""
     modes = sum(b.modes.count if isinstance(b.modes.count, int) else 30 for b in scene.flexible().values())
     counts = (len(scene.owners()["body"]), len(scene.joint), len(scene.owners()["contact"]), len(scene.forces()), modes)
     each = (BODY, JOINT, CONTACT, LOAD, MODE)
@@ -111,7 +111,7 @@ def row(scene: Scene) -> int:
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[str]:
-    """Sentences about flexible bodies whose modes lack static compliance between the frames that joints use."""
+    """Return warnings on flexible bodies whose modes lack static compliance between the frames that joints use."""
     if not reduced:
         return []
     from flexclear.pipeline.core.artifacts import deficits
@@ -127,18 +127,18 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[st
 
 @contextmanager
 def in_time(scene: Scene) -> Iterator[None]:
-    """Meanwhile work is to stop when the time is over that the scene allows."""
+    """Stop the work inside this context when the scene's time limit is over."""
     with stopping.until(scene.limits.time, scene.limits.time_words):
         yield
 
 
 def bundles(inputs: Mapping[str, Data]) -> dict[str, Data]:
-    """The inputs called ``bundle/<body>``, by body."""
+    """Return the inputs named ``bundle/<body>``, by body."""
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 
 
 def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = None) -> Scene:
-    """The scene again, from `params`; its title is its name, where that is reported.
+    """Rebuild the scene from `params`; its title is its name.
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
     """
@@ -146,14 +146,14 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = N
 
     table, name = params["scene"], str(params.get("name", "scene"))
     body = filled(table["body"], inputs or {})
-    mine = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
-    scene = Scene.model_validate({**table, **mine})
+    own = {"body": body, "title": name, "limits": params.get("limits", UNLIMITED)}
+    scene = Scene.model_validate({**table, **own})
     scene._name = name
     return scene
 
 
 def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[str, Any]:
-    """The table of bodies with the numbers of those that inputs ``rigid/<body>`` describe instead of their recipes."""
+    """Return the table of bodies with numbers from the inputs ``rigid/<body>`` instead of recipes."""
     import numpy as np
 
     from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
@@ -175,7 +175,7 @@ def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[st
             "com": data["com"].values.tolist(),
             "inertia": data["inertia"].values.tolist(),
             "frames": frames,
-            "frame_tolerance": LEFT_BY_MESHES * float(np.ptp(data["frame_position"].values, axis=0).max()),
+            "frame_tolerance": FRAME_ERROR * float(np.ptp(data["frame_position"].values, axis=0).max()),
         }
         result[body] = {key: value for key, value in bodies[body].items() if key != "mesh"} | numbers
     return result

@@ -1,4 +1,4 @@
-"""Next to stage 4: a variant of a scene -> what is watched of it, over members where it has contacts."""
+"""Next to stage 4: a variant of a scene -> its watched quantities, over ensemble members where it has contacts."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
 
-#: settings of a scene that a watched run does not look at
+#: settings of a scene that a watched run ignores
 UNSEEN = ("accuracy", "ensemble", "sections", "view")
-#: starts of a variant with contacts
+#: number of members of a variant with contacts
 MEMBERS = 4
 
 
 def plain(scene: Scene) -> Scene:
-    """The scene without what asks for more than one run of it."""
+    """Return the scene without the settings that request more than one run."""
     return edited(scene, dict.fromkeys(UNSEEN)) if any(getattr(scene, key) for key in UNSEEN) else scene
 
 
 def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
-    """The task of a variant; its artifact holds one point, see `points.unpacked`."""
+    """Return the task of a variant; its artifact holds one point, see `points.unpacked`."""
     variant = plain(scene)
     graph = Graph(variant, shown=False)
     return Task(
@@ -50,14 +50,14 @@ def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
 
 
 def _members(scene: Scene, members: int) -> int:
-    """Members of a scene with contacts; a motion without any needs none."""
+    """Return the number of members: 0 for a scene without contacts and stops, whose motion needs no ensemble."""
     return members if scene.contacts() or scene.stop else 0
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """One point as a dataset; refusals of the solver are in it, since they, too, say what an effect does.
+    """Return one point as a dataset, refusals of the solver included, since they, too, show an effect.
 
-    Its attributes `compile_seconds` and `cpu_seconds` are the processor time of the kernels and of the runs.
+    Its attributes `compile_seconds` and `cpu_seconds` are the processor time of the kernels and of the runs [s].
     """
     from flexclear.pipeline.core.artifacts.effect_size import recorded
     from flexclear.pipeline.core.artifacts.points import batch
@@ -75,7 +75,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
-    """The run of a scene, in this process; `members` as given by the caller, none where there is no contact."""
+    """Run a scene in this process and return its point; without contacts `members` is ignored."""
     from flexclear.pipeline.core.artifacts.effect_size import recorded
     from flexclear.pipeline.dynamics.record.point import Runner
 

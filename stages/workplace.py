@@ -1,7 +1,7 @@
-"""Where commands work: arguments that all of them take, the store, the sources, whom it reports to; bringing tasks up
-to date.
+"""The context of commands: common arguments, store, sources, monitor of progress; and bringing tasks up to date.
 
-No scene is read here, so that a command that finds all of its results as they were does not import what reads them.
+This module reads no scene, so that a command whose results are fully up to date does not import the code that reads
+scenes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from flexclear.pipeline.core.workflow.task import Task
 if TYPE_CHECKING:
     import xarray as xr
 
-#: options that mean the same on every command: how argparse adds each
+#: options with the same meaning in every command: flags and keys of argparse for each
 OPTIONS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "set": (
         ("--set",),
@@ -40,34 +40,34 @@ OPTIONS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "help": "change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
         },
     ),
-    "jobs": (("--jobs",), {"type": int, "metavar": "N", "help": "processes at most; default: one for each core"}),
+    "jobs": (("--jobs",), {"type": int, "metavar": "N", "help": "number of processes at most (default: one per core)"}),
     "limit": (
         ("--limit",),
         {
             "metavar": "TIME",
-            "help": "stop in good order after, e.g., 2h (exit code 4); what is finished is not computed again",
+            "help": "stop after this time, such as 2h, with exit code 4; finished results are stored",
         },
     ),
     "budget": (("--budget",), {"metavar": "TIME", "help": "processor time for trial runs, such as 10s, 2min or 1h"}),
     "json": (("--json",), {"action": "store_true", "help": "print the results as JSON"}),
-    "quiet": (("-q", "--quiet"), {"action": "store_true", "help": "say nothing but errors, warnings and results"}),
-    "verbose": (("-v", "--verbose"), {"action": "store_true", "help": "keep every line of progress, with times"}),
+    "quiet": (("-q", "--quiet"), {"action": "store_true", "help": "print only errors, warnings and results"}),
+    "verbose": (("-v", "--verbose"), {"action": "store_true", "help": "print every line of progress, with times"}),
 }
 
 
 def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) -> None:
-    """Add options of `OPTIONS` by name; "said" adds quiet and verbose, "usual" what all commands take that compute.
+    """Add options of `OPTIONS` by name; "said" adds quiet and verbose, "usual" those of all commands that compute.
 
-    changed: by name, keys of argparse that differ on this command, as its default.
+    changed: by name, keys of argparse that differ in this command, as its default.
     """
     for name in names:
         if name == "usual":
             add_options(parser, "set", "jobs", "limit", "said", **changed)
         elif name == "said":
-            said = parser.add_mutually_exclusive_group()
+            group = parser.add_mutually_exclusive_group()
             for option in ("quiet", "verbose"):
                 flags, keys = OPTIONS[option]
-                said.add_argument(*flags, **keys)
+                group.add_argument(*flags, **keys)
         else:
             (flags, keys), more = OPTIONS[name], changed.get(name, {})
             text = f"{keys['help']} (default {more['default']})" if "default" in more else keys["help"]
@@ -75,7 +75,7 @@ def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) ->
 
 
 def seconds(given: str | float, option: str) -> float:
-    """A time above zero [s], as a number or as ``10s`` or ``2min``; InputError for another value of an option."""
+    """Return a time above zero [s] from a number or from ``10s`` or ``2min``; raise InputError for other values."""
     try:
         spaced = re.sub(r"(?<=[0-9.])(?=[a-z])", " ", given.strip()) if isinstance(given, str) else float(given)
         result = quantity(spaced, "time")
@@ -87,13 +87,13 @@ def seconds(given: str | float, option: str) -> float:
 
 
 def relative(path: Path) -> str:
-    """A path as seen from the current folder, where it lies below it."""
+    """Return a path relative to the current folder when the path is below that folder, else the path as it is."""
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
 
 
 @dataclass(frozen=True)
 class Made:
-    """An artifact that is up to date: the task that made it, its record, and the store that holds its files."""
+    """An artifact that is up to date: the task that produced it, its record, and the store that holds its files."""
 
     task: Task
     record: Record
@@ -101,27 +101,27 @@ class Made:
 
     @property
     def folder(self) -> Path:
-        """Where its files are shown."""
+        """Folder where the artifact's files are shown."""
         return self.store.root / self.task.folder
 
     def dataset(self) -> xr.Dataset:
-        """Its main file."""
+        """Load the artifact's main file."""
         return self.store.load(self.record)
 
     def read(self, name: str) -> bytes:
-        """One of its files, from the store."""
+        """Read one of the artifact's files from the store."""
         return self.store.path(self.task.stage, self.record.key, name).read_bytes()
 
     def text(self, name: str) -> str:
-        """One of its files that are text."""
+        """Read one of the artifact's text files."""
         return self.read(name).decode()
 
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where artifacts are stored, where the source lies, and the monitor of progress.
+    """The store of artifacts, the sources, and the monitor of progress.
 
-    end: when the command is to stop, by the monotonic clock [s], and the message printed then.
+    end: time at which the command stops, by the monotonic clock [s], and the message printed then.
     """
 
     store: Store
@@ -131,27 +131,27 @@ class Workplace:
     end: tuple[float, str] = (math.inf, "")
 
     def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
-        """Bring tasks up to date, in so many processes at most; default: this workplace's, else the cores there are."""
+        """Bring tasks up to date in at most `jobs` processes; default: this workplace's, else the number of cores."""
         with self.limited():
             return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
 
     def artifacts(self, outcome: Outcome) -> dict[Task, Made]:
-        """What `bring` made, and what was up to date."""
+        """Return the artifacts that `bring` produced or that were up to date, by task."""
         return {task: Made(task, record, self.store) for task, record in outcome.records.items()}
 
     def made(self, *tasks: Task, jobs: int | None = None) -> list[Made]:
-        """Artifacts of tasks, brought up to date; FailedTasksError where one of them, or of their inputs, fails."""
+        """Bring tasks up to date and return their artifacts; raise FailedTasksError when a task or an input fails."""
         outcome = self.bring(list(tasks), jobs)
         check(outcome)
-        there = self.artifacts(outcome)
-        return [there[task] for task in tasks]
+        by_task = self.artifacts(outcome)
+        return [by_task[task] for task in tasks]
 
     def datasets(self, *tasks: Task, jobs: int | None = None) -> list[xr.Dataset]:
-        """Main files of what `made` gives."""
+        """Bring tasks up to date and return their main files."""
         return [one.dataset() for one in self.made(*tasks, jobs=jobs)]
 
     def limited(self) -> AbstractContextManager[None]:
-        """Meanwhile work is to stop when the time is over that the command was given."""
+        """Return a context that stops the work inside when the command's time limit is over."""
         end, why = self.end
         return stopping.until(None if end == math.inf else end - time.monotonic(), why)
 
@@ -165,9 +165,9 @@ class FailedTasksError(FlexclearError):
 
 
 def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
-    """The usual one, with results where `results_root` says.
+    """Return the usual workplace, with results where `results_root` places them.
 
-    options: of a command, with `jobs`, its `limit` and how much is said.
+    options: of a command, with `jobs`, `limit` and the amount of output.
     """
     if options is not None:
         set_level(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
@@ -182,6 +182,6 @@ def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
 
 
 def check(outcome: Outcome) -> None:
-    """Raise FailedTasksError when something failed."""
+    """Raise FailedTasksError when a task has failed."""
     if outcome.failures:
         raise FailedTasksError(outcome.failures)

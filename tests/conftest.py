@@ -13,6 +13,21 @@ settings.register_profile("ci", derandomize=True, deadline=None, suppress_health
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 
+#: files that take longest, the longest first: one that is begun last is run on alone
+LONGEST = (
+    *("stages/test_plan.py", "stages/test_gallery.py", "analytic/test_accuracy.py", "stages/test_page_examples.py"),
+    *("properties/test_articulated.py", "properties/test_specialised.py", "properties/test_derivative.py"),
+    *("stages/test_benchmark_families.py", "stages/test_workflow.py", "stages/test_sweep_workers.py"),
+    *("stages/test_own_scene.py", "stages/test_sweep.py", "stages/test_fingerprint.py", "stages/test_doctor.py"),
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files are given to workers in this order (`--no-loadscope-reorder`; else by their numbers of tests)."""
+    places = {ROOT / "tests" / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """Folder of the project."""

@@ -27,7 +27,7 @@ import psutil
 from benchmarks import processes
 from benchmarks.family import FINISHED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
-from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts import maintenance
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.artifacts.store import Store, read_record
 from flexclear.pipeline.core.workflow.journal import Journal
@@ -186,7 +186,7 @@ def _damage(rng: random.Random, files: list[tuple[Path, Judge]], flips: int, cut
 
 
 def _shown(store: Store) -> str:
-    return "detected" if upkeep.shown_faults(store, store.root / "runs") else "used"
+    return "detected" if maintenance.shown_faults(store, store.root / "runs") else "used"
 
 
 def _folders(place: Place) -> Counter[str]:
@@ -291,7 +291,7 @@ def _kills(place: Place, verb: str, rng: random.Random, count: int) -> Counter[s
         time.sleep(min(LATEST, seconds) * rng.random())
         process.kill()
         process.wait()
-        counts["used" if upkeep.inventory(store, whole=True).damaged else "detected"] += 1
+        counts["used" if maintenance.inventory(store, whole=True).damaged else "detected"] += 1
     ended = place.start(words, results).wait()
     left = [path for path in store.root.rglob("*") if path.suffix in (".tmp", ".lock", ".part")]
     if ended or left or _artifacts(store) != whole:
@@ -321,9 +321,8 @@ def _helpers(place: Place, verb: str, rng: random.Random, count: int, *, idle: b
         with suppress(psutil.NoSuchProcess):
             rng.choice(waiting).kill()
         said = process.communicate()[1].decode(errors="replace")
-        sound = (
-            process.returncode in SAID and "Traceback" not in said and not upkeep.inventory(store, whole=True).damaged
-        )
+        intact = not maintenance.inventory(store, whole=True).damaged
+        sound = process.returncode in SAID and "Traceback" not in said and intact
         again = place.start(words, results).wait() == 0 and _artifacts(store) == whole
         if not (sound and again):
             print(f"{verb}: {process.returncode}, then {again}: {said[-500:]}", file=sys.stderr)
@@ -350,7 +349,7 @@ def _full(place: Place) -> Counter[str]:
     for k, size in enumerate(FULL):
         code = place.start(["run", SCENE], f"full{k}", preexec_fn=processes.limit_files(size)).wait()
         store = place.store(f"full{k}")
-        damaged = upkeep.inventory(store, whole=True).damaged if store.root.is_dir() else ()
+        damaged = maintenance.inventory(store, whole=True).damaged if store.root.is_dir() else ()
         counts["used" if damaged or code not in (0, 4) else "detected" if code else "harmless"] += 1
     return counts
 
@@ -359,7 +358,7 @@ def _concurrent(place: Place) -> Counter[str]:
     """Equal commands at once, on empty results: each ends well, and together they make one complete result."""
     codes = [process.wait() for process in [place.start(["run", SCENE], "together") for _ in range(CONCURRENT)]]
     store = place.store("together")
-    sound = _artifacts(store) == _artifacts(place.store()) and not upkeep.inventory(store, whole=True).damaged
+    sound = _artifacts(store) == _artifacts(place.store()) and not maintenance.inventory(store, whole=True).damaged
     return Counter("detected" if code == 0 and sound else "used" for code in codes)
 
 

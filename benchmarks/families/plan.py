@@ -134,7 +134,7 @@ def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float
 
 def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
     """Inputs with the bundles of fewer modes where the plan takes them."""
-    by_count = [level for level in effect_plan.less(inputs) if modes and all(body in level for body in modes)]
+    by_count = [level for level in effect_plan.fewer_modes(inputs) if modes and all(body in level for body in modes)]
     chosen = next((n for n in by_count if all(n[body].sizes["mode"] == count for body, count in modes.items())), {})
     return inputs | {f"bundle/{body}": chosen[body] for body in modes}
 

@@ -18,8 +18,8 @@ from flexclear.commands.scenes import bundles
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.dynamics.compile.functions import Entry
 from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.stages.simulation import params
 from flexclear.stages.sweeps.sweep_engine import Job, engine
 from flexclear.stages.sweeps.sweep_points import Family as Points
@@ -104,7 +104,7 @@ def _runner(kind: Kind) -> Callable[[float], None]:
 @contextmanager
 def _timed_kernels() -> Iterator[list[float]]:
     """Adds up the processor time [s] of compiled functions that are called meanwhile."""
-    spent, plain = [0.0], {name: getattr(Entry, name) for name in ("evaluate", "advance", "observe")}
+    spent, plain = [0.0], {name: getattr(Engine, name) for name in ("evaluate", "advance", "observe")}
 
     def timed(function: Callable[..., None]) -> Callable[..., None]:
         def call(*given: Any) -> None:
@@ -115,12 +115,12 @@ def _timed_kernels() -> Iterator[list[float]]:
         return call
 
     for name, function in plain.items():
-        setattr(Entry, name, timed(function))
+        setattr(Engine, name, timed(function))
     try:
         yield spent
     finally:
         for name, function in plain.items():
-            setattr(Entry, name, function)
+            setattr(Engine, name, function)
 
 
 def _workers() -> Record:

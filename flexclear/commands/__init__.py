@@ -1,1 +1,1 @@
-"""The commands: a module for each verb with `arguments` and `command`."""
+"""Commands: a module for each verb with `arguments` and `command`."""

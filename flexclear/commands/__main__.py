@@ -24,48 +24,48 @@ from flexclear.pipeline.core.system.version import version
 from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
-#: new objects before Python searches for garbage: a short command makes hardly any, and spent a tenth of its time
-#: looking
+#: new objects before Python's garbage collector runs: a short command makes hardly any garbage, and spent a tenth of
+#: its time on collections
 GARBAGE = 200_000
-#: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
+#: verb -> its help. The module of the same name has `arguments(parser)` and `command(options)`
 COMMANDS = {
-    "new": "a commented scene of one's own to start from",
-    "show": "the start pose with all names, in seconds; nothing is run",
-    "check": "every mistake of scenes and recipes at once; nothing is run",
-    "run": "bring scenes up to date",
-    "why": "for each stage: fresh, or why it would run again",
-    "sweep": "many points of one scene: a dataset and a figure",
-    "cost": "what accuracy costs: errors against cost, and where they come from",
-    "render": "pictures, film and interactive page of scenes",
-    "compare": "scenes next to each other or their ideal mechanisms: differences, errors, events, costs",
-    "plan": "which effects, modes and tolerance the requested accuracy calls for",
-    "effects": "what each part does to each quantity, alone and in pairs",
-    "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
-    "frequencies": "equilibrium in a pose, and natural frequencies there",
-    "report": "the page of scenes; without scenes, all figures and tables of the paper",
-    "schema": "JSON schema of scene files",
-    "cite": "sources of the methods and data that a scene uses",
-    "completion": "completion for bash and zsh",
-    "cache": "stored results: size, check, explain, prune",
-    "doctor": "is all here that is needed, and does it compute; one file to repeat a failure",
+    "new": "write a commented scene to start from",
+    "show": "draw the start pose with all names, in seconds, without a simulation",
+    "check": "report all errors of scenes, recipes and sweeps, without a simulation",
+    "run": "simulate scenes, unless their results are up to date",
+    "why": "say for each stage whether it is up to date, or why it would run again",
+    "sweep": "vary parameters of a scene, with one dataset and a figure of all points",
+    "cost": "study error against cost, and the causes of errors",
+    "render": "make pictures, films and interactive pages of scenes",
+    "compare": "compare scenes with each other or with their ideal mechanisms",
+    "plan": "select the effects, modes and tolerance that the requested accuracy needs",
+    "effects": "measure how each part changes each quantity, alone and in pairs",
+    "sections": "classify a repeated motion as periodic, quasi-periodic or chaotic",
+    "frequencies": "compute an equilibrium and its natural frequencies",
+    "report": "write the page of scenes; without scenes, all figures and tables of the paper",
+    "schema": "print a JSON schema of scenes, recipes or sweeps",
+    "cite": "list the sources of the methods and data that a scene uses",
+    "completion": "print the completion script for bash or zsh",
+    "cache": "manage stored results: size, check, explain, prune",
+    "doctor": "check the installation by a run with a known answer; write one file that repeats a failure",
 }
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command and return its exit code; mistakes of the user are reported without a traceback."""
+    """Run the command and return its exit code; errors of the user's input are reported without a traceback."""
     plain_output()
-    own = arguments is None  # whether this process is the command's
+    own = arguments is None  # True when this process is the command's own
     if own:
         signal.signal(signal.SIGTERM, _as_interrupt)
         gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
-        # at its end Python searches for garbage in all that there is, several times: a sixth of the time of a short
-        # command, half a second where something was compiled; nobody gains by it, since the system takes all back
+        # at exit Python collects garbage several times over all objects: a sixth of the time of a short command, half a
+        # second where something was compiled. Nobody gains by that, since the system takes all memory back
         atexit.register(gc.freeze)
-    # pydantic would look through all that is installed for plugins of its own
+    # pydantic would search all installed packages for plugins of its own
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
-        if own:  # what is imported stays: neither now nor at the end is it garbage
+        if own:  # imported objects stay: they are garbage neither now nor at the end
             gc.freeze()
         with workers.reused():
             return int(options.command(options) or 0)
@@ -79,29 +79,29 @@ def main(arguments: list[str] | None = None) -> int:
         if not reader_has_gone():
             print(f"flexclear: {workers.LOST}", file=sys.stderr)
             return ResourceError.exit_code
-        # the reader (`| head`) has gone; keep the interpreter from complaining about it at exit
+        # the reader (`| head`) has closed the pipe; keep the interpreter from reporting that at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED_PIPE
-    except (OSError, MemoryError) as error:  # of the machine, and nobody knew better words for it
+    except (OSError, MemoryError) as error:  # errors of the machine that no other code described better
         print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
         return ResourceError.exit_code
 
 
 def _as_interrupt(number: int, frame: FrameType | None) -> None:
-    """Stop as Ctrl-C does: schedulers of clusters and services send SIGTERM, and workers are to end in good order."""
+    """Stop as Ctrl-C does: schedulers of clusters and services send SIGTERM, and workers must end in good order."""
     handler = signal.getsignal(signal.SIGINT)
-    if not callable(handler):  # of a command in the background, Ctrl-C is ignored
+    if not callable(handler):  # Ctrl-C is ignored by a command in the background
         raise KeyboardInterrupt
     handler(number, frame)
 
 
 class Parser(argparse.ArgumentParser):
-    """Answers a misspelt command or option by the nearest one."""
+    """Parser that answers a misspelt command or option with the nearest one."""
 
     options: Collection[str] = ()
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError with a suggestion where there is one; exit code 2 in any case."""
+        """Raise InputError with the nearest option for an unknown one; exit code 2 for every error."""
         unknown = message.removeprefix("unrecognized arguments: ").split()
         if unknown[0].startswith("-") and message.startswith("unrecognized"):
             name = unknown[0].partition("=")[0]
@@ -110,7 +110,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def require_command(name: str) -> None:
-    """InputError for a word that is no command."""
+    """Raise InputError for a word that is no command."""
     if name in COMMANDS or name.startswith("-"):
         return
     if name.endswith(".toml"):
@@ -119,14 +119,14 @@ def require_command(name: str) -> None:
 
 
 def parser(arguments: list[str]) -> argparse.ArgumentParser:
-    """The command line: one sub-command per verb; the module of the one that `arguments` ask for is imported."""
+    """Return the parser of the command line: one sub-command per verb; only the requested verb's module is imported."""
     if arguments:
         require_command(arguments[0])
     top = Parser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
-    top.add_argument("--version", action="version", version=f"flexclear {version()}", help="say the version")
+    top.add_argument("--version", action="version", version=f"flexclear {version()}", help="print the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     asked = [verb for verb in COMMANDS if verb in arguments[:1]]
-    for verb in asked or COMMANDS:  # all of them only where their list is reported
+    for verb in asked or COMMANDS:  # all verbs only where their list is printed
         text = COMMANDS[verb]
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
         if asked:

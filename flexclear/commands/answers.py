@@ -1,7 +1,7 @@
-"""Three answers about a scene: what accuracy costs, whether it is stable, which effects matter.
+"""Three answers about a scene: what accuracy costs, whether its run is stable, which effects matter.
 
-Each is made of runs within a budget of processor time, of which half goes to the costs of accuracy and half to the
-effects; stability is read from the run and from what the costs of accuracy were measured with.
+Runs within a budget of processor time give the answers, half for the costs of accuracy, half for the effects. Stability
+is judged from the scene's run and from the runs that measured the costs of accuracy.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: without a budget the answers may take so many times the run's own processor time, and at least so long [s]
+#: default budget: so many times the processor time of the scene's own run, and at least so long [s]
 TIMES, LEAST = 3.0, 30.0
-#: variants are run and compiled so many at a time; what code for one takes, where the scene's steps are there [s]
+#: number of variants that are run and compiled concurrently; time to compile one with the scene's steps compiled [s]
 AT_ONCE, COMPILING = 2.0, 4.0
-#: of variants without a clearance or a flexible body, the kernels of so many are compiled next to the scene's own run
+#: number of ideal variants (without a clearance or a flexible body) whose kernels are compiled during the scene's run
 AHEAD = 2
-#: tolerance of members with contacts, at most so tight: their starts differ by a thousandth of the clearance
+#: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance
 MEANS = 1e-7
-#: members with which effects are compared: more of them until the difference is decided or the budget is used
+#: numbers of members with which effects are compared; they rise until the difference is decided or the budget is used
 MEMBERS = (4, 8, 16, 32)
-#: the effect that represents all clearances and flexible bodies; that of `post.answers.matters`
+#: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.matters`
 IDEAL = "clearance and flexibility"
 
 
 @dataclass(frozen=True)
-class Said:
-    """What is shown of an answer: heading, the answer in words, its picture with a caption, and a table as HTML."""
+class ShownAnswer:
+    """An answer as a page shows it: heading, text, file name of its picture with a caption, and a table as HTML."""
 
     heading: str
     text: str
@@ -55,37 +55,37 @@ class Said:
     table: str = ""
 
 
-def said(name: str, answer: Made, scene: Scene) -> Said:
-    """What is shown of the answer called accuracy, stability or matters."""
+def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
+    """Return heading, text, picture and table of the answer called accuracy, stability or matters."""
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
 
     data = answer.dataset()
     if name == "accuracy":
         caption = "Error against processor time; the star is this scene"
-        return Said("What accuracy costs", sentences(data), "accuracy.png", caption)
+        return ShownAnswer("What accuracy costs", sentences(data), "accuracy.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
         caption = "Errors of energy and loops over time, and their limits"
         table = prose(("check", *columns), rows)
-        return Said("Is it stable", data.attrs["answer"], "stability.png", caption, table)
+        return ShownAnswer("Is it stable", data.attrs["answer"], "stability.png", caption, table)
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
     caption = "Change of each quantity without the effect; thin lines: what of it may be chance"
     text, table = matters.sentence(data, requested), scenes.tables(answer, "matters.md")
-    return Said("Which effects matter", text, "matters.png", caption, table)
+    return ShownAnswer("Which effects matter", text, "matters.png", caption, table)
 
 
 def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
-    """One of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
+    """Return one of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
 
-    budget: processor time [s], or text such as "2min".  models: of the study, as of `cost.bring`.
-    Raises InputError for a scene that has nothing to answer.
+    budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study. Raises InputError
+    for a scene without effects or watched quantities.
     """
     from flexclear.pipeline.post.answers.answered import answered
 
-    # in this process: workers would run a caller's script again from its top
+    # in this process: a worker would run a caller's script again from its top
     workplace, given = replace(open_workplace(), jobs=1), None if budget is None else seconds(budget, "budget")
     if name == "cost":
         name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET, models=models)
@@ -93,17 +93,17 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool
         answer = getattr(Answers(scene, workplace, given, questions=1), name)
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
-    words = said(name, answer, scene)
+    words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
     return answered(answer.dataset(), words.text, picture, words.table)
 
 
 @dataclass(frozen=True)
 class Answers:
-    """The three answers about a scene, each made when it is asked for.
+    """The three answers about a scene, each computed at its first use.
 
-    seconds: of processor that the runs may take; without it TIMES the scene's own run, and at least LEAST.
-    questions: among which it is divided, the costs of accuracy and the effects; 0 leaves nothing to measure.
+    seconds: processor time of the runs; by default TIMES that of the scene's own run, and at least LEAST. questions:
+    number of answers that divide it, the costs of accuracy and the effects; 0: only stability is judged.
     """
 
     scene: Scene
@@ -113,11 +113,11 @@ class Answers:
 
     @cached_property
     def kernels(self) -> dict[tuple[str, ...], Task]:
-        """Those of variants that the effects need, to be compiled while the scene's own run leaves a processor idle; by
-        what runs on them (`kernels.shared`)."""
+        """Return tasks that compile kernels of the effects' variants while the scene's own run leaves a processor idle;
+        by what runs on them (`kernels.shared`)."""
         effects, tasks = variants.effects(self.scene), dict[tuple[str, ...], Task]()
         ideal = [effect for effect in effects if effect.kind in (CLEARANCE, FLEXIBILITY)]
-        for effect in ideal if len(ideal) > 1 else ():  # without the only one it is the ideal scene, which is run
+        for effect in ideal if len(ideal) > 1 else ():  # without the only one: the ideal scene, which is run
             gone = [other for other in effects if effect.name in (other.name, other.within)]
             variant = watched_quantities.plain(variants.without(self.scene, gone))
             variant = edited(variant, {"solver.integrator": DEFAULT}) if self.scene.by_need() else variant
@@ -125,8 +125,8 @@ class Answers:
         return dict(list(tasks.items())[:AHEAD])
 
     @cached_property
-    def _begun(self) -> cost.Study:
-        """The scene's own run, measured, and the budget that follows from it."""
+    def _started(self) -> cost.Study:
+        """Return the study with the scene's own run measured, and with the budget that follows from that run."""
         study = cost.Study(self.scene, self.workplace, (self.seconds or LEAST) / self.questions)
         study.begin()
         if self.seconds is None:
@@ -135,20 +135,20 @@ class Answers:
 
     @cached_property
     def _study(self) -> cost.Study:
-        """The points about the scene's own setting."""
-        study = self._begun
+        """Return the study with the points in the neighbourhood of the scene's own setting."""
+        study = self._started
         study.first()
         study.neighbourhood()
         return study
 
     @cached_property
     def accuracy(self) -> Made:
-        """What accuracy costs (`stages.cost_study`); SolverError where no run could be made."""
+        """Return what accuracy costs (`stages.cost_study`); raise SolverError where no run succeeds."""
         return self.workplace.made(self._study.task())[0]
 
     @cached_property
     def stability(self) -> Made:
-        """Whether the run is stable (`stages.evaluation`), with what the costs of accuracy were measured with."""
+        """Return the verdict on stability (`stages.evaluation`), which also uses the runs of the costs of accuracy."""
         try:
             study = {"study": self._study.task()} if self.questions else {}
         except SolverError:
@@ -168,44 +168,43 @@ class Answers:
 
     @cached_property
     def matters(self) -> Made | None:
-        """Which effects matter (`stages.effect_study`); None for a scene without effects, or which watches
-        nothing."""
+        """Return which effects matter (`stages.effect_study`); None for a scene without effects or watches."""
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
             return None
         self.workplace.bring(list(self.kernels.values()))
-        self._begun.compiled |= self.kernels
-        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task())[0]
+        self._started.compiled |= self.kernels
+        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._started).task())[0]
 
 
 @dataclass
 class _Comparison:
-    """The scene against the scene without each effect, with more members where it is not decided yet."""
+    """Comparison of the scene with the scene without each effect; more members run where a change is undecided."""
 
     scene: Scene
     workplace: Workplace
     effects: Sequence[Effect]
     chosen: Sequence[Quantity]
     study: cost.Study
-    #: by effect that is missing, and number of members
+    #: tasks by missing effect and number of members
     tasks: dict[tuple[str, int], Task] = field(default_factory=dict)
     points: dict[tuple[str, int], Point] = field(default_factory=dict)
     spent: float = 0.0
-    #: whether members are run at the scene's own tolerance, since the one for means was refused
+    #: True when members run at the scene's own tolerance, since the looser one for means was refused
     tight: bool = False
-    #: what a run of each variant took [s]
-    took: dict[str, float] = field(default_factory=dict)
+    #: processor time of a run of each variant [s]
+    cpu_seconds: dict[str, float] = field(default_factory=dict)
 
     def task(self) -> Task:
-        """The task of the answer, its points made."""
+        """Run the points that the budget allows and return the task of the answer."""
         from flexclear.pipeline.post.answers.matters import Pair, undecided
 
-        levels = MEMBERS if self._touching("") else (0,)
-        waiting = names = self._fitting(list(self._gone), levels[0])
+        levels = MEMBERS if self._has_contacts("") else (0,)
+        waiting = names = self._affordable(list(self._removed), levels[0])
         pairs = dict.fromkeys(names, 0)
         for members in levels:
             if members != levels[0]:
-                waiting = self._fitting(waiting, members)
+                waiting = self._affordable(waiting, members)
             if not waiting:
                 break
             self._bring(["", *waiting], members)
@@ -215,33 +214,33 @@ class _Comparison:
             pairs |= dict.fromkeys(waiting, members)
             full = self.points["", members]
             waiting = [n for n in waiting if undecided(Pair(full, self.points[n, members], members), self.chosen)]
-        alone = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
-        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
+        repeated = IDEAL in self._removed and self._repeats(IDEAL, [name for name in self._removed if name != IDEAL])
+        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if repeated else IDEAL}
         without = {name: self._variant(name) for name in ("", *names)}
-        left = [words[name] for name in self._gone if name not in names and words[name]]
+        left = [words[name] for name in self._removed if name not in names and words[name]]
         return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left)
 
     @cached_property
     def _compiled(self) -> set[tuple[str, ...]]:
-        """Kinds of kernels that are there: those of the study, and of the run of the ideal scene."""
+        """Return the kinds of compiled kernels: those of the study, and those of the run of the ideal scene."""
         run = [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
         return {*self.study.compiled, *(kernels.shared(scene) for scene in run)}
 
     @cached_property
-    def _gone(self) -> Mapping[str, frozenset[str]]:
-        """What goes with each effect: first all clearances and flexible bodies, then each alone."""
-        alone = {e.name: self._closed({e.name}) for e in self.effects}
+    def _removed(self) -> Mapping[str, frozenset[str]]:
+        """Return the effects that go with each one: first all clearances and flexible bodies, then single effects."""
+        single = {e.name: self._closed({e.name}) for e in self.effects}
         ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
         both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
         order = sorted(self.effects, key=lambda effect: effect.kind not in (CLEARANCE, FLEXIBILITY))
-        return both | {effect.name: alone[effect.name] for effect in order}
+        return both | {effect.name: single[effect.name] for effect in order}
 
     def _closed(self, names: set[str]) -> frozenset[str]:
-        """With the effects that are nothing without one that is gone."""
+        """Return the names of effects, and those of effects that exist only within them."""
         return frozenset(names | {e.name for e in self.effects if e.within in names})
 
     def _variant(self, name: str) -> Scene:
-        gone = self._gone[name] if name else frozenset()
+        gone = self._removed[name] if name else frozenset()
         variant, setting = variants.without(self.scene, [e for e in self.effects if e.name in gone]), self.study.setting
         if setting.step is not None:
             return variant
@@ -250,18 +249,18 @@ class _Comparison:
         rtol = max(setting.rtol, MEANS) if means else setting.rtol
         return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})
 
-    def _touching(self, name: str) -> bool:
+    def _has_contacts(self, name: str) -> bool:
         scene = self._variant(name)
         return bool(scene.contacts() or scene.stop)
 
     def _seconds(self, name: str, members: int) -> float:
-        """Of wall time that so many members are predicted to take: as in the last round, else as the scene's run."""
-        runs = members if self._touching(name) else 1
-        return (runs * self.took.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
+        """Predict the wall time of members of a variant [s]: from its last round, else from the scene's own run."""
+        runs = members if self._has_contacts(name) else 1
+        return (runs * self.cpu_seconds.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
 
-    def _fitting(self, names: Sequence[str], members: int) -> list[str]:
-        """Those that the rest of the budget holds, the first ones first: what the summary says before the others. Of
-        all at least one."""
+    def _affordable(self, names: Sequence[str], members: int) -> list[str]:
+        """Return the first names that the rest of the budget allows, in the order in which the summary needs them; at
+        least one while no point exists."""
         fitting, total = list[str](), self.spent + self._seconds("", members)
         for name in names:
             kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
@@ -274,8 +273,8 @@ class _Comparison:
         return fitting
 
     def _repeats(self, name: str, others: Sequence[str]) -> bool:
-        """Whether the runs without an effect are those without another one: a single effect may be all of them."""
-        return any(self._gone.get(name) == self._gone.get(other) for other in others)
+        """Return True when another effect's variant has the same runs: a single effect may be all of them."""
+        return any(self._removed.get(name) == self._removed.get(other) for other in others)
 
     def _bring(self, names: Sequence[str], members: int) -> None:
         from flexclear.pipeline.core.artifacts.effect_size import watched
@@ -285,6 +284,6 @@ class _Comparison:
             stored = made.dataset()
             self.tasks[name, members] = made.task
             self.points[name, members] = watched(stored, self._variant(name).owners(), self.chosen)
-            self.took[name] = float(stored.attrs["cpu_seconds"]) / (members if self._touching(name) else 1)
+            self.cpu_seconds[name] = float(stored.attrs["cpu_seconds"]) / (members if self._has_contacts(name) else 1)
             if not self._repeats(name, names[:k]):
                 self.spent += self._seconds(name, members) + float(stored.attrs["compile_seconds"]) / AT_ONCE

@@ -1,4 +1,4 @@
-"""``flexclear cache``: how large the caches are, whether they are whole, what an artifact was made from; pruning."""
+"""``flexclear cache``: size and integrity of the caches, the inputs of an artifact, and pruning."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from stat import S_ISREG
 
-from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts import maintenance
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.system.errors import InputError, ResourceError, shown
 from flexclear.pipeline.dynamics.compile import files
@@ -18,17 +18,17 @@ from flexclear.stages.workplace import open_workplace
 ACTIONS = {
     "size": "stored bytes by stage",
     "check": "read everything and compare it with its digest; exit code 4 when something is damaged",
-    "explain": "what an artifact was made from",
-    "prune": "remove what is damaged and what nothing shows any more",
+    "explain": "print the facts from which an artifact was computed",
+    "prune": "remove damaged artifacts, and those that no scene shows any more",
 }
-#: artifacts that nothing shows are stored for so many days: going back to an earlier value costs nothing then
+#: days that artifacts which nothing shows stay stored: a return to an earlier value costs nothing in that time
 DAYS = 30.0
-#: faults that `check` lists one by one
+#: number of faults that `check` prints
 LISTED_FAULTS = 20
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     for name, text in ACTIONS.items():
         below = actions.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
@@ -37,13 +37,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Do it."""
+    """Run the requested action."""
     {"size": _size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
 
 
 def _size(options: argparse.Namespace) -> None:
     store = open_workplace().store
-    inventory = upkeep.inventory(store, whole=False)
+    inventory = maintenance.inventory(store, whole=False)
     sizes: dict[str, list[int]] = {}
     for artifact in inventory.artifacts:
         sizes.setdefault(artifact.record.stage.partition("/")[0], []).append(artifact.size)
@@ -57,7 +57,7 @@ def _size(options: argparse.Namespace) -> None:
 
 
 def _sizes(paths: Iterable[Path]) -> list[int]:
-    """Sizes of those that are files [bytes]; what others remove meanwhile, as locks, is none any more."""
+    """Return the sizes of those paths that are files [bytes]; files that other processes remove are skipped."""
     lines = []
     for path in paths:
         with suppress(FileNotFoundError):
@@ -69,12 +69,13 @@ def _sizes(paths: Iterable[Path]) -> list[int]:
 
 def _check(options: argparse.Namespace) -> None:
     store = open_workplace().store
-    inventory = upkeep.inventory(store, whole=True)
-    # one without a sum has not been compiled yet, or is about to be
+    inventory = maintenance.inventory(store, whole=True)
+    # a kernel without a checksum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
-    others = {path for path in kernels if files.of_another_build(path)}
+    others = {path for path in kernels if files.stored_by_another_build(path)}
     damaged = [path for path in kernels if path not in others and not files.compiled(path)]
-    faults = [*inventory.damaged, *upkeep.shown_faults(store, store.root), *(f"{path} is damaged" for path in damaged)]
+    in_results = maintenance.shown_faults(store, store.root)
+    faults = [*inventory.damaged, *in_results, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:LISTED_FAULTS]:
         print(shown(fault))
     if len(faults) > LISTED_FAULTS:
@@ -92,7 +93,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _explain(options: argparse.Namespace) -> None:
     store = open_workplace().store
-    record = upkeep.find(store, options.what)
+    record = maintenance.find(store, options.what)
     if record is None:
         raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
     print(f"{record.stage} {record.key}")
@@ -106,16 +107,16 @@ def _explain(options: argparse.Namespace) -> None:
 
 def _prune(options: argparse.Namespace) -> None:
     store = open_workplace().store
-    inventory = upkeep.inventory(store, whole=True)
-    chosen = upkeep.prunable(store, inventory, DAYS * upkeep.DAY)
+    inventory = maintenance.inventory(store, whole=True)
+    chosen = maintenance.prunable(store, inventory, DAYS * maintenance.DAY)
     broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]
     chosen += [artifact for artifact in broken if artifact not in chosen]
     size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in inventory.orphans)
     store.sweep()
     for artifact in chosen:
-        upkeep.remove(store, artifact)
+        maintenance.remove(store, artifact)
     for path in (*inventory.orphans, *inventory.unreadable):
-        upkeep.take_away(path)
+        maintenance.remove_file(path)
     kernels = sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
     print(f"removed {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
     if kernels:

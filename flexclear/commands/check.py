@@ -1,6 +1,6 @@
-"""``flexclear check``: every mistake of scenes, recipes and sweeps at once, with file and line; nothing is run.
+"""``flexclear check``: all errors of scenes, recipes and sweeps at once, with file and line; nothing is run.
 
-What it computes takes seconds, without modes and without compiling: meshes, the start, free motions.
+The checks take seconds, without modes and without compilation: meshes, the start, free motions.
 """
 
 from __future__ import annotations
@@ -33,45 +33,45 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.model.mechanism import Mechanism
     from flexclear.pipeline.structure.fe.model import Model
 
-#: the message about a file: it is wrong, or asks for too much
+#: errors about a file: it is wrong, or asks for too much
 MISTAKES = (InputError, ResourceError)
-#: larger files of meshes, and meshes with more unknowns, are left to the run [bytes, unknowns]
+#: larger mesh files, and meshes with more unknowns, are checked by the run only [bytes, unknowns]
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
-#: extents of a mesh from a file beyond which its unit of length is doubted [m]
+#: extents of a mesh from a file outside of which its unit of length is doubted [m]
 SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
-#: parts that a mechanism does not need in order to fit together
+#: parts without which a mechanism fits together as well
 ACTING = ("[load.", "[gear.", "[stop.")
-#: unused frames that are listed
+#: number of unused frames that are listed
 LISTED_FRAMES = 3
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     parser.add_argument(
         "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
     )
     parser.add_argument(
-        "--show", action="store_true", help="also write the start pose of each scene, and what does not fit there"
+        "--show", action="store_true", help="also draw the start pose of each scene, with gaps where joints do not fit"
     )
     add_options(parser, "set", "json", "said")
 
 
 def command(options: argparse.Namespace) -> int:
-    """Print all mistakes of all files; exit code 2 where there are some, 4 where a file only asks for too much.
+    """Print all errors of all files; exit code 2 for errors, 4 where a file only asks for too much.
 
     Implausible values are warnings, which leave the exit code 0.
     """
     errors: dict[str, FlexclearError] = {}
     warnings: dict[str, InputError] = {}
     for name in options.scenes:
-        seen = examined(name, options.set)
+        findings = examined(name, options.set)
         if options.show:
             refused = _show(name, options.set, quiet=options.json)
-            seen.errors += [refused] if refused is not None and not seen.errors else []
-        errors |= {str(mistake): mistake for mistake in seen.errors}
-        warnings |= {str(warning): warning for warning in seen.warnings}
-        if not seen.errors and not options.json and not options.quiet:
-            print(f"{scenes.find_scene(name)}: {'; '.join(seen.notes)}; no error")
+            findings.errors += [refused] if refused is not None and not findings.errors else []
+        errors |= {str(mistake): mistake for mistake in findings.errors}
+        warnings |= {str(warning): warning for warning in findings.warnings}
+        if not findings.errors and not options.json and not options.quiet:
+            print(f"{scenes.find_scene(name)}: {'; '.join(findings.notes)}; no error")
     if options.json:
         records = [_record(mistake, "error") for mistake in errors.values()]
         print(json.dumps([*records, *(_record(warning, "warning") for warning in warnings.values())], indent=2))
@@ -87,7 +87,7 @@ def command(options: argparse.Namespace) -> int:
 
 
 def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | None:
-    """Write the start pose of a scene where one can be drawn; returns why it is refused."""
+    """Write the start pose of a scene if it can be drawn; return the error that refuses it, or None."""
     try:
         if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
             scene = scenes.loaded(name, settings)
@@ -100,14 +100,14 @@ def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | No
 
 @dataclass
 class Findings:
-    """errors: what is refused.  warnings: what is doubtful.  notes: what it is, and facts of it, in words."""
+    """errors: refusals.  warnings: doubtful values.  notes: kind and facts of the file, in words."""
 
     errors: list[FlexclearError] = field(default_factory=list)
     warnings: list[InputError] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def attempt(self, check: Callable[[], Any], path: Path | None = None) -> bool:
-        """Run a check; what it raises is collected, located in a file.  Returns whether it passed."""
+        """Run a check and collect its errors, located in a file.  Returns True when the check passes."""
         try:
             with scenes.in_file(path):
                 check()
@@ -118,76 +118,76 @@ class Findings:
 
 
 def examined(name: str, settings: Sequence[str] = ()) -> Findings:
-    """All mistakes of a scene, sweep or recipe, and what it is where it can be read.
+    """Return all errors and warnings of a scene, sweep or recipe, and a description where it can be read.
 
-    settings: as `--set` has them; a scene is examined with these changes.
+    settings: changes of the scene, ``KEY=VALUE`` as of `--set`.
     """
-    seen = Findings()
-    seen.attempt(partial(_examine, name, settings, seen))
-    return seen
+    findings = Findings()
+    findings.attempt(partial(_examine, name, settings, findings))
+    return findings
 
 
-def _examine(name: str, settings: Sequence[str], seen: Findings) -> None:
+def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
     path = scenes.find_scene(name)
-    {SCENE: _scene, SWEEP: _sweep, RECIPE: _recipe}[kind_of_file(read_toml(path))](path, settings, seen)
+    {SCENE: _scene, SWEEP: _sweep, RECIPE: _recipe}[kind_of_file(read_toml(path))](path, settings, findings)
 
 
-def _scene(path: Path, settings: Sequence[str], seen: Findings) -> None:
-    seen.errors += dangling(compose(path), scenes.recipe_frames, str(path))
+def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
+    findings.errors += dangling(compose(path), scenes.recipe_frames, str(path))
     loaded: list[Scene] = []
-    seen.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
-    # a recipe that several bodies name is meshed once
+    findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
+    # bodies may share a recipe, which is meshed once
     mesh_of = cache(partial(meshed, limits=loaded[0].limits if loaded else Limits()))
     bodies = compose(path).get("body", {}).values()
     for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
-        seen.errors += mesh_of(Path(mesh))[1].errors
+        findings.errors += mesh_of(Path(mesh))[1].errors
     for scene in loaded:
-        seen.attempt(partial(Graph(scene).up_to, "post"), path)
+        findings.attempt(partial(Graph(scene).up_to, "post"), path)
         for check in _laws(scene):
-            seen.attempt(check, path)
-        seen.warnings += scenes.implausibilities(scene, settings)
-        seen.notes.append(scene.summary())
-        if not seen.errors:
-            compute(scene, mesh_of, seen)
+            findings.attempt(check, path)
+        findings.warnings += scenes.implausibilities(scene, settings)
+        findings.notes.append(scene.summary())
+        if not findings.errors:
+            compute(scene, mesh_of, findings)
 
 
-def _sweep(path: Path, settings: Sequence[str], seen: Findings) -> None:
-    """Its own mistakes and those of its scene."""
+def _sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:
+    """Check a sweep file and its scene."""
     from flexclear.commands import sweep
     from flexclear.stages.sweeps import sweep_plan
 
     requested, scene = sweep.read(path)
-    _examine(str(scene.path), (), seen)
-    if not seen.errors:
-        seen.attempt(lambda: sweep_plan.plan(requested, scene, str(path)))
-    seen.notes = [f"a sweep over {', '.join(requested.vary)} of {scene.name}: {'; '.join(seen.notes)}"]
+    _examine(str(scene.path), (), findings)
+    if not findings.errors:
+        findings.attempt(lambda: sweep_plan.plan(requested, scene, str(path)))
+    findings.notes = [f"a sweep over {', '.join(requested.vary)} of {scene.name}: {'; '.join(findings.notes)}"]
 
 
-def _recipe(path: Path, settings: Sequence[str], seen: Findings) -> None:
-    """A recipe is examined as where a scene names it, with the limits of a scene that says none."""
+def _recipe(path: Path, settings: Sequence[str], findings: Findings) -> None:
+    """Check a recipe as a scene would use it, with the default limits of a scene."""
     body, of_mesh = meshed(path)
-    seen.errors += of_mesh.errors
-    if seen.errors:
+    findings.errors += of_mesh.errors
+    if findings.errors:
         return
     table = meshing.params(path)["recipe"]
     mass = f", mass {float(body.rigid.mass):.6g} kg" if body is not None else ""
     frames = ", ".join(table.get("frames", {})) or "none"
-    seen.warnings += of_mesh.warnings
-    seen.notes.append(f"a mesh recipe, {table['shape']['type']}, frames: {frames}{mass}")
+    findings.warnings += of_mesh.warnings
+    findings.notes.append(f"a mesh recipe, {table['shape']['type']}, frames: {frames}{mass}")
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
-    """A check for each prescribed coordinate: whether there is such a one, and its values fit."""
+    """Yield a check for each prescribed coordinate: it must exist, and its values must fit."""
     from flexclear.pipeline.dynamics.model.driving import prescribed
     from flexclear.pipeline.dynamics.model.laws import checked_law
 
     for name, drive in scene.drive.items():
         if getattr(drive, "joint", None) in (None, *scene.joint):
-            alone = scene.model_copy(update={"drive": {name: drive}})
+            one_drive = scene.model_copy(update={"drive": {name: drive}})
 
-            def check(alone: Scene = alone) -> None:
-                for one in prescribed(alone):
-                    checked_law(alone, one.law, one.dimension, one.place)
+            def check(one_drive: Scene = one_drive) -> None:
+                for one in prescribed(one_drive):
+                    checked_law(one_drive, one.law, one.dimension, one.place)
 
             yield check
 
@@ -211,38 +211,38 @@ class Body:
     interfaces: tuple[str, ...]
 
 
-#: what gives `meshed` of a recipe
+#: type of `meshed` as a function of a recipe's path
 MeshOf = Callable[[Path], tuple[Body | None, Findings]]
 
 
-def compute(whole: Scene, mesh_of: MeshOf, seen: Findings) -> None:
-    """Meshes and requested modes of a scene whose recipes can be read, and the mechanism made of them."""
+def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
+    """Check meshes and requested modes of a scene whose recipes can be read, then the mechanism that they form."""
     bodies: dict[str, Body] = {}
     for name, path in whole.recipes().items():
         body, of_mesh = mesh_of(Path(path))
-        seen.errors += of_mesh.errors
-        seen.warnings += of_mesh.warnings
+        findings.errors += of_mesh.errors
+        findings.warnings += of_mesh.warnings
         bodies |= {name: body} if body is not None else {}
     for name, part in whole.flexible().items():
         if name in bodies:
-            seen.attempt(partial(_modes, bodies[name], name, part), whole.path)
-    if seen.errors or set(bodies) != set(whole.recipes()):
+            findings.attempt(partial(_modes, bodies[name], name, part), whole.path)
+    if findings.errors or set(bodies) != set(whole.recipes()):
         return
     rigid = {name: body.rigid for name, body in bodies.items()}
-    if seen.attempt(partial(_assembled, whole, rigid, seen), whole.path):
-        _free_motions(whole, rigid, seen)
+    if findings.attempt(partial(_assembled, whole, rigid, findings), whole.path):
+        _free_motions(whole, rigid, findings)
 
 
 def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findings]:
-    """A mesh recipe: its mesh, where that is allowed and can be made in seconds, and what is to be said of it."""
-    seen = Findings()
+    """Return the body of a recipe if its mesh is allowed and takes seconds (else None), with errors and warnings."""
+    findings = Findings()
     made: list[Body] = []
-    if seen.attempt(partial(meshing.check_size, path, limits or Limits())):
-        seen.attempt(lambda: made.extend(_meshed(path, seen)))
-    return (made[0] if made else None), seen
+    if findings.attempt(partial(meshing.check_size, path, limits or Limits())):
+        findings.attempt(lambda: made.extend(_meshed(path, findings)))
+    return (made[0] if made else None), findings
 
 
-def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
+def _meshed(path: Path, findings: Findings) -> Iterator[Body]:
     from flexclear.pipeline.structure.fe.recipe import parse
     from flexclear.pipeline.structure.kinds import kind
     from flexclear.pipeline.structure.modes import bundle
@@ -256,7 +256,7 @@ def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
         mesh = kind.build(table, path.parent)
     except InputError as error:
         raise meshing.in_recipe(error, path) from None
-    seen.warnings += _unit(mesh, table, path)
+    findings.warnings += _unit(mesh, table, path)
     if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
         return
     model = kind.of_mesh(mesh).assemble(mesh)
@@ -264,7 +264,7 @@ def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
 
 
 def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:
-    """A mesh from a file whose size suggests another unit of length; files do not say theirs."""
+    """Yield a warning for a mesh from a file whose size suggests another unit of length; files do not state theirs."""
     import numpy as np
 
     shape = table["shape"]
@@ -289,15 +289,15 @@ def _modes(body: Body, name: str, part: FlexibleBody) -> None:
         raise InputError(f"[body.{name}.{error.place}]", error.problem, error.remedy) from None
 
 
-def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> None:
-    """Build the mechanism where the run begins: poses, axes, loads and loose joints are checked against each other.
+def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
+    """Assemble the mechanism at its start, which checks poses, axes, loads and loose joints against each other.
 
     Flexible bodies are undeformed; of rigid mechanisms rank and drives are checked, too.
     """
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
     from flexclear.pipeline.dynamics.model.plausibility import (
-        forgotten,
+        missing_joints,
         refuse_missed,
         refuse_overlap,
         unused_frames,
@@ -315,12 +315,12 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> No
 
         mechanism = assembled(mechanism)
         refuse_missed(mechanism)
-    for body, text, remedy in forgotten(mechanism):
-        seen.warnings.append(scenes.placed(InputError(f"[body.{body}]", text, remedy), whole.path))
+    for body, text, remedy in missing_joints(mechanism):
+        findings.warnings.append(scenes.placed(InputError(f"[body.{body}]", text, remedy), whole.path))
     unused = unused_frames(mechanism)
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
-        seen.notes.append(f"frames that nothing uses: {', '.join(unused[:LISTED_FRAMES])}{more}")
+        findings.notes.append(f"frames that nothing uses: {', '.join(unused[:LISTED_FRAMES])}{more}")
 
 
 def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
@@ -335,10 +335,10 @@ def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
     return build(placed(whole), {name: rigid[name] for name in whole.flexible()})
 
 
-def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> None:
+def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
     """Note the free motions besides the drives, with rigid bodies and loose joints closed, where these fit.
 
-    Loads, gears and stops are read for it: what is wrong with them is an error of the scene itself.
+    Loads, gears and stops are read as well: an error in one of them is an error of the scene itself.
     """
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
@@ -347,9 +347,9 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) ->
     try:
         mechanism = _mechanism(ideal(whole) if idealised else whole, rigid)
         free = analyse(tabulate(mechanism)).mobility
-    except InputError as error:  # others: only as flexible bodies or with clearance it moves
+    except InputError as error:  # other errors: the mechanism moves only with flexible bodies or with clearance
         if error.place.startswith(ACTING):
-            seen.errors.append(scenes.placed(error, whole.path))
+            findings.errors.append(scenes.placed(error, whole.path))
         return
     closed = " with loose joints closed" if loose(whole) else ""
-    seen.notes.append(f"free motions besides the drives{closed}: {free}")
+    findings.notes.append(f"free motions besides the drives{closed}: {free}")

@@ -1,7 +1,7 @@
 """``flexclear cite``: sources of the methods and data that a scene uses, from the modules that it reaches.
 
-What every run of the scene imports is listed separately from what functions import where they need it: another
-integrator where the scene's own is too slow, singular poses, accuracies, frequencies.
+Modules that every run of the scene imports are listed separately from those that functions import where they need them:
+another integrator where the scene's own is too slow, singular poses, accuracies, frequencies.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ RUNS = "flexclear.pipeline.dynamics.run"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
     add_options(parser, "set", "said")
 
 
 def command(options: argparse.Namespace) -> None:
-    """Print them."""
+    """Print the sources of a scene."""
     (graph,) = scenes.graphs([options.scene], options.set)
     print(text(graph, open_workplace().sources), end="")
 
 
 def text(graph: Graph, sources: Sources) -> str:
-    """Three lists: methods, those that may be needed (module: source), and data (part of the scene: source)."""
+    """Return lists of methods, of methods that may be needed (module: source), and of data (part: source)."""
     scene = graph.scene
     used, always = list(methods(graph, sources)), _at_once(graph, sources)
     lines = [f"Methods of {scene.name}"]
@@ -50,11 +50,11 @@ def text(graph: Graph, sources: Sources) -> str:
 
 
 def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
-    """Module and source text, modules in alphabetical order, each pair once."""
+    """Yield module and source text of each method once, with the modules in alphabetical order."""
     stages, parts = _roots(graph)
     reached = sources.closure(stages | parts)
     for name in sorted(reached.keys() - set(_unused(reached, parts))):
-        if name.startswith(f"{COMPILE}."):  # how code is made is no method
+        if name.startswith(f"{COMPILE}."):  # compilation is no method of dynamics
             continue
         path = source_file(sources.root, name)
         assert path is not None  # else it would not be in the closure
@@ -63,32 +63,32 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
 
 
 def _roots(graph: Graph, met: tuple[str, ...] | None = None) -> tuple[set[str], set[str]]:
-    """Modules of a scene's stages, and of its parts and of what its run may meet, or of these: `Task.met`."""
+    """Return modules of a scene's stages, and those of its parts and of encounters (`met`; None: all of `Task.met`)."""
     roots = [task.roots(met) for task in in_order(graph.up_to("post"))]
     return {stage for stage, *_ in roots}, {name for _, *names in roots for name in names}
 
 
 def _at_once(graph: Graph, sources: Sources) -> set[str]:
-    """Modules that a run of the scene imports whatever it meets: not those that functions import where they need them,
-    nor the integrators that may take over."""
+    """Return the modules that every run of the scene imports, without those that functions import where they need them,
+    and without integrators that may take over."""
     own = module_name(graph.scene.solver.integrator)
     others = {f"{INTEGRATE}.{module_name(name)}" for name in INTEGRATORS} - {f"{INTEGRATE}.{own}"}
     single = [task for task in in_order(graph.up_to("post")) if task.met]
-    met = {name for task in single for name in {*task.roots()} - {*task.roots(())}}  # others may reach it, too
+    met = {name for task in single for name in {*task.roots()} - {*task.roots(())}}  # other modules may reach them, too
     waiting = [name for names in _roots(graph, ()) for name in names - met]
-    seen = set[str]()
+    visited = set[str]()
     while waiting:
         name = waiting.pop()
         path = source_file(sources.root, name)
-        if name in seen or name in others or path is None:
+        if name in visited or name in others or path is None:
             continue
-        seen.add(name)
+        visited.add(name)
         waiting += [*imported(path.read_bytes(), name, path.name == "__init__.py", deep=False)[0], *parents(name)]
-    return seen
+    return visited
 
 
 def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
-    """Modules of families that the scene names no part of, and of parts that it does not name.
+    """Yield modules of parts, and of whole families, that the scene does not name.
 
     They are imported for their types, or by each other, and do nothing for the scene.
     """
@@ -103,7 +103,7 @@ def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
 
 
 def named(source: str) -> Iterator[str]:
-    """Texts after ``Source:`` in all docstrings of a module, each on one line."""
+    """Yield the texts after ``Source:`` in all docstrings of a module, each on one line."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             yield from cited(ast.get_docstring(node))

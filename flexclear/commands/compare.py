@@ -17,9 +17,9 @@ from flexclear.pipeline.post.pages import Part, page
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, check, open_workplace
 
-#: what `--ideal` takes away: everything at once, one effect, or one after the other
+#: what `--ideal` removes: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
-#: files of a comparison that its page shows: pictures with their captions, then tables
+#: files that the page of a comparison shows: pictures with their captions, then tables
 PICTURES = {
     "compare.png": ("Watched quantities, and their distance from the reference",),
     "compare_contacts.png": ("Orbits",),
@@ -28,7 +28,7 @@ TABLES = ("differences.md", "costs.md")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scene_arguments(parser, "json")
     parser.add_argument(
         "--ideal",
@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring the comparison up to date, print its tables and say where it is."""
+    """Bring the comparison up to date, print its tables and where its files are."""
     workplace = open_workplace(options)
     made = bring([graph.scene for graph in graphs(options.scenes, options.set)], workplace, options.ideal)
     if options.json:
@@ -55,10 +55,10 @@ def command(options: argparse.Namespace) -> None:
 def bring(
     scenes: list[Scene], workplace: Workplace, without: str | None = None, alongside: Sequence[Task] = ()
 ) -> Made:
-    """Runs of the scenes, of their ideal mechanisms, and of all at tighter tolerances, compared; and the page of it.
+    """Run scenes, their ideal mechanisms, and all of these at tighter tolerances; return the comparison and its page.
 
-    without: one of IDEAL, or None for the scenes alone.  alongside: tasks made while the runs leave a processor idle,
-    which may fail.  Raises InputError for what cannot be compared.
+    without: one of IDEAL, or None for the scenes alone.  alongside: tasks for a processor that the runs leave idle;
+    they may fail.  Raises InputError.
     """
     sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
     if len(sides) < 2:
@@ -72,7 +72,7 @@ def bring(
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(labels, sides, strict=True)}
     runs = workplace.bring([*(graph.simulate for graph in graphs.values()), *alongside])
     check(replace(runs, failures=tuple(failure for failure in runs.failures if failure.task not in alongside)))
-    # their kernels are there now, so that these do not compile side by side what the first ones did
+    # the runs have compiled the kernels, so that the tighter runs need not compile them concurrently
     tight = {
         label: graph.tighter(workplace.store.load(runs.records[graph.simulate]).attrs)
         for label, graph in graphs.items()
@@ -88,12 +88,12 @@ def bring(
 
 
 def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
-    """The scene without what `without` says, the most ideal one first; InputError when there is nothing to take."""
+    """Return the scene without the effects of `without`, the most ideal one first; InputError where nothing can go."""
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
     ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
-        there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
-        if there or not ideals:
+        present = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
+        if present or not ideals:
             made = ideal(scene, effects)
             same = any(made.model_dump() == other.model_dump() for other in ideals)
             made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
@@ -102,7 +102,7 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
 
 
 def parts(made: Made) -> list[Part]:
-    """What a page shows of a comparison."""
+    """Return the sections of a page that show a comparison."""
     return [
         Part("differences", "Differences and errors", tables(made, *TABLES)),
         Part("runs", "Side by side", pictures(made, PICTURES)),

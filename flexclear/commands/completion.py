@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-#: what the shell reads; zsh takes bash's form
+#: code for the shell; zsh takes bash's form
 BASH = """_flexclear() {{
     local current=${{COMP_WORDS[COMP_CWORD]}}
     if [ "$COMP_CWORD" -eq 1 ]; then
@@ -26,14 +26,14 @@ SHELLS = {"bash": BASH, "zsh": "autoload -U +X bashcompinit && bashcompinit\n" +
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     parser.add_argument(
         "shell", choices=SHELLS, metavar="SHELL", help='bash or zsh; for example: eval "$(flexclear completion bash)"'
     )
 
 
 def command(options: argparse.Namespace) -> None:
-    """Print it."""
+    """Print the completion code of a shell."""
     from flexclear.commands.__main__ import COMMANDS, parser
 
     cases = []

@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.post.cost.answer import Studied
 
-#: a `Peer` as parameters of tasks have it
+#: a `Peer` as tasks have it in their parameters
 Track = dict[str, Any]
-#: bytes of a file of them
+#: largest file of peers [bytes]
 LARGEST_PEERS = 16 << 20
-#: tolerances at which ensembles are compared, where a scene has one
+#: tolerances at which the ensembles of a scene are compared
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
-#: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
+#: budget of a study [s of processor time]; time of a run besides its integration, and of a new set of kernels [s]
 BUDGET, POINT, COMPILING = 80.0, 0.6, 8.0
-#: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
+#: limit of a point's evaluations: so many times those of the scene's own run, or this fraction of the budget if more
 MOST_EVALUATIONS = 10.0
-#: of runs that were left undone, so many are named
+#: number of skipped runs that are named
 LISTED_RUNS = 6
 #: tables of a study, in the order in which they are printed
 PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
@@ -57,14 +57,14 @@ FIGURES = {
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
-    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
-    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the studies as a page")
+    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="also draw these runs of another program")
     parser.add_argument(
-        "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
+        "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these methods (default: all)"
     )
-    parser.add_argument("--models", action="store_true", help="also other meshes, mode sets and beam theories")
+    parser.add_argument("--models", action="store_true", help="also study meshes, mode sets and beam theories")
 
 
 def command(options: argparse.Namespace) -> None:
@@ -90,19 +90,19 @@ def command(options: argparse.Namespace) -> None:
     if options.json:
         print(as_json({name: made.dataset() for name, made in studies.items()}))
     if options.page is not None:
-        said = f" --peer {options.peer.as_posix()}" if options.peer else ""
-        said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
-        said += f" --budget {options.budget}{' --models' if options.models else ''}"
-        write_page(studies, options.page, said)
+        shown_options = f" --peer {options.peer.as_posix()}" if options.peer else ""
+        shown_options += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        shown_options += f" --budget {options.budget}{' --models' if options.models else ''}"
+        write_page(studies, options.page, shown_options)
 
 
 @dataclass
 class Study:
-    """A cost study while its points are made, each from the cache where it is there.
+    """A cost study while its points are computed, each from the cache where it exists.
 
-    seconds: of processor that the points may take; a point counts what it took when it was made.  models: whether
-    other meshes, mode sets and beam theories are among them.  compiled: kernels, by what runs on them.
-    own, seconds_each: evaluations of the scene's own run, and what each took.
+    seconds: processor time that the points may take; a point counts with the time of its computation.  models: True
+    when other meshes, mode sets and beam theories take part.  compiled: kernels, by what runs on them. own,
+    seconds_each: evaluations of the scene's own run, and the time of each.
     """
 
     scene: Scene
@@ -117,7 +117,7 @@ class Study:
     undone: list[cost_design.Design] = field(default_factory=list)
     spent: float = 0.0
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
-    #: by integrator, the loosest tolerance at which a point used up its evaluations
+    #: loosest tolerance at which a point used up its evaluations, by integrator
     used_up: dict[str, float] = field(default_factory=dict)
     own: float = 0.0
     seconds_each: float = 0.0
@@ -125,56 +125,56 @@ class Study:
     _ensembles: dict[str, Task] = field(default_factory=dict)
 
     def begin(self) -> None:
-        """Make the scene's own run, which predicts what others will take.
+        """Run the scene as it is, which predicts the time of other runs.
 
-        Raises FailedTasksError or SolverError where it cannot be made.
+        Raises FailedTasksError or SolverError where it fails.
         """
         if self.points:
             return
-        record = self._made(self._near[0])
+        record = self._made(self._neighbours[0])
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
         self.own = float(record.attrs["evaluations"])
         self.seconds_each = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
 
     def first(self) -> None:
-        """Make a few points about the scene's own setting."""
+        """Compute the first few points in the neighbourhood of the scene's own setting."""
         self.begin()
-        self._queue(self._near[1 : cost_design.FIRST])
+        self._queue(self._neighbours[1 : cost_design.FIRST])
 
     def neighbourhood(self) -> None:
-        """Make the other points about the scene's own setting, as far as the budget goes."""
-        self._queue(self._near[cost_design.FIRST :])
+        """Compute the other points in the neighbourhood of the scene's own setting, as far as the budget goes."""
+        self._queue(self._neighbours[cost_design.FIRST :])
 
     def beyond(self) -> None:
-        """Make the points farther away, the cheapest first, as far as the budget goes."""
+        """Compute the points farther away, the cheapest first, as far as the budget goes."""
         scene, more = self.scene, cost_design.wide(self.scene, self.integrators)
         if self.models and scene.flexible():
             bundles = scenes.bundles(scene, self.workplace, jobs=None).values()
             more += cost_design.models(scene, self.setting, max(float(one["frequency"].max()) for one in bundles))
-        there = {design.key for design in (*self.points, *self.undone)}
-        more = [design for design in more if design.key not in there]
+        known = {design.key for design in (*self.points, *self.undone)}
+        more = [design for design in more if design.key not in known]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
         self._complete = True
 
     @property
     def _chosen(self) -> list[Quantity]:
-        """The quantities that the scene asks an accuracy for, else those that it watches."""
+        """Quantities of the scene's `[accuracy]`, else those that it watches."""
         return self.scene.requested() if self.scene.accuracy is not None else self.scene.watched()
 
     @cached_property
-    def _near(self) -> list[cost_design.Design]:
+    def _neighbours(self) -> list[cost_design.Design]:
         return cost_design.neighbours(self.scene, self.setting)
 
     @cached_property
     def setting(self) -> cost_design.Setting:
-        """How the scene's own run is integrated, as the run says where the scene leaves it open."""
+        """Return integrator, tolerance and step of the scene's own run, which says those that the scene leaves open."""
         graph = Graph(self.scene, shown=False)
         (run,) = self.workplace.datasets(graph.simulate)
         return cost_design.Setting(*of_run(self.scene.solver, self.scene.by_need(), run.attrs), self.scene.solver.step)
 
     def task(self) -> Task:
-        """The task of the study of all points that there are."""
+        """Return the task of the study of all points so far."""
         listed = [
             {"key": d.key, "group": d.group, "factors": dict(d.factors), "input": f"point{k}"}
             for k, d in enumerate(self.points)
@@ -189,9 +189,9 @@ class Study:
                 "quantities": [q.written() for q in self._chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
-                "complete": self._complete and all(self._crawls(design) for design in self.undone),
-                "undone": _listed([d.key for d in self.undone if not self._crawls(d)]),
-                "given_up": _listed([d.key for d in self.undone if self._crawls(d)]),
+                "complete": self._complete and all(self._exhausted(design) for design in self.undone),
+                "undone": _listed([d.key for d in self.undone if not self._exhausted(d)]),
+                "given_up": _listed([d.key for d in self.undone if self._exhausted(d)]),
                 "peers": list(self.peers),
             },
             inputs=inputs | self._ensembles,
@@ -200,11 +200,11 @@ class Study:
         )
 
     def drawn(self) -> Made:
-        """The study of the points so far, with its tables and figures."""
+        """Return the study of the points so far, with its tables and figures."""
         return self.workplace.made(self.task())[0]
 
     def ensembles(self) -> None:
-        """Ensembles at several tolerances, of a scene that has one, as far as the budget goes."""
+        """Compute the scene's ensemble, if it has one, at several tolerances, as far as the budget goes."""
         names, ensemble = [q.name for q in self._chosen], self.scene.ensemble
         for rtol in ENSEMBLES if ensemble is not None else ():
             change = edited(self.scene, {"solver.rtol": rtol, "accuracy": None})
@@ -217,24 +217,24 @@ class Study:
             self._ensembles[f"ensemble:rtol {rtol:g}"] = task
 
     def _queue(self, designs: Sequence[cost_design.Design]) -> None:
-        """Make points in this order; those that the budget no longer holds are left undone."""
+        """Compute points in this order; skip those that the budget no longer allows."""
         for design in designs:
             seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
             compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
-            if self.spent + seconds + compiling > self.seconds or self._crawls(design):
+            if self.spent + seconds + compiling > self.seconds or self._exhausted(design):
                 self.undone.append(design)
             else:
                 self._made(design)
 
-    def _crawls(self, design: cost_design.Design) -> bool:
-        """Whether its method used up its evaluations at a tolerance that is no tighter."""
+    def _exhausted(self, design: cost_design.Design) -> bool:
+        """Return True when the design's method used up its evaluations at the same or a looser tolerance."""
         solver = design.scene.solver
         return design.chooses_steps and solver.rtol <= self.used_up.get(solver.integrator, 0.0)
 
     def _made(self, design: cost_design.Design) -> xr.Dataset:
-        """One point, brought up to date."""
+        """Return one point, brought up to date."""
         if self.own:
-            limit = min(self.scene.solver.evaluations, self._most())
+            limit = min(self.scene.solver.evaluations, self._evaluation_limit())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
         names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self.compiled
         compiled = self._kernels(design)
@@ -245,7 +245,7 @@ class Study:
         self.points.append(design)
         solver = design.scene.solver
         if "evaluations" in record.attrs.get("refused", ""):
-            self.spent += POINT + self._most() * self.seconds_each
+            self.spent += POINT + self._evaluation_limit() * self.seconds_each
             if design.chooses_steps:
                 self.used_up[solver.integrator] = max(solver.rtol, self.used_up.get(solver.integrator, 0.0))
         elif "refused" in record.attrs:
@@ -257,9 +257,9 @@ class Study:
                 known[solver.rtol] = float(record.attrs["evaluations"])
         return record
 
-    def _most(self) -> int:
-        """Evaluations that a point may take: 1, 2 or 5 times a power of ten, so that its key does not change with each
-        budget."""
+    def _evaluation_limit(self) -> int:
+        """Return the evaluations that a point may take: 1, 2 or 5 times a power of ten, so that keys rarely change with
+        budgets."""
         affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
         below = 10 ** math.floor(math.log10(affordable))
         return next(factor * below for factor in (1, 2, 5, 10) if factor * below >= affordable)
@@ -281,11 +281,11 @@ def bring(
     models: bool = False,
     answered: Callable[[Made], None] = lambda made: None,
 ) -> Made:
-    """The study of a scene with its tables and figures, brought up to date as far as the budget [s] goes.
+    """Return the study of a scene with its tables and figures, brought up to date as far as the budget [s] goes.
 
-    peers: runs of other programs.  integrators: see `cost_design.wide`.  models: of the `Study`.  answered: called with
-    the first answer.
-    Raises InputError when the scene has nothing to measure.  Work that is interrupted leaves the answer so far.
+    peers: runs of other programs.  integrators: see `cost_design.wide`.  models: as of `Study`.  answered: called with
+    the first answer. Raises InputError for a scene without quantities to measure.  Interrupted work leaves the answer
+    so far.
     """
     study = Study(scene, workplace, budget, integrators, models, peers)
     study.first()
@@ -302,12 +302,12 @@ def bring(
 
 
 def tables(made: Made) -> tuple[str, ...]:
-    """Those tables of a study that there are, as Markdown."""
+    """Return the existing tables of a study as Markdown."""
     return tuple(made.text(name) for name in PRINTED if name in made.record.files)
 
 
 def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, dict[str, str]]:
-    """What a page says of a scene, and the study's files of its pictures, by path relative to the page.
+    """Return the section of a page on a scene, and the study's files of its pictures, by path relative to the page.
 
     made: as `bring` returned it.  pictures: folder for them next to the page.
     """
@@ -315,28 +315,28 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
 
     shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem in FIGURES}
     shown = {stem: path for stem, path in shown.items() if f"{stem}.png" in made.record.files}
-    said = advice(made.dataset(), tables(made))
-    page = Studied(name, said, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
+    paragraph = advice(made.dataset(), tables(made))
+    page = Studied(name, paragraph, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
     return page, {path: f"{stem}.png" for stem, path in shown.items()}
 
 
 def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> None:
-    """The page on accuracy, with its pictures in a folder of its name next to it.
+    """Write the page on accuracy, with its pictures in a folder of the same name next to it.
 
-    studies: what `bring` returned, by scene.  options: the command's other options.
+    studies: results of `bring`, by scene.  options: the command's other options.
     """
     from flexclear.pipeline.post.cost.answer import markdown
 
     sections, files = list[Studied](), dict[str, bytes]()
     for name, made in studies.items():
-        said, pictures = figures_and_tables(name, made, page.stem)
-        sections.append(said)
+        section, pictures = figures_and_tables(name, made, page.stem)
+        sections.append(section)
         files |= {Path(path).name: made.read(file) for path, file in pictures.items()}
     scenes.write_page(page, markdown(tuple(sections), f"{page.as_posix()}{options}"), files)
 
 
 def _listed(keys: Sequence[str]) -> str:
-    """The first of many, and how many more there are."""
+    """Return the first keys as text, and the number of the others."""
     more = f" and {len(keys) - LISTED_RUNS} more" if len(keys) > LISTED_RUNS else ""
     return "; ".join(keys[:LISTED_RUNS]) + more
 
@@ -346,7 +346,7 @@ def _bundles(design: cost_design.Design) -> dict[str, Task]:
 
 
 def _measured(design: cost_design.Design, function: str, more: Mapping[str, object], compiled: Task) -> Task:
-    """A task of `stages.cost_point` on a design's scene."""
+    """Return a task of `stages.cost_point` on a design's scene."""
     ensemble = design.scene.ensemble is not None
     return Task(
         stage="cost-ensemble" if ensemble else "cost-point",
@@ -376,7 +376,7 @@ class Peer(Part):
 
 
 def read_peers(path: Path) -> dict[str, list[Track]]:
-    """What a file says of other programs, by scene.  InputErrors for one that cannot be read or says something else."""
+    """Read the runs of other programs from a file, by scene.  InputErrors for a file that does not hold such runs."""
     where = f"--peer {path}"
     require_file(path, where)
     try:

@@ -1,8 +1,8 @@
-"""Which runs a cost study makes of a scene: the factors, how expensive each is predicted to be, and in which order.
+"""Design of a cost study: the runs, their factors, their predicted cost and their order.
 
 First the neighbourhood of the scene's own setting: looser and tighter tolerances, another family of methods, denser
 output. Then, cheapest first, all methods over all their tolerances and steps. No run is a reference by itself: the
-study takes the tightest that was made (`pipeline.post.cost.study`).
+study takes the tightest run that succeeded (`pipeline.post.cost.study`).
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import NAMING
 from flexclear.pipeline.core.system.errors import InputError
 
-#: the scene's own tolerance and step times these, in this order; half and a tenth show whether tighter runs agree
+#: multiples of the scene's own tolerance and step, in this order; half and a tenth show whether tighter runs agree
 TOLERANCES, STEPS = (0.1, 10.0, 1.0, 0.5, 0.01, 100.0), (0.5, 2.0, 1.0, 0.25, 4.0)
-#: the same of another family of methods, by which the tightest is confirmed; with fixed steps at these tolerances
+#: the same for another family of methods, which confirms the tightest run; tolerances next to fixed steps
 CONFIRMING, CONFIRMING_STEPS = (0.1, 0.01), (1e-6, 1e-8)
-#: so many of the neighbourhood give a first answer
+#: number of neighbours that give a first answer
 FIRST = 4
-#: tolerances that make a difference: tighter ones drown in rounding
+#: limits of tolerances: tighter ones drown in rounding
 TIGHTEST, LOOSEST = 1e-14, 1e-2
 #: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
 MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
 LIMITS = (0.25, 0.5, 1.0, 2.0)
 REFINEMENTS = (1, 2, 4)
 FINER_OUTPUT = 10.0
-#: what no point of a study has
+#: keys of the scene that no point of a study has
 PLAIN: Mapping[str, None] = {"accuracy": None, "ensemble": None}
-#: what a method is predicted to take of which no run is known, in evaluations of the scene's own run
+#: predicted evaluations of a method without a known run, in multiples of those of the scene's own run
 UNSEEN = 3.0
 
 
 @dataclass(frozen=True)
 class Setting:
-    """How the scene's own run is integrated; step: of fixed steps, else None."""
+    """Integrator and tolerance of the scene's own run; step: its fixed step [s], else None."""
 
     integrator: str
     rtol: float
@@ -49,7 +49,7 @@ class Setting:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """As attributes of a study."""
+        """Setting as attributes of a study."""
         setting = {"own_rtol": self.rtol} if self.step is None else {"own_step": self.step}
         return {"own_integrator": self.integrator, **setting}
 
@@ -66,19 +66,19 @@ class Design:
 
     @property
     def chooses_steps(self) -> bool:
-        """Whether its evaluations are those of the scene's own model at its tolerance."""
+        """True when the run has the scene's own model and steps of variable length."""
         return self.scene.solver.step is None and self.group in ("tolerance", "sampling")
 
-    def evaluations(self, seen: Mapping[str, Mapping[float, float]], own: float) -> float:
-        """Predicted evaluations of the right-hand side.
+    def evaluations(self, measured: Mapping[str, Mapping[float, float]], own: float) -> float:
+        """Predict the evaluations of the right-hand side.
 
-        seen: those of runs with chosen steps, by integrator and tolerance.  own: those of the scene as it is.
+        measured: those of runs with variable steps, by integrator and tolerance.  own: those of the scene's own run.
         """
         solver = self.scene.solver
         order = INTEGRATORS[solver.integrator].order
         if solver.step is not None:
             return (self.scene.time.end - self.scene.time.start) / solver.step * order
-        known = seen.get(solver.integrator)
+        known = measured.get(solver.integrator)
         if not self.chooses_steps:
             return UNSEEN * own
         if not known:
@@ -88,8 +88,8 @@ class Design:
 
 
 def neighbours(scene: Scene, own: Setting) -> list[Design]:
-    """The scene as it is and its neighbourhood, what answers most first: by its own method, since another one must be
-    compiled. Only fixed steps call for it early, which are no reference."""
+    """Return the scene as it is and its neighbours, the most informative first: runs by its own method, since another
+    one must be compiled. Only fixed steps, which are no reference, need the other method early."""
     asis, denser = _sampling(scene, own)
     if own.step is not None:
         mine = [_stepped(scene, own.integrator, own.step * factor) for factor in STEPS]
@@ -104,15 +104,15 @@ def neighbours(scene: Scene, own: Setting) -> list[Design]:
 
 
 def _others(scene: Scene, own: Setting) -> list[str]:
-    """Methods of other families than the scene's own: an explicit one, and one for what is stiff or vibrates."""
+    """Return methods of other families than the scene's: an explicit one, and one for stiff or vibrating systems."""
     implicit = VIBRATING if scene.flexible() and own.integrator != VIBRATING else STIFF
     return [name for name in (DEFAULT, implicit) if name != own.integrator]
 
 
 def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
-    """All methods over all their tolerances and steps, and the paper's choice.
+    """Return all methods over all their tolerances and steps, and the paper's choice.
 
-    integrators: those that are compared, all when empty.  Raises InputError for a method that is not compared.
+    integrators: methods to compare, all when empty.  Raises InputError for a method that is never compared.
     """
     known = [name for name, traits in INTEGRATORS.items() if traits.tolerances or traits.steps]
     for name in integrators:
@@ -147,7 +147,7 @@ def _words(solver: Mapping[str, Any]) -> str:
 
 
 def _solver(scene: Scene, **changes: Any) -> dict[str, Any]:
-    """The scene's solver with another method; its limits stay."""
+    """Return the scene's solver with another method and with its own limits."""
     own = scene.solver.model_dump(mode="json", exclude_none=True, exclude={*NAMING, "events", "by_need"})
     return own | changes
 
@@ -158,7 +158,7 @@ def _own(scene: Scene, own: Setting) -> dict[str, Any]:
 
 
 def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
-    """The scene as it is, and with denser output."""
+    """Yield the scene as it is, and with denser output."""
     interval, plain = scene.output.interval, {"solver": _own(scene, own), **PLAIN}
     yield Design("as it is", "sampling", {"interval": interval}, edited(scene, plain))
     output = scene.output.without(scene.output.stress or ())
@@ -167,9 +167,9 @@ def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
 
 
 def models(scene: Scene, own_setting: Setting, highest: float) -> Iterator[Design]:
-    """Mode sets by the frequencies that they reach, finer meshes, and another beam theory, with the own integrator.
+    """Yield mode sets by their highest frequencies, finer meshes, and other beam theories, with the scene's integrator.
 
-    highest: the highest frequency that the scene's bundles hold [Hz].
+    highest: the highest frequency of the scene's bundles [Hz].
     """
     recipes = [read_toml(Path(body.mesh)) for body in scene.flexible().values()]
     own_theory = str(recipes[0].get("theory", "rayleigh"))

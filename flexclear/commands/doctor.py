@@ -44,11 +44,11 @@ LIBRARIES = (
     "meshio",
     "matplotlib",
 )
-#: without these only pictures of shapes are missing
+#: optional libraries: only pictures of shapes need them
 OPTIONAL = ("pyvista", "vtk", "imageio")
-#: before each line: what is right, what is wrong, and what is lacking without being needed
+#: labels of a line: all right, wrong, or lacking but optional
 LABELS = {True: "ok   ", False: "WRONG", None: "lacks"}
-#: least space that is no reason to worry [B]
+#: smallest sufficient memory, disk space, and disk space for kernels [B]
 LITTLE_MEMORY, LITTLE_DISK, LITTLE_FOR_KERNELS = 1e9, 2e9, 1e8
 #: a body in free fall: after the time T [s] it has fallen by g T^2/2
 GRAVITY, T = 9.81, 0.1
@@ -67,7 +67,7 @@ mass = 2.0
 inertia = [0.1, 0.1, 0.1]
 pose = {{}}
 """
-#: run in a process of its own, where nothing is compiled: that would take longer than all else
+#: run in a process of its own, without compilation, which would take longer than all else
 RUN = """import sys
 import flexclear as fc
 from flexclear.pipeline.core.system.errors import FlexclearError
@@ -77,33 +77,31 @@ except FlexclearError as error:
     sys.exit(str(error))
 print(float(result.position.sel(body="ball", axis="z")[-1]))
 """
-#: templates that represent the kinds of parts that most mechanisms have
+#: templates with the kinds of parts that most mechanisms have
 USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
-#: integration is exact to its tolerance, 1e-10 of metres
+#: largest error [m]; the integration is exact to its tolerance of 1e-10
 CLOSE = 1e-9
 
 
 class UnwellError(FlexclearError):
-    """Something that this program needs is missing or wrong."""
+    """Error that reports something missing or wrong that this program needs."""
 
     exit_code = 4
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What it takes: nothing, what to repeat, or what to compile."""
+    """Add the command's arguments to its parser."""
     either = parser.add_mutually_exclusive_group()
-    either.add_argument(
-        "--bundle", metavar="SCENE", help="run a scene and write all that is needed to repeat it into one file"
-    )
-    either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="run what such a file holds")
+    either.add_argument("--bundle", metavar="SCENE", help="run a scene, and write all that repeats it into one file")
+    either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="repeat the run in such a file")
     either.add_argument(
         "--compile",
         nargs="*",
         metavar="SCENE",
-        help="compile now what runs of these scenes call, without running them; without names what most scenes call",
+        help="compile the functions of these scenes without a run; without names those of most scenes",
     )
     add_options(parser, "set")
-    parser.add_argument("--out", type=Path, metavar="FILE.zip", help="where --bundle writes")
+    parser.add_argument("--out", type=Path, metavar="FILE.zip", help="file that --bundle writes")
 
 
 def command(options: argparse.Namespace) -> None:
@@ -121,8 +119,8 @@ def command(options: argparse.Namespace) -> None:
             print(f"left out: {file}, since a mesh names it outside of the scene's folders; move it next to the mesh")
         return
     if options.repeat is not None:
-        same, said = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
-        print(said)
+        same, report = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
+        print(report)
         if not same:
             raise UnwellError("it does not end here as it did there")
         return
@@ -139,7 +137,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def findings() -> Iterator[tuple[str, str, bool | None]]:
-    """Name, finding, and whether that is right; None where something is lacking that only pictures need."""
+    """Yield name, finding, and True when it is right; None when something is lacking that only pictures need."""
     yield (
         "python",
         f"{platform.python_version()} on {platform.system()} {platform.machine()}",
@@ -156,7 +154,7 @@ def findings() -> Iterator[tuple[str, str, bool | None]]:
 
 
 def _results(root: Path) -> tuple[str, bool]:
-    """The folder of results, the space there, and what else keeps results from being written."""
+    """Return the folder of results with its free space and obstacles to writing, and True without obstacles."""
     free = machine.disk(root)
     wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
     if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
@@ -165,13 +163,13 @@ def _results(root: Path) -> tuple[str, bool]:
 
 
 def _kernels() -> tuple[str, bool]:
-    said: list[str] = []
+    messages: list[str] = []
     try:
-        folder = writable(kernel_root(), said.append)
+        folder = writable(kernel_root(), messages.append)
     except FlexclearError as error:
         return str(error), False
-    if said:
-        return f"{said[0]}: FLEXCLEAR_KERNELS names another folder", False
+    if messages:
+        return f"{messages[0]}: FLEXCLEAR_KERNELS names another folder", False
     text = f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled"
     if machine.disk(folder) < LITTLE_FOR_KERNELS:
         return f"{text}; only {machine.size(machine.disk(folder))} free: FLEXCLEAR_KERNELS names another folder", False
@@ -179,7 +177,7 @@ def _kernels() -> tuple[str, bool]:
 
 
 def _graphics() -> tuple[str, bool | None]:
-    """Draw something: libraries that load may still fail. Without them only pictures of shapes are lacking."""
+    """Draw something, since libraries that load may still fail; without them only pictures of shapes are lacking."""
     if gl.works():
         return f"{gl.state()}; a picture was drawn", True
     return f"{gl.state()}; nothing can be drawn: {gl.remedy()}", None
@@ -187,7 +185,7 @@ def _graphics() -> tuple[str, bool | None]:
 
 def _self_test() -> tuple[str, bool]:
     expected = -0.5 * GRAVITY * T**2
-    paths = os.pathsep.join([str(TREE), os.environ.get("PYTHONPATH", "")])  # where the libraries may be, too
+    paths = os.pathsep.join([str(TREE), os.environ.get("PYTHONPATH", "")])  # the libraries may be there, too
     try:
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
@@ -205,20 +203,20 @@ def _self_test() -> tuple[str, bool]:
         return f"a free fall cannot be computed: {error.strerror} ({error.filename})", False
     lines = done.stdout.split()
     if done.returncode or not lines:
-        said = done.stderr.strip().splitlines()
-        # of a traceback only the last line is for users
-        last_lines = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
+        errors = done.stderr.strip().splitlines()
+        # users need only the last line of a traceback
+        last_lines = errors[-1:] if any(line.startswith("Traceback") for line in errors) else errors[-4:]
         return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine
 
 
 def compiled_for(names: list[str], workplace: Workplace) -> list[str]:
-    """Compile, or fetch, what runs of scenes call; the usual ones' without names.  What each scene is called.
+    """Compile, or fetch from the cache, all functions that runs of scenes call; return the scenes' names.
 
-    For an image, a cluster, or before a lesson: nothing is compiled behind a user's back, since a process that stays
-    after its command would take a laptop's battery, be billed or killed by a scheduler, and write into a folder that a
-    container is about to throw away.
+    Without names, scenes with the most common kinds of parts are compiled.  For an image, a cluster, or before a
+    lesson: nothing is compiled in the background, since a process that outlives its command would use a laptop's
+    battery, be billed or killed by a scheduler, and write into a folder that a container is about to discard.
     """
     if names:
         return _compiled(scenes.graphs(names), workplace)
@@ -245,7 +243,7 @@ def _compiled(requested: Sequence[Graph], workplace: Workplace) -> list[str]:
 
 
 def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
-    """What a scene's methods call, and those that may take over."""
+    """Compile the functions of a scene's integrators, and of those that may take over."""
     from flexclear.pipeline.dynamics.compile import functions
     from flexclear.pipeline.dynamics.effects import schemes
 

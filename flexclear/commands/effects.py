@@ -1,4 +1,4 @@
-"""``flexclear effects``: what each part of a scene does to each quantity, taken away and put in, alone and in pairs."""
+"""``flexclear effects``: effect size of each part of a scene on each quantity, by removal, alone and in pairs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scene_arguments(parser, "json")
     parser.add_argument(
         "--members",
@@ -34,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring the tables up to date, print them and say where they are."""
+    """Bring the tables up to date, print them and where their files are."""
     workplace = open_workplace(options)
     datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
@@ -50,9 +50,9 @@ def command(options: argparse.Namespace) -> None:
 
 
 def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.MEMBERS) -> Made:
-    """All variants, and their differences: the effect sizes over (effect, other, quantity), and the page of them.
+    """Run all variants; return effect sizes over (effect, other, quantity), and their page.
 
-    Raises InputError for a scene without effects, or that watches nothing.
+    Raises InputError for a scene without effects or watched quantities.
     """
     from flexclear.pipeline.post.answers.effect_sizes import variants as requested
 
@@ -60,8 +60,8 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
         raise InputError(
             "--members", f"must be at least 2 (got {members})", "the scatter cannot be estimated from one start"
         )
-    there, chosen = variants.effects(scene), scene.watched()
-    if not there:
+    present, chosen = variants.effects(scene), scene.watched()
+    if not present:
         raise InputError(
             str(scene.path or scene.name),
             "has no effect that could be taken away: no clearance, flexible body, friction, gravity or stop",
@@ -69,10 +69,10 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
         )
     if not chosen:
         raise InputError(str(scene.path or scene.name), "nothing in it is watched", "name quantities in [view] watch")
-    by_name = {effect.name: effect for effect in there}
-    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(there)}
+    by_name = {effect.name: effect for effect in present}
+    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(present)}
     tasks = {gone: watched_quantities.task(variant, chosen, members) for gone, variant in scenes.items()}
-    (made,) = workplace.made(effect_study.task(scene, there, chosen, scenes, tasks, members))
+    (made,) = workplace.made(effect_study.task(scene, present, chosen, scenes, tasks, members))
     parts = [
         Part("chart", "Chart", pictures(made, {"effects.png": ("Each effect alone",)})),
         Part("table", "Table", tables(made, "effects.md")),

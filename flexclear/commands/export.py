@@ -1,4 +1,4 @@
-"""Results for other programs: files of the format that a name ends with (``run --out x.csv``), and JSON for scripts."""
+"""Results for other programs: files in the format of a name's ending (``run --out x.csv``), and JSON for scripts."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from flexclear.pipeline.core.system.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-#: by ending: library that writes it, where that is not installed with this program
+#: library that writes a format, by ending; empty where it is installed with this program
 NEEDS = {".nc": "", ".csv": "", ".mat": "", ".parquet": "pyarrow", ".xlsx": "openpyxl"}
 KNOWN = ", ".join(NEEDS)
 
 
 def check_format(target: Path, endings: Sequence[str] = tuple(NEEDS), option: str = "--out") -> None:
-    """InputError for a name whose ending is no known format, or one whose library is missing; before the work."""
+    """Raise InputError when a name's ending is no known format or its library is missing; called before the work."""
     if target.suffix not in endings:
         raise InputError(f"{option} {target}", f"'{target.suffix}' is no known format", f"known: {', '.join(endings)}")
     library = NEEDS.get(target.suffix, "")
@@ -31,7 +31,7 @@ def check_format(target: Path, endings: Sequence[str] = tuple(NEEDS), option: st
 
 
 def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",)) -> None:
-    """Write a dataset: ``.nc`` and ``.mat`` hold all of it, tables what has the dimensions `rows`."""
+    """Write a dataset: ``.nc`` and ``.mat`` hold everything, tables the variables with the dimensions `rows`."""
     if target.suffix == ".nc":
         write_dataset(target, dataset)
         return
@@ -47,7 +47,7 @@ def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",
 
 
 def _matlab(dataset: xr.Dataset) -> bytes:
-    """All variables and coordinates as arrays of a MATLAB file, words as cells."""
+    """Return all variables and coordinates as arrays of a MATLAB file, text as cells."""
     from scipy.io import savemat
 
     arrays = {str(name): array.values for name, array in dataset.variables.items()}
@@ -64,7 +64,7 @@ def _written(write_to: Callable[[Any], object]) -> bytes:
 
 
 def as_json(value: object) -> str:
-    """A result as JSON; datasets as their variables with dimensions, units and values, and their attributes."""
+    """Return a result as JSON; datasets with variables (dimensions, units, values) and attributes."""
     return json.dumps(value, indent=2, default=_plain, allow_nan=False)
 
 
@@ -79,7 +79,7 @@ def _plain(value: Any) -> Any:
 
 
 def _finite(values: Any) -> Any:
-    """Numbers of an array as lists; those that JSON does not have are null."""
+    """Return an array's numbers as lists, with null for those that JSON does not have."""
     plain = values.tolist() if hasattr(values, "tolist") else values
     if isinstance(plain, list):
         return [_finite(value) for value in plain]

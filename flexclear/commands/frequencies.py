@@ -1,4 +1,4 @@
-"""``flexclear frequencies``: equilibrium of a scene in a pose, and the natural frequencies there."""
+"""``flexclear frequencies``: equilibrium of a scene in a pose, and its natural frequencies."""
 
 from __future__ import annotations
 
@@ -23,27 +23,29 @@ if TYPE_CHECKING:
 
 #: characters of a bare number
 NUMBER = "+-.0123456789eE"
-#: speeds of one diagram
+#: largest number of speeds of one diagram
 MOST_SPEEDS = 10_000
 #: endings of pictures of Campbell diagrams
 PICTURES = (".png", ".svg")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
-    parser.add_argument("--at", metavar="TIME", help="time whose drive positions are held, e.g. 0.09 or '90 ms'")
+    parser.add_argument(
+        "--at", metavar="TIME", help="hold the drives at their positions at this time, such as 0.09 or '90 ms'"
+    )
     parser.add_argument(
         "--moving",
         action="store_true",
-        help="vibrations about steady motion: drives keep their speed instead of being held",
+        help="vibrations about steady motion: drives have their speed instead of being held",
     )
     parser.add_argument(
         "--speeds",
         metavar="FIRST:LAST:STEP",
         help="Campbell diagram: vibrations about steady motion at these speeds of the drive, e.g. 0:500rpm:50",
     )
-    parser.add_argument("--drive", metavar="NAME", help="with --speeds: the drive, where several move")
+    parser.add_argument("--drive", metavar="NAME", help="with --speeds: the drive, if there are several")
     parser.add_argument(
         "--out",
         type=Path,
@@ -55,7 +57,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Print the table."""
+    """Print the table of frequencies, or of a Campbell diagram with `--speeds`."""
     (graph,) = scenes.graphs([options.scene], options.set)
     time = scenes.moment(options.at)
     if options.speeds is not None:
@@ -74,7 +76,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _targets(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]:
-    """The files of `--out`, checked before the work; pictures: endings besides those of datasets."""
+    """Return the files of `--out`, checked before the work; pictures: endings besides those of datasets."""
     targets: list[Path] = options.out or []
     for target in targets:
         scenes.check_out(target, (options.scene,), endings=(*export.NEEDS, *pictures))
@@ -99,7 +101,7 @@ def diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> No
 
 
 def speeds(text: str) -> list[float]:
-    """Speeds [rad/s] of FIRST:LAST:STEP, the last included; one unit is enough for all three. Raises InputError."""
+    """Parse FIRST:LAST:STEP into speeds [rad/s], the last included; one unit serves all three. Raises InputError."""
     parts = [part.strip() for part in text.split(":")]
     rule = "takes FIRST:LAST:STEP, the step positive and the last speed above the first"
     units = {part.lstrip(NUMBER).strip() for part in parts} - {""}
@@ -122,7 +124,7 @@ def speeds(text: str) -> list[float]:
 
 
 def text(linear: xr.Dataset) -> str:
-    """Pose, residual and mobility, then frequency, damping and dominant part of every vibration (schema LINEAR)."""
+    """Format pose, residual, mobility, and frequency, damping and dominant part of every vibration (schema LINEAR)."""
     a = linear.attrs
     lines = [
         f"{a['scene']} at t = {a['time']:.6g} s, drives {a['drives']}",
@@ -144,14 +146,14 @@ def text(linear: xr.Dataset) -> str:
     fraction = linear["energy_share"].max("moving_body").values
     columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "decay_rate", "dominant")]
     for number, hertz, damping, rate, name, part in zip(*columns, fraction, strict=True):
-        # what is damped so far has two rates and no frequency: two rows of one motion
-        alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
-        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")
+        # an overdamped motion has two rates and no frequency: two rows of one motion
+        note = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
+        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){note}")
     return "\n".join(lines) + "\n"
 
 
 def _freedoms(linear: xr.Dataset) -> list[str]:
-    """How many there are, how many of them nothing drives back, and what their count leaves open."""
+    """Return lines on mobility: free motions, those without stiffness, and closure rows that follow from others."""
     limp, repeated = linear.attrs["motions_without_stiffness"], linear.attrs["redundant_closure_rows"]
     lines = [
         f"free motions besides the drives: {linear.attrs['mobility']}" + (f", {limp} without stiffness" if limp else "")
@@ -171,5 +173,5 @@ def _pose(linear: xr.Dataset) -> list[str]:
     names = [str(name) for name in linear["drive"].values]
     position, each = linear["drive_position"], linear.coords.get("drive_position_units")
     units = [str(position.attrs.get("units", ""))] * len(names) if each is None else [str(unit) for unit in each.values]
-    places = zip(names, position.values, units, strict=True)
-    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in places)]
+    columns = zip(names, position.values, units, strict=True)
+    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in columns)]

@@ -9,7 +9,7 @@ from flexclear.pipeline.core.artifacts.paths import DATA
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
 
 TEMPLATES = DATA / "stages" / "templates"
-#: kinds of mechanisms -> what they are
+#: kinds of mechanisms -> their descriptions
 KINDS = {
     "four-bar": "planar linkage of rigid bodies with one loose pin",
     "slider-crank": "flexible connecting rod, clearance at the crank pin",
@@ -20,16 +20,21 @@ KINDS = {
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     message = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
     parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=message)
     parser.add_argument(
-        "folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help="where; default: the current folder"
+        "folder",
+        nargs="?",
+        type=Path,
+        default=Path(),
+        metavar="FOLDER",
+        help="folder to write to (default: the current one)",
     )
 
 
 def command(options: argparse.Namespace) -> None:
-    """Write the files and say what to do next."""
+    """Write the files and print the next commands."""
     files = write(options.kind, options.folder)
     print(f"wrote {', '.join(str(path) for path in files)}")
     scene = files[0]
@@ -44,7 +49,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def write(kind: str, folder: Path) -> list[Path]:
-    """The files of a new mechanism, the scene first; InputError where one of them is there already."""
+    """Write the files of a new mechanism and return their paths, the scene first; InputError where one exists."""
     sources = sorted(
         (TEMPLATES / kind.replace("-", "_")).glob("*.toml"), key=lambda p: "[body" not in p.read_text(encoding="utf-8")
     )

@@ -1,5 +1,4 @@
-"""``flexclear plan``: which effects, modes and tolerance a scene's requested accuracy calls for, and by what
-evidence."""
+"""``flexclear plan``: effects, modes and tolerance that a scene's requested accuracy calls for, with the evidence."""
 
 from __future__ import annotations
 
@@ -15,7 +14,7 @@ from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.scene.variants import lessened
+from flexclear.pipeline.core.scene.variants import pruned
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.post.plotting.table import as_html, as_markdown
 from flexclear.stages import effect_plan, watched_quantities
@@ -26,25 +25,25 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: how a planned scene's file is called, after its scene's
+#: ending of a planned scene's file, after the scene's name
 SUFFIX = ".planned.toml"
-#: starts that `--verify` runs of scenes with contacts: more of them until the verdict is decided or the budget used [s]
+#: members that `--verify` runs of scenes with contacts, up to a verdict or to the budget [s]
 MEMBERS, BUDGET = (4, 8, 16, 32, 64), 60.0
 #: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
 LEVELS = ("10 %", "1 %", "0.1 %")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
-    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
+    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="also write the planned scene here (one scene)")
     parser.add_argument(
-        "--verify", action="store_true", help="run the full scene and say what the plan's true error is"
+        "--verify", action="store_true", help="also run the full scene, and report the plan's true error"
     )
 
 
 def command(options: argparse.Namespace) -> None:
-    """Plan scenes, print the decisions and say where the planned scenes are; with `--verify` their true errors."""
+    """Plan scenes, print the decisions and the planned scenes' files; with `--verify` print their true errors."""
     scenes.check_out(options.out, options.scenes, endings=(".toml",))
     workplace = open_workplace(options)
     missed, plans = list[str](), dict[str, object]()
@@ -73,17 +72,17 @@ def command(options: argparse.Namespace) -> None:
 
 
 def levels(scene: Scene, workplace: Workplace) -> str:
-    """What three accuracies of all watched quantities call for, as a table.
+    """Return a table of the plans for three accuracies of all watched quantities.
 
-    Raises InputError for a scene without effects, or that watches nothing; where no accuracy has a plan, what the last
-    one was refused for.
+    Raises InputError for a scene without effects or watched quantities, and the last refusal when no accuracy has a
+    plan.
     """
     from flexclear.pipeline.post.answers.plan import levels as shown
 
     plans: dict[str, xr.Dataset | str] = {}
     for level in LEVELS:
         try:
-            plans[level] = bring(asking(scene, level), workplace).made.dataset()
+            plans[level] = bring(with_accuracy(scene, level), workplace).made.dataset()
         except (InputError, FailedTasksError) as error:
             if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
@@ -91,8 +90,8 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     return as_markdown(shown(plans))
 
 
-def asking(scene: Scene, level: str) -> Scene:
-    """The scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
+def with_accuracy(scene: Scene, level: str) -> Scene:
+    """Return the scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
     chosen = {quantity.name: level for quantity in scene.watched()}
     if not chosen:
         raise InputError(str(scene.path or scene.name), "watches nothing", "name quantities in [view] watch")
@@ -102,16 +101,16 @@ def asking(scene: Scene, level: str) -> Scene:
 
 
 def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
-    """The planned scene, and the plan as a dataset that shows its answer in a notebook.
+    """Return the planned scene, and the plan as a dataset that shows its answer in a notebook.
 
-    level: accuracy of all watched quantities, where the scene requests none.  budget: of `errors_of` [s], or text; None
-    leaves them out.
+    level: accuracy of all watched quantities, where the scene requests none.  budget: time for `errors_of` [s], or
+    text; None leaves the errors out.
     """
     from flexclear.pipeline.post.answers.answered import answered
     from flexclear.pipeline.post.answers.plan import verified, words
 
     workplace = open_workplace()
-    planned = bring(scene if scene.accuracy is not None else asking(scene, level), workplace)
+    planned = bring(scene if scene.accuracy is not None else with_accuracy(scene, level), workplace)
     result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))
@@ -124,7 +123,7 @@ def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene
 
 @dataclass(frozen=True)
 class Planned:
-    """A plan that is up to date. scene: the full one.  planned: what the plan makes of it.
+    """A plan that is up to date. scene: the full one.  planned: the scene with the plan's decisions.
 
     made: effect sizes, decisions and evidence (`pipeline.post.answers.plan.dataset`), and the table ``plan.md``.
     """
@@ -135,11 +134,11 @@ class Planned:
 
     @property
     def target(self) -> Path:
-        """The planned scene's file."""
+        """Path of the planned scene's file."""
         return self.made.folder / f"{self.scene.name.rpartition('/')[2]}{SUFFIX}"
 
     def file(self, target: Path) -> bytes:
-        """The planned scene's file for a given path; it extends the full scene's."""
+        """Return the planned scene's file for a given path; it extends the full scene's."""
         assert self.scene.path is not None
         head = (
             "written by flexclear plan",
@@ -150,17 +149,17 @@ class Planned:
 
 
 def _example(scene: Scene) -> str:
-    """What `[accuracy]` of this scene could say."""
+    """Return an entry that this scene's `[accuracy]` could have."""
     watched = next((quantity for quantity in scene.watched() if quantity.kind == "position"), None)
     body = watched.owner if watched is not None else next(iter(scene.rigid()), "body")
     return f'{body}.position = "10 um"'
 
 
 def bring(scene: Scene, workplace: Workplace) -> Planned:
-    """The plan of a scene, brought up to date; the planned scene's file and the page next to it.
+    """Bring the plan of a scene up to date, and write the planned scene's file and the page next to it.
 
-    Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy nothing meets or everything does,
-    and what its runs raise.
+    Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy no plan or every plan meets, and
+    the errors of its runs.
     """
     where = f"{scene.path or scene.name}"
     if scene.accuracy is None or not scene.accuracy.quantities:
@@ -182,10 +181,10 @@ def bring(scene: Scene, workplace: Workplace) -> Planned:
 
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
-    """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
+    """Apply a plan to a scene: replace and remove parts, set solver and watched quantities."""
     decided = json.loads(plan.attrs["planned"])
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
-    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
+    fewer = pruned(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
     watch = [q.name for q in scene.watched() if q.is_there(owners)]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
@@ -198,7 +197,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
             "title": f"{scene.title}, as planned",
             "accuracy": None,
             "ensemble": None,
-            **({"solver": solver} if "integrator" in decided else {}),  # else the scene as it is
+            **({"solver": solver} if "integrator" in decided else {}),  # without a decision the solver stays
             "view": view | {"watch": watch},
         },
     )
@@ -207,7 +206,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
 
 
 def page(planned: Planned) -> bytes:
-    """The page of a plan: in words, the chart, the table, the planned scene."""
+    """Return the page of a plan: its answer in words, the chart, the table, the planned scene."""
     import html
 
     from flexclear.pipeline.post.answers.plan import words
@@ -225,7 +224,7 @@ def page(planned: Planned) -> bytes:
 
 
 def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:
-    """Run the full and the planned scene, print how much they differ, and return what was missed, in words.
+    """Run the full and the planned scene, print their differences, and return a sentence for each missed accuracy.
 
     budget: time for members that decide the verdicts [s].
     """
@@ -245,9 +244,9 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
 
 
 def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
-    """Distance of the planned run from the full one by quantity, each over members where it has contacts.
+    """Return the distance of the planned run from the full one by quantity, over members where the scene has contacts.
 
-    As many members as decide every verdict, as far as they fit into the budget [s].
+    Members are added until every verdict is decided, as far as the budget [s] allows.
     """
     from flexclear.pipeline.core.artifacts import effect_size
     from flexclear.pipeline.post.answers.plan import until_decided
@@ -267,7 +266,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
                 raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")
         for k, q in enumerate(chosen):
             relative = asked[q.name].relative
-            if relative is not None:  # what it is relative to is known now
+            if relative is not None:  # the size of the quantity is known now
                 result["requested"][k] = relative * effect_size.size(one, q)
         result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
         result.attrs |= {"full_evaluations": one.evaluations, "planned_evaluations": two.evaluations}

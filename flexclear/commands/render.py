@@ -14,7 +14,7 @@ from flexclear.stages.workplace import check, open_workplace, relative
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument(
         "--what",
@@ -29,11 +29,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="picture (png), film (gif, mp4), page to turn (html), or for other programs: gltf, pvd (ParaView); "
         "default: what suits",
     )
-    parser.add_argument("--at", metavar="TIME", help="of vibrations: time whose drive positions are held, e.g. '90 ms'")
+    parser.add_argument(
+        "--at", metavar="TIME", help="for vibrations: hold the drives at their positions at this time, such as '90 ms'"
+    )
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring them up to date and say where they are."""
+    """Bring the pictures up to date and print where they are."""
     requested = _requested(options.what, options.format)
     if options.at is not None and options.what != "vibrations":
         raise InputError("--at", "belongs to --what vibrations")
@@ -46,8 +48,8 @@ def command(options: argparse.Namespace) -> None:
     if len(graphs) > 1 and requested == ("modes", "html"):
         made.append(_mode_sets(graphs))
     outcome = workplace.bring(made)
-    there, files = workplace.artifacts(outcome), dict[str, list[str]]()
-    for one in (there[task] for task in made if task in there):
+    artifacts, files = workplace.artifacts(outcome), dict[str, list[str]]()
+    for one in (artifacts[task] for task in made if task in artifacts):
         files.setdefault(one.task.scene, []).extend(str(one.folder / name) for name in one.record.files)
         if not options.json:
             shown = [name for name in sorted(one.record.files) if not name.endswith(".vtp")]
@@ -59,7 +61,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _requested(what: str | None, kind: str | None) -> tuple[str, str] | None:
-    """What is to be made, None for what is usual.  Raises InputError for what cannot be shown so."""
+    """Return subject and format, None for the default ones.  Raises InputError for a format that the subject lacks."""
     if what is None and kind is None:
         return None
     what = what or "motion"
@@ -72,7 +74,7 @@ def _requested(what: str | None, kind: str | None) -> tuple[str, str] | None:
 
 
 def _mode_sets(graphs: list[Graph]) -> Task:
-    """The mode sets of several scenes on one page."""
+    """Return the task that shows the mode sets of several scenes on one page."""
     bundles = {f"bundle/{graph.scene.name}: {body}": task for graph in graphs for body, task in graph.bundle.items()}
     return Task(
         stage="render",

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import compare
-from flexclear.commands.answers import Answers, said
+from flexclear.commands.answers import Answers, shown_answer
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import graphs, in_file, pictures
 from flexclear.papers.wang_wang_2019 import tasks
@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.stages.graph import Graph
 
-#: what a report shows of the motion, by the names of `Graph.render`
+#: pictures of the motion in a report, by the names of `Graph.render`
 SHOWN_MOTION = ("motion mp4", "motion html", "modes html")
-#: general figures, in this order: caption, and what a reader who does not see them reads
+#: general figures, in this order: caption, and text for a reader who does not see them
 FIGURES = {
     name: (caption, alt)
     for name, caption, alt in rows("""
@@ -57,7 +57,7 @@ watched.png | Watched quantities | What the scene watches, over time
 energy.png | Energy | Energies over time, and the error of their balance
 """)
 }
-#: of a run's attributes, those that say how it was made, and what they are called
+#: attributes of a run that say how it was computed, and their labels
 COST = {
     "method": "integrator",
     "method_reason": "why this one",
@@ -80,24 +80,22 @@ PROVENANCE = {
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="scenes of the report; without any, the paper's")
     parser.add_argument(
-        "scenes", nargs="*", metavar="SCENE", help="the report of these scenes; without any, that of the paper"
-    )
-    parser.add_argument(
-        "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
+        "--folder", action="store_true", help="write a folder with the page and its pictures, not one file"
     )
     parser.add_argument(
         "--answers",
         choices=("all", "none"),
         default="all",
-        help="none leaves those out that take further runs (default all)",
+        help="none omits the answers that need further runs (default all)",
     )
     add_options(parser, "usual", "budget", "json")
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring it up to date and say where it is."""
+    """Bring the reports up to date and print where they are."""
     workplace = open_workplace(options)
     pages: dict[str, str] = {}
     for name, path in _pages(options, workplace):
@@ -109,7 +107,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _pages(options: argparse.Namespace, workplace: Workplace) -> Iterator[tuple[str, Path]]:
-    """Name and page of everything asked for, as soon as it is there."""
+    """Yield name and page of every requested report, as soon as it is written."""
     if not options.scenes:
         yield "paper", of_paper(workplace, folder=options.folder)
         return
@@ -120,9 +118,9 @@ def _pages(options: argparse.Namespace, workplace: Workplace) -> Iterator[tuple[
 
 
 def of_paper(workplace: Workplace, *, folder: bool = False) -> Path:
-    """Bring everything that the page of the paper shows up to date; returns the page, with `folder` one next to files.
+    """Bring everything on the page of the paper up to date; return the page, with `folder` one next to its files.
 
-    What fails is left out of the page and raised (FailedTasksError) after the page is written.
+    Parts that fail are left out of the page and raised (FailedTasksError) after the page is written.
     """
     outcome = tasks.bring(workplace)
     if gl.state().endswith("none"):
@@ -135,11 +133,11 @@ def of_paper(workplace: Workplace, *, folder: bool = False) -> Path:
 def of_scene(
     graph: Graph, workplace: Workplace, *, folder: bool = False, budget: float | None = None, answers: bool = True
 ) -> Path:
-    """Bring everything that the report of a scene shows up to date; returns the page.
+    """Bring everything in the report of a scene up to date; return the page.
 
     One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
-    it has no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: whether they are there.
-    Raises FailedTasksError when the run itself cannot be made.
+    the page has no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: False leaves out
+    those that take further runs. Raises FailedTasksError when the run itself fails.
     """
     scene = graph.scene
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
@@ -172,7 +170,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
 
 
 def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
-    """Those of the three answers that can be given, by name; why one cannot is said."""
+    """Return the answers that succeed, by name; report why another one fails."""
     result = {}
     for name in ("accuracy", "stability", "matters") if answers.questions else ("stability",):
         try:
@@ -186,10 +184,10 @@ def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
 
 
 def _answered(scene: Scene, result: Mapping[str, Made]) -> list[Part]:
-    """The three sections: each with a sentence that answers, a picture and a table."""
+    """Return the sections of the answers: each with a sentence, a picture and a table."""
     parts = []
     for name, answer in result.items():
-        words = said(name, answer, scene)
+        words = shown_answer(name, answer, scene)
         shown = pictures(answer, {words.picture: (words.caption,)})
         parts.append(Part(name, words.heading, f"<p>{html.escape(words.text)}</p>\n{shown}{words.table}"))
     return parts
@@ -208,7 +206,7 @@ def _page(
 
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
-    doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
+    warnings = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
     assumptions = by_weight(assumed(derived_series.sources(scene)), run)
     members = _members(graph, made)
     parts: list[Any] = [
@@ -216,7 +214,7 @@ def _page(
         Part("run", "The run", pictures(made.get(graph.overview), FIGURES)),
         *_answered(scene, answers),
         *(compare.parts(compared) if compared is not None else []),
-        Part("doubts", "Warnings", prose(("no.", "warning"), [(f"{k + 1}", text) for k, text in enumerate(doubts)])),
+        Part("doubts", "Warnings", prose(("no.", "warning"), [(f"{k + 1}", text) for k, text in enumerate(warnings)])),
         Part(
             "assumptions",
             "Assumptions, the most influential first",
@@ -234,11 +232,11 @@ def _page(
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
     changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
-    return page(scene.title, lead, parts, answer(dataset, run, doubts, changes, members))
+    return page(scene.title, lead, parts, answer(dataset, run, warnings, changes, members))
 
 
 def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
-    """Attributes by what they are called; whole numbers in groups of three, shares in per cent."""
+    """Return attributes by label; whole numbers in groups of three, fractions in per cent."""
     rows = {}
     for name, label in names.items():
         value = attributes.get(name)
@@ -254,7 +252,7 @@ def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, 
 
 
 def _members(graph: Graph, made: Mapping[Task, Made]) -> float | None:
-    """Horizon of the scene's ensemble [s]; None where there is none, or where it cannot be made."""
+    """Return the predictability horizon of the scene's ensemble [s]; None without an ensemble, or where it fails."""
     if graph.ensemble is None or graph.post not in made:
         return None
     return float(made[graph.post].dataset()["ensemble_horizon"])
@@ -269,7 +267,7 @@ def _provenance(graph: Graph, made: Mapping[Task, Made]) -> dict[str, str]:
 
 
 def _files(graph: Graph, compared: Made | None) -> dict[str, bytes]:
-    """The scene as it was written, with what it extends, its recipes, and the tables; small enough for any page."""
+    """Return the scene's file, its recipes and the tables, by name; small enough for any page."""
     files = {}
     if graph.scene.path is not None:
         files[graph.scene.path.name] = graph.scene.path.read_bytes()
@@ -282,7 +280,7 @@ def _files(graph: Graph, compared: Made | None) -> dict[str, bytes]:
 
 
 def _moving(graph: Graph, made: Mapping[Task, Made]) -> str:
-    """The film, and the views that can be turned."""
+    """Return the film and the interactive views as HTML."""
     text = ""
     for what, one in ((what, made[task]) for what, task in graph.render.items() if task in made):
         if what.endswith("html"):

@@ -1,4 +1,4 @@
-"""One file with all that is needed to repeat what a scene does: its files, versions, what was said. And the repeat."""
+"""One file with all that is needed to repeat a scene's run: its files, versions and log; and the repetition."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.stages import meshing
 from flexclear.stages.sweeps.sweep_points import source_digest
 
-#: entries of the file: what it is about, what was said; the scene's files are below the folder
+#: entries of the file: facts, log; the scene's files are below the folder
 FACTS, LOG, FILES = "facts.json", "log.txt", "files"
-#: bytes that are unpacked at most, and characters of a log that are stored
+#: largest size of the unpacked file [bytes], and length of a stored log [characters]
 LARGEST_UNPACKED, LONGEST_LOG = 1 << 30, 200_000
-#: last lines of what was said that are shown of each
+#: last lines of each log that are shown
 REPORTED = 5
-#: variables of the environment that change what is computed, or where
+#: variables of the environment that change results, or where they are stored
 VARIABLES = ("FLEXCLEAR_", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_")
 #: no date: equal content gives equal bytes
 DATE = (1980, 1, 1, 0, 0, 0)
 
 
 def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: Path | None) -> tuple[Path, list[Path]]:
-    """Run a scene and write all about it into one file (zip); its path, and files that are left out.
+    """Run a scene and write all about it into one file (zip); return its path, and the files that are left out.
 
-    No path of this machine is in it: files are called by their paths relative to each other, folders in what was said
-    by words.  Raises InputError for a scene that is not there.
+    The file holds no path of this machine: its paths are relative, and words replace folders in the log.  Raises
+    InputError for a scene that does not exist.
     """
     scene = scenes.find_scene(name).resolve()
     if not scene.is_file():
@@ -79,25 +79,25 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
 
 
 def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
-    """Run what a file of `make` holds, in a folder of its own; whether it ended as it did, and the message about that.
+    """Run the scene in a file of `make` in a separate folder; return True when its exit code is the same, and a report.
 
-    Raises InputError for what is no such file.
+    Raises InputError for a file of another kind.
     """
     with tempfile.TemporaryDirectory(prefix="flexclear_repeat_") as name:
         folder = Path(name).resolve()
         facts, log = _unpack(path, folder)
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
         done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
-        said = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST_LOG:]
+        output = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST_LOG:]
     differences = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
     if digest and facts.get("run"):
         differences += [
             f"the run is {'the same to the last bit' if digest == facts['run'] else 'not the same to the last bit'}"
         ]
-    now = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
-    then = {**facts["libraries"], "python": facts["python"]}
-    differences += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
-    ending = [text.strip().splitlines()[-REPORTED:] for text in (log, said)]
+    here = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
+    recorded = {**facts["libraries"], "python": facts["python"]}
+    differences += [f"{k} is {here[k]} here, {v} there" for k, v in sorted(recorded.items()) if here.get(k, v) != v]
+    ending = [text.strip().splitlines()[-REPORTED:] for text in (log, output)]
     differences += [
         f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines
     ]
@@ -105,13 +105,13 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
 
 
 def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], list[Path]]:
-    """All that the scene opens, and whether it is a text of ours: a scene or recipe; what is left out.
+    """Return all files of a scene, with True for scenes and recipes (texts of ours), and the files to leave out.
 
-    Left out is what meshes name outside of the folders of all else: it may be private, and only the mesh says so.  What
-    is wrong is what the file is made for, so each is taken as far as it goes.
+    Left out are files that meshes name outside of all other folders: they may be private, and only the mesh names them.
+    Errors in a file are skipped, since the bundle exists to report them.
     """
     texts, others, within = [scene], list[Path](), list[Path]()
-    for path in texts:  # grows by what these extend
+    for path in texts:  # the list grows by the scenes that these extend
         with contextlib.suppress(FlexclearError):
             extended = path.parent / str(read_toml(path).get("extends", path.name))
             if is_file(extended) and extended.resolve() not in texts:
@@ -137,7 +137,7 @@ def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], lis
 
 
 def _named(node: object, key: str) -> list[Path]:
-    """Files that a scene's table names by a key, at any depth."""
+    """Return the files that a scene's table names under a key, at any depth."""
     if isinstance(node, dict):
         own = [Path(node[key])] if isinstance(node.get(key), str) else []
         return own + _named(list(node.values()), key)
@@ -147,7 +147,7 @@ def _named(node: object, key: str) -> list[Path]:
 def _run(
     scene: Path, settings: Sequence[str], environment: Mapping[str, str]
 ) -> tuple[subprocess.CompletedProcess[str], str]:
-    """What running a scene says, and the sha256 of the dataset of the run, if there is one."""
+    """Run a scene in a process; return that process, and the sha256 of the run's dataset, empty without one."""
     changes = [word for text in settings for word in ("--set", text)]
     with tempfile.TemporaryDirectory(prefix="flexclear_run_") as folder:
         dataset = Path(folder) / "run.nc"
@@ -169,7 +169,7 @@ def _run(
 
 
 def _hidden(top: Path) -> dict[str, str]:
-    """Folders of this machine and the words for them, the longest first."""
+    """Return the folders of this machine and the words that replace them, the longest first."""
     places = {str(top): ".", str(results_root()): "<results>", str(kernel_root()): "<kernels>"}
     places |= {str(TREE): "<flexclear>", sys.prefix: "<python>", sys.base_prefix: "<python>"}
     places |= {str(Path.home()): "~", tempfile.gettempdir(): "<temporary>"}
@@ -183,7 +183,7 @@ def _without(text: str, hidden: Mapping[str, str]) -> str:
 
 
 def _text(path: Path, files: Iterable[Path]) -> bytes:
-    """Content of a text of ours with the others' paths relative to it."""
+    """Return the content of a scene or recipe, with paths of the other files relative to it."""
     content = path.read_bytes()
     for other in files:
         relative = Path(os.path.relpath(other, path.parent)).as_posix()
@@ -193,7 +193,7 @@ def _text(path: Path, files: Iterable[Path]) -> bytes:
 
 
 def _spellings(path: PurePath) -> tuple[str, ...]:
-    """How TOML may write a path: on Windows with two strokes in "...", with one in '...', or with /."""
+    r"""Return the ways in which TOML may write a path: on Windows with \\ in "...", with \ in '...', or with /."""
     return json.dumps(str(path), ensure_ascii=False)[1:-1], str(path), path.as_posix()
 
 
@@ -207,7 +207,7 @@ def _packed(content: Mapping[str, bytes]) -> bytes:
 
 
 def _unpack(path: Path, folder: Path) -> tuple[dict[str, Any], str]:
-    """Facts and log; the files are put into the folder, and nowhere else."""
+    """Return facts and log of a file, and unpack its other entries into the folder, and nowhere else."""
     require_file(path, str(path))
     try:
         with zipfile.ZipFile(path) as archive:

@@ -26,7 +26,7 @@ from flexclear.stages.workplace import Workplace, check, open_workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scene_arguments(parser, "json")
     parser.add_argument(
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
@@ -35,18 +35,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"write the run here: {export.KNOWN}",
+        help=f"write the run to this file: {export.KNOWN}",
     )
+    parser.add_argument("--planned", action="store_true", help="run the scene that `flexclear plan` selects")
     parser.add_argument(
-        "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
-    )
-    parser.add_argument(
-        "--verify", action="store_true", help="with --planned: run the full scene, report the true error"
+        "--verify", action="store_true", help="with --planned: also run the full scene, and report the true error"
     )
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring scenes up to date; say what their bundles lack where those were asked for."""
+    """Bring scenes up to date; print the deficits of their bundles where those are the last stage."""
     check_out(options.out, options.scenes)
     if options.verify and not options.planned:
         raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
@@ -75,11 +73,11 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _result(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, object]:
-    """What `run --json` prints of a scene: the files that are shown, warnings, and the verdict on its accuracy."""
+    """Return the JSON record of a scene: its shown files, warnings, and the verdict on its accuracy."""
     folder, record = workplace.store.root / graph.simulate.folder, outcome.records.get(graph.simulate)
-    said = {} if record is None else record.said
+    reported = {} if record is None else record.said
     return {
         "files": [str(path) for path in sorted(folder.rglob("*")) if path.is_file() and FACTS not in path.parts],
-        "warnings": [text for text in said.get("warnings", "").split("\n") if text],
-        "accuracy": said.get("accuracy_verdict"),
+        "warnings": [text for text in reported.get("warnings", "").split("\n") if text],
+        "accuracy": reported.get("accuracy_verdict"),
     }

@@ -1,4 +1,4 @@
-"""Scenes that a command or a function of Python names: read, examined, brought up to date."""
+"""Scenes that a command or a Python function names: read, checked, brought up to date."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import export
-from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts import maintenance
 from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
@@ -38,47 +38,47 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.schema import Scene
-#: bytes of what `--set` changes that are in the name of a folder
+#: largest length of the `--set` changes in a folder's name [bytes]
 LONGEST_EDITS = 100
 #: folder below a scene's results that is not for users
 FACTS = ".facts"
 
 
 def scene_arguments(parser: argparse.ArgumentParser, *more: str, **changed: Any) -> None:
-    """What all commands take that bring scenes up to date; more, changed: as of `workplace.add_options`."""
+    """Add the arguments of all commands that bring scenes up to date; more, changed: see `workplace.add_options`."""
     parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
     add_options(parser, "usual", *more, **changed)
 
 
 def print_files(folder: Path, files: Mapping[str, str]) -> None:
-    """One line on what was written where, of those files that are there."""
-    there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
-    if there:
-        print(f"{relative(folder)}: {', '.join(there)}")
+    """Print one line that lists the files that exist in a folder, with their descriptions."""
+    existing = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
+    if existing:
+        print(f"{relative(folder)}: {', '.join(existing)}")
 
 
 def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
-    """Those pictures and films of an artifact that are there, as HTML; by name their captions, and what they show."""
+    """Return the existing pictures and films of an artifact as HTML; captions: caption and description by file name."""
     files = made.record.files if made is not None else {}
     return "".join(media(name, made.read(name), *text) for name, text in captions.items() if made and name in files)
 
 
 def tables(made: Made, *names: str) -> str:
-    """Tables of an artifact, which it has as Markdown, as HTML."""
+    """Return Markdown tables of an artifact as HTML."""
     return "".join(as_html(from_markdown(made.text(name))) for name in names)
 
 
 def joined(names: Sequence[str]) -> str:
-    """The name of the folder of what is made of several scenes."""
+    """Return the name of a folder for results of several scenes."""
     return "+".join(name.replace("/", "_").replace(" ", "_") for name in names)
 
 
 class MissedAccuracyError(SolverError):
-    """Runs are not as accurate as their scenes ask; the runs are stored, with their verdicts."""
+    """Error for runs that are not as accurate as their scenes ask; the runs are stored, with their verdicts."""
 
 
 def find_scene(name: str) -> Path:
-    """The file of a scene given by path or by name (``sps4/csj``). InputError names what is near."""
+    """Return the file of a scene given by path or by name (``sps4/csj``). InputError suggests similar names."""
     path = Path(name)
     if path.suffix == ".toml" or is_file(path):
         return path
@@ -91,17 +91,17 @@ def find_scene(name: str) -> Path:
 
 
 def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
-    """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
+    """Return the dataset of the simulate stage, brought up to date; titled and named as the scene is.
 
-    An edited scene (`override`) is cached like any other but does not replace its file's
-    results under results/runs.  Raises FlexclearError.
+    An edited scene (`override`) is cached like any other but does not replace its file's results under results/runs.
+    Raises FlexclearError.
     """
     examine(scene)
     workplace = workplace or open_workplace()
     from flexclear.pipeline.core.artifacts import modal as modal  # gives the dataset its accessor
 
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
-    # in this process: workers would run a caller's script again from its top
+    # in this process: a worker would run a caller's script again from its top
     (made,) = workplace.datasets(task, jobs=1)
     from flexclear.pipeline.core.artifacts.table import recorded
 
@@ -109,9 +109,9 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
 
 
 def results(scene: Scene | str | Path) -> xr.DataTree:
-    """What there is of a scene below results/runs, or in a file with a dataset, as a tree; nothing is run.
+    """Return the datasets of a scene below results/runs, or the dataset in a file, as a tree; nothing is run.
 
-    InputError when there is nothing, or the file holds something else.
+    InputError without results, or for a file with other contents.
     """
     import xarray as xr
 
@@ -130,18 +130,18 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     )
     if not files:
         raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
-    changed = upkeep.shown_faults(Store(results_root()), folder)
+    changed = maintenance.shown_faults(Store(results_root()), folder)
     if changed:
         raise ResourceError(f"{changed[0]}: flexclear run {name}")
     if _of_another_run(folder):
         files = [path for path in files if path != folder / "post.nc"]
-    # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
+    # datasets are loaded and closed: the garbage collector closes open ones inside of whatever NetCDF call runs then
     tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.load_dataset(path) for path in files}
     return xr.DataTree.from_dict(tree, name=folder.name)
 
 
 def _dataset(path: Path) -> xr.Dataset:
-    """The dataset in a file; InputError for what is no scene's (a sweep's, another program's)."""
+    """Return the dataset in a file; InputError for one that is no scene's (a sweep's, another program's)."""
     import xarray as xr
 
     require_file(path, str(path))
@@ -155,16 +155,17 @@ def _dataset(path: Path) -> xr.Dataset:
 
 
 def _of_another_run(folder: Path) -> bool:
-    """Whether the shown post.nc was derived from another run than is shown, as after `fc.run` of a changed scene."""
+    """Return True when the shown post.nc is derived from another run than the shown one, as after edits and
+    `fc.run`."""
     store, where = Store(results_root()), folder.relative_to(results_root()).as_posix()
     post, made = store.last(where, "post"), store.last(where, "simulate")
     return post is not None and made is not None and post.facts.get("input run") != made.digest
 
 
 def bundles(scene: Scene, workplace: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
-    """The reduced flexible bodies of a scene by name, brought up to date.
+    """Return the reduced flexible bodies of a scene by name, brought up to date.
 
-    jobs: as of `Workplace.bring`; one is this process, since workers would run a caller's script again from its top.
+    jobs: as of `Workplace.bring`; one is this process, since a worker would run a caller's script again from its top.
     Raises FlexclearError.
     """
     tasks = Graph(scene, shown=False).bundle
@@ -172,7 +173,7 @@ def bundles(scene: Scene, workplace: Workplace | None = None, jobs: int | None =
 
 
 def deficits(graph: Graph, workplace: Workplace) -> str:
-    """What the scene's bundles lack, one table for each flexible body."""
+    """Return a table for each flexible body of what its bundle lacks."""
     from flexclear.pipeline.core.artifacts.deficits import table
 
     reduced = dict(zip(graph.bundle, workplace.datasets(*graph.bundle.values()), strict=True))
@@ -180,7 +181,7 @@ def deficits(graph: Graph, workplace: Workplace) -> str:
 
 
 def linear(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
-    """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is.
+    """Return the equilibrium of a scene in one pose, and its natural vibrations; brought up to date as `run` is.
 
     pose: as of `Graph.linear`.
     """
@@ -193,9 +194,9 @@ def linear(scene: Scene, time: float | None = None, workplace: Workplace | None 
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
-    """Report what the scenes' runs are to be doubted for, as the last thing that a command says.
+    """Report the warnings and accuracy verdicts of the scenes' runs, as the last output of a command.
 
-    Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
+    Then raises MissedAccuracyError for runs that are not as accurate as requested, and for the sentences in `plans`.
     """
     missed = [*plans]
     for graph in graphs:
@@ -217,12 +218,12 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
 
 
 def as_in_its_file(scene: Scene) -> bool:
-    """Whether a scene is what its file says, so that its results are shown below results/runs."""
+    """Return True when a scene is as its file has it, so that its results are shown below results/runs."""
     return scene.path is not None and load_scene(scene.path) == scene
 
 
 def overrides(settings: Sequence[str]) -> dict[str, object]:
-    """``KEY=VALUE`` texts as edits of a scene; a value is what TOML reads, else text. InputError for other texts."""
+    """Parse ``KEY=VALUE`` texts into edits of a scene; values are TOML, else text. InputError for other texts."""
     changes: dict[str, object] = {}
     for text in settings:
         key, sign, value = text.partition("=")
@@ -230,7 +231,7 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
             raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
         try:
             changes[key.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except ValueError:  # no TOML, or a number of more digits than Python reads
+        except ValueError:  # not TOML, or a number with more digits than Python reads
             changes[key.strip()] = value.strip()
         except RecursionError:
             raise InputError(f"--set {text}", "nests tables or lists too deeply to be read") from None
@@ -238,23 +239,23 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
 
 
 def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
-    """The scene called `name` with `settings` changed; its own name then contains them, and so do its results."""
+    """Load the scene called `name` and apply `settings`; its own name then contains them, and so do its results."""
     scene = load_scene(find_scene(name), overrides(settings))
     scene._name = with_edits(scene.name, settings)
     return scene
 
 
 def with_edits(name: str, settings: Sequence[str]) -> str:
-    """The name with what was changed, as a folder's name: of what is long the beginning, and a digest of the whole."""
+    """Return the name with its changes, as a folder's name; long changes are shortened to a start and a digest."""
     if not settings:
         return name
-    suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
+    suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # Windows drops final dots
     short = suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
     return f"{name},{short}"
 
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
-    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are reported
+    """Return the graphs of the scenes with `settings` (KEY=VALUE) applied, each once; errors of all are raised
     together."""
     by_scene: dict[Path | str, Graph] = {}
     wrong: list[InputError] = []
@@ -279,7 +280,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
 
 @contextmanager
 def in_file(path: Path | None) -> Iterator[None]:
-    """Errors without a file in their location get this one."""
+    """Add this file to the location of errors that have none."""
     try:
         yield
     except InputError as error:
@@ -287,7 +288,7 @@ def in_file(path: Path | None) -> Iterator[None]:
 
 
 def placed(error: InputError, path: Path | None) -> InputError:
-    """An error with the file before its place, where that is only a part of the file."""
+    """Return an error with the file before its place, where that is only a part of the file."""
     if isinstance(error, InputErrors):
         return InputErrors([placed(one, path) for one in error.errors])
     if path is None or not error.place.startswith("["):
@@ -296,25 +297,25 @@ def placed(error: InputError, path: Path | None) -> InputError:
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
-    """Plausibility warnings about a scene; those about values that `settings` changed are located there."""
+    """Return plausibility warnings about a scene; those about values from `settings` are located there."""
     changed = overrides(settings)
-    doubts = []
-    for doubt in implausible(scene):
-        key = doubt.place.partition("[")[2].rstrip("]")
-        place = f"--set {key}" if key in changed else doubt.place
-        doubts.append(InputError(place, doubt.problem, doubt.remedy))
-    return doubts
+    warnings = []
+    for warning in implausible(scene):
+        key = warning.place.partition("[")[2].rstrip("]")
+        place = f"--set {key}" if key in changed else warning.place
+        warnings.append(InputError(place, warning.problem, warning.remedy))
+    return warnings
 
 
 def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
-    """Print plausibility warnings; InputErrors for names that lead nowhere. Both before anything is computed."""
+    """Print plausibility warnings; raise InputErrors for dangling names. Both come before any computation."""
     require_names(scene)
-    for doubt in implausibilities(scene, settings):
-        print(f"flexclear: {WARNING}{lines.located(doubt)}", file=sys.stderr)
+    for warning in implausibilities(scene, settings):
+        print(f"flexclear: {WARNING}{lines.located(warning)}", file=sys.stderr)
 
 
 def require_names(scene: Scene) -> None:
-    """InputErrors for names in a scene that lead nowhere, before a mesh or a mode is computed for it."""
+    """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
     wrong = dangling(table, recipe_frames, str(scene.path or scene.name))
     if wrong:
@@ -322,7 +323,7 @@ def require_names(scene: Scene) -> None:
 
 
 def recipe_frames(mesh: str) -> list[str] | None:
-    """Names of the frames in a mesh recipe; None where it cannot be read, which is reported elsewhere."""
+    """Return the names of the frames in a mesh recipe; None when it cannot be read, which is reported elsewhere."""
     try:
         frames = read_toml(Path(mesh)).get("frames")
     except InputError:
@@ -340,7 +341,7 @@ def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:
 def check_out(
     out: Path | None, given: Sequence[str], what: str = "scene", endings: Sequence[str] = tuple(export.NEEDS)
 ) -> None:
-    """InputError for `--out` where no file of one of the scenes can be written; asked before the work."""
+    """Raise InputError for `--out` where no file of one of the scenes can be written; called before the work."""
     if out is None:
         return
     if len(given) > 1:
@@ -350,7 +351,7 @@ def check_out(
 
 
 def moment(text: str | None) -> float | None:
-    """The time that `--at` names [s]; InputError for what is no time."""
+    """Return the time that `--at` names [s]; InputError for text that is no time."""
     try:
         return None if text is None else quantity(text, "time")
     except ValueError as error:
@@ -358,7 +359,7 @@ def moment(text: str | None) -> float | None:
 
 
 def write_page(page: Path, text: str, files: Mapping[str, bytes]) -> None:
-    """A page in Markdown, with files by their names in a folder of its name next to it."""
+    """Write a page in Markdown, with its files in a folder of the same name next to it."""
     folder = page.parent / page.stem
     with disk_limits(page.parent):
         folder.mkdir(parents=True, exist_ok=True)
@@ -368,24 +369,24 @@ def write_page(page: Path, text: str, files: Mapping[str, bytes]) -> None:
 
 
 def check_target(target: Path, option: str = "--out") -> None:
-    """InputError when a file cannot be put there; asked before the work, not after it."""
+    """Raise InputError when a file cannot be written there; called before the work."""
     where = f"{option} {target}"
     try:
         if not target.parent.is_dir():
             raise InputError(where, "its folder does not exist", f"mkdir -p {target.parent}")
         if target.is_dir():
             raise InputError(where, "is a folder", "name a file in it")
-        if target.exists() and not target.is_file():  # a new file would replace a device
+        if target.exists() and not target.is_file():  # replacing a device by a file would destroy it
             raise InputError(where, "is no ordinary file", "name a file, and look at it when it is there")
     except OSError as error:
         raise InputError(where, f"can be no file: {error.strerror}", "name another one") from None
 
 
 def _refuse_namesakes(scenes: list[Scene]) -> None:
-    """InputError when two files given together have one name."""
+    """Raise InputError when two files given together have the same scene name."""
     folders: dict[str, Path] = {}
     for scene in scenes:
-        path, name = _file(scene), file_names.folded(scene.name)  # as Windows and macOS name folders
+        path, name = _file(scene), file_names.folded(scene.name)  # equal names on Windows and macOS
         if path is not None and folders.setdefault(name, path) != path:
             raise InputError(
                 str(path),
@@ -395,7 +396,7 @@ def _refuse_namesakes(scenes: list[Scene]) -> None:
 
 
 def claim(scene: Scene, store: Store) -> str | None:
-    """Note that results/runs/<name> is of this file; a sentence when it was of another one that is still there."""
+    """Note that results/runs/<name> belongs to this file; return a sentence when it belonged to another one."""
     path = _file(scene)
     if path is None:
         return None

@@ -9,14 +9,14 @@ KINDS = ("scene", "recipe", "sweep")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     parser.add_argument(
         "kind", nargs="?", choices=KINDS, default="scene", metavar="KIND", help="scene (default), recipe or sweep"
     )
 
 
 def command(options: argparse.Namespace) -> None:
-    """Print it."""
+    """Print the JSON schema of a kind of file."""
     if options.kind == "scene":
         from flexclear.pipeline.core.scene.json_schema import scene_schema as schema
     elif options.kind == "sweep":

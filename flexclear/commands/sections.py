@@ -1,4 +1,4 @@
-"""``flexclear sections``: is a repeated motion periodic, quasi-periodic or chaotic, and by what evidence."""
+"""``flexclear sections``: verdict whether a repeated motion is periodic, quasi-periodic or chaotic, with evidence."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
-    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="also write the verdicts as a page")
 
 
 def command(options: argparse.Namespace) -> None:
@@ -38,7 +38,7 @@ def command(options: argparse.Namespace) -> None:
 def write_page(
     verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
 ) -> None:
-    """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name next to it."""
+    """Write the verdicts as a page, with figures (PNG) and a table (CSV) in a folder of the same name next to it."""
     from flexclear.pipeline.post.sections.verdict_page import csv_text, markdown
 
     files = {f"{name.replace('/', '_')}.png": picture for name, picture in pictures.items()}
@@ -47,7 +47,7 @@ def write_page(
 
 
 def text(scene: str, verdict: xr.Dataset) -> str:
-    """The verdict in words, and the numbers behind it (schema VERDICT)."""
+    """Return the verdict in words, and its numbers (schema VERDICT)."""
     lines = [f"{scene}: {verdict.attrs['verdict']}"]
     lines += [f"  {reason}" for reason in str(verdict.attrs["reasons"]).split("; ")]
     if "contraction" in verdict:

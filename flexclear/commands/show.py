@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
 
 
@@ -50,20 +50,20 @@ def command(options: argparse.Namespace) -> int:
 
 
 def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
-    """Write picture and page, and print where they are; returns the files, and why the start is refused if it is."""
+    """Write picture and page, and print where they are; return the files, and the start's error or None."""
     with scenes.in_file(scene.path):
-        seen, refused = viewed(scene)
-    files = files_of(scene, seen, Path.cwd() if folder is None else folder, quiet=quiet)
+        view, refused = viewed(scene)
+    files = files_of(scene, view, Path.cwd() if folder is None else folder, quiet=quiet)
     if not quiet:
         print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
-    for gap in seen.gaps:
-        print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.said}", file=sys.stderr)
+    for gap in view.gaps:
+        print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.words}", file=sys.stderr)
     return files, None if refused is None else scenes.placed(refused, scene.path)
 
 
 @dataclass(frozen=True)
 class Start:
-    """What `flexclear.show` returns: the view, why the start is refused, and the page."""
+    """Result of `flexclear.show`: the view, the error that refuses the start, and the page."""
 
     view: StartView
     refused: InputError | None
@@ -71,27 +71,27 @@ class Start:
 
     @property
     def gaps(self) -> dict[str, str]:
-        """What joints miss, by name; empty where all fit."""
-        return {gap.joint: gap.said for gap in self.view.gaps}
+        """Description of each joint's gap, by name; empty where all joints fit."""
+        return {gap.joint: gap.words for gap in self.view.gaps}
 
     def _repr_html_(self) -> str:
-        """The page within a notebook, in a frame of its own so that its style stays there."""
+        """Return the page for a notebook, in a frame of its own so that its style stays there."""
         text = html.escape(self.page.decode(), quote=True)
         return f'<iframe srcdoc="{text}" width="100%" height="760" style="border:0"></iframe>'
 
 
 def start(scene: Scene, folder: Path | None = None) -> Start:
-    """The start pose of a scene; picture and page are written where a folder is given.  Raises InputError."""
+    """Return the start pose of a scene; write picture and page where a folder is given.  Raises InputError."""
     scenes.require_names(scene)
     with scenes.in_file(scene.path):
-        seen, refused = viewed(scene)
+        view, refused = viewed(scene)
     if folder is not None:
-        files_of(scene, seen, folder)
-    return Start(seen, refused, _page(scene, seen))
+        files_of(scene, view, folder)
+    return Start(view, refused, _page(scene, view))
 
 
 def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
-    """The start pose with its names, and why it is refused.  Raises InputError where there is none to be drawn."""
+    """Return the start pose with its names, and the error that refuses it.  Raises InputError if none can be drawn."""
     from flexclear.pipeline.dynamics.model.start_pose import start_pose
     from flexclear.pipeline.dynamics.run.run import placed
     from flexclear.pipeline.post.render.mechanism import Looks
@@ -102,22 +102,22 @@ def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
     filled = _filled(scene, bodies, lone := _unplaced(scene))
     pose = start_pose(placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
     gaps = [Missing(gap.joint, gap.start, gap.end, gap.angle) for gap in pose.gaps]
-    seen = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
+    view = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
     if lone:
         note = f"drawn at the origin, since neither a pose nor a joint places them: {', '.join(lone)}"
-        seen = replace(seen, notes=(*seen.notes, note))
-    return seen, pose.refused
+        view = replace(view, notes=(*view.notes, note))
+    return view, pose.refused
 
 
-def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False) -> list[Path]:
+def files_of(scene: Scene, view: StartView, folder: Path, *, quiet: bool = False) -> list[Path]:
     """Write the page, and the picture where this machine can draw.  Raises ResourceError."""
     stem = Path(scene.name).name
-    content = {f"{stem}_start.html": _page(scene, seen)}
+    content = {f"{stem}_start.html": _page(scene, view)}
     if gl.works():
         from flexclear.pipeline.post.render.pictures import png
         from flexclear.pipeline.post.render.start_view import picture
 
-        content[f"{stem}_start.png"] = png(picture(seen, scene.title or stem))
+        content[f"{stem}_start.png"] = png(picture(view, scene.title or stem))
     elif not quiet:
         print(f"flexclear: warning: no picture, only the page: {gl.remedy()}", file=sys.stderr)
     try:
@@ -128,15 +128,15 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
     return [folder / name for name in content]
 
 
-def _page(scene: Scene, seen: StartView) -> bytes:
+def _page(scene: Scene, view: StartView) -> bytes:
     from flexclear.pipeline.post.render.start_view import page_view
 
     title = scene.title or Path(scene.name).name
-    return viewer_page(f"{title}: start", [viewer(page_view(seen), title)])
+    return viewer_page(f"{title}: start", [viewer(page_view(view), title)])
 
 
 def _body(recipe: Path) -> xr.Dataset:
-    """What is rigid of a mesh, and what is drawn of it."""
+    """Return rigid-body data and drawn surface of a mesh."""
     from flexclear.pipeline.structure.kinds import kind
     from flexclear.pipeline.structure.modes import bundle
 
@@ -145,14 +145,14 @@ def _body(recipe: Path) -> xr.Dataset:
 
 
 def _unplaced(scene: Scene) -> list[str]:
-    """Bodies that neither a pose nor a joint places, as in scenes that are only about a body's modes."""
+    """Return the bodies that neither a pose nor a joint places, as in scenes about a body's modes alone."""
     joined = {frame.partition(".")[0] for joint in scene.joint.values() for frame in joint.between}
     paths = {drive.frame.partition(".")[0] for drive in scene.drive.values() if hasattr(drive, "frame")}
     return [n for n, b in scene.body.items() if getattr(b, "pose", b) is None and n not in joined | paths]
 
 
 def _filled(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Scene:
-    """The scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
+    """Return the scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
 
     lone: bodies that are put at the origin.
     """

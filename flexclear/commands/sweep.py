@@ -27,16 +27,16 @@ from flexclear.stages.sweeps import sweep_large, sweep_plan
 from flexclear.stages.sweeps.sweep_engine import Engine, Job, engine
 from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative
 
-#: of the shown files, without their endings
+#: name of the shown files, without their endings
 NAME = "sweep"
-#: what a sweep without a file is called
+#: name of a sweep without a file
 UNNAMED = "sweep"
 #: finished points are stored after so many seconds, later after that fraction of the time so far
 OFTEN, FRACTION = 2.0, 0.01
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
     add_options(parser, "usual", "json")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
@@ -69,16 +69,16 @@ def command(options: argparse.Namespace) -> None:
 
 
 def width(asked: int | None) -> int:
-    """Number of workers; InputError for one that cannot be."""
+    """Return the number of workers; InputError for a number below one."""
     if asked is not None and asked < 1:
         raise InputError("--jobs", f"must be at least 1, not {asked}", "leave it out to use every core")
     return asked or cores.cores()
 
 
 def read(path: Path, settings: Sequence[str] = ()) -> tuple[Sweep, Scene]:
-    """A sweep file and its scene, which is searched for next to the file, then below scenes/.
+    """Return a sweep file and its scene, which is searched next to the file, then below scenes/.
 
-    settings: as `--set` has them; changes of the scene that hold at all points.
+    settings: changes of the scene at all points, ``KEY=VALUE`` as of `--set`.
     """
     sweep = load_sweep(path)
     own_path = path.parent / sweep.scene
@@ -94,22 +94,22 @@ def read(path: Path, settings: Sequence[str] = ()) -> tuple[Sweep, Scene]:
 def of_scene(
     scene: Scene, table: Mapping[str, Any], workers: int | None = None, scheduler: str | None = None
 ) -> xr.Dataset:
-    """The dataset of a sweep that a table describes as a file does, but for its scene; see `fc.sweep`."""
+    """Return the dataset of a sweep from a table with the keys of a sweep file except its scene; see `fc.sweep`."""
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
     with engine(width(workers), scheduler) as runner:
         return bring(plan, runner, open_workplace())
 
 
 @dataclass
-class _Desk:
-    """Where finished points arrive: they are stored now and then, and reported."""
+class _Sink:
+    """Collector of finished points: it stores them now and then, and reports progress."""
 
     plan: sweep_plan.Plan
     workplace: Workplace
     total: int
     done: dict[str, Point]
     waiting: list[tuple[Job, Point]] = field(default_factory=list)
-    here: bool = True  #: whether this machine computes them
+    here: bool = True  #: True when this machine computes the points
     large: bool = False  #: values are left out of `done`: they are in the store, and memory does not hold them
     begun: float = field(default_factory=time.monotonic)
     stored: float = field(default_factory=time.monotonic)
@@ -120,7 +120,7 @@ class _Desk:
         self.refused = sum(bool(point.refused) for point in self.done.values())
 
     def take(self, finished: Sequence[tuple[Job, Point]], report: Callable[[float, str], None]) -> None:
-        """Note finished points."""
+        """Add finished points and report the progress."""
         self.waiting += finished
         self.done |= {job.key: sweep_large.stripped(point) if self.large else point for job, point in finished}
         self.fresh += len(finished)
@@ -133,7 +133,7 @@ class _Desk:
         report(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{text}, {rate:.3g}/s")
 
     def store(self) -> None:
-        """Put what waits into the cache, family by family."""
+        """Write the points that are not stored yet into the cache, family by family."""
         self.stored = time.monotonic()
         for family in self.plan.families:
             mine = {job.key: point for job, point in self.waiting if job.family == family.key}
@@ -143,11 +143,10 @@ class _Desk:
 
 
 def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: Path | None = None) -> xr.Dataset:
-    """The dataset of a sweep, brought up to date point by point.
+    """Return the dataset of a sweep, brought up to date point by point.
 
-    folder: where dataset and figures are shown; on Ctrl-C it is left there with the points that are finished. A dataset
-    that memory does not hold is in Zarr's form there, and what is returned reads from it.
-    Raises FlexclearError.
+    folder: where dataset and figures are shown; Ctrl-C leaves the finished points there. A dataset that memory does not
+    hold is written in Zarr's form there, and the returned dataset reads from it. Raises FlexclearError.
     """
     large = folder is not None and sweep_large.is_large(plan)
     if folder is None:
@@ -167,32 +166,32 @@ def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: 
         }
         requested = {job.key: job for job in ready.jobs}
         known = {key: points[key] for key in requested if key in points}
-        desk = _Desk(ready, workplace, len(requested), known, here=workers.here, large=large)
-        missing = [job for key, job in requested.items() if key not in desk.done]
+        sink = _Sink(ready, workplace, len(requested), known, here=workers.here, large=large)
+        missing = [job for key, job in requested.items() if key not in sink.done]
         try:
             if missing:
-                _run(desk, workers, missing)
+                _run(sink, workers, missing)
         finally:
-            desk.store()
+            sink.store()
             if folder is not None and large:
-                result = sweep_large.written(ready, workplace.store, desk.done, folder / f"{NAME}{sweep_large.SUFFIX}")
+                result = sweep_large.written(ready, workplace.store, sink.done, folder / f"{NAME}{sweep_large.SUFFIX}")
                 (folder / f"{NAME}.nc").unlink(missing_ok=True)
             else:
-                result = ready.dataset(desk.done)
+                result = ready.dataset(sink.done)
                 if folder is not None:
                     _publish(result, folder)
     return result
 
 
-def _run(desk: _Desk, workers: Engine, missing: list[Job]) -> None:
-    monitor = desk.workplace.monitor
+def _run(sink: _Sink, workers: Engine, missing: list[Job]) -> None:
+    monitor = sink.workplace.monitor
     monitor.start(1)
-    sweep, scene = desk.plan.sweep, desk.plan.scene
+    sweep, scene = sink.plan.sweep, sink.plan.scene
     name = monitor.begin(scene.name if sweep.name == UNNAMED else sweep.name, "sweep")
-    packed = {family.key: pickle.dumps(family.work) for family in desk.plan.families}
+    packed = {family.key: pickle.dumps(family.work) for family in sink.plan.families}
     failed = True
     try:
-        workers.run(missing, packed, lambda finished, _: desk.take(finished, lambda f, t: monitor.update(name, f, t)))
+        workers.run(missing, packed, lambda finished, _: sink.take(finished, lambda f, t: monitor.update(name, f, t)))
         failed = False
     finally:
         monitor.finish(name, failed=failed)
@@ -207,7 +206,7 @@ def _publish(result: xr.Dataset, folder: Path) -> None:
 
 
 def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None, *, quiet: bool = False) -> None:
-    """Figures next to the dataset, and a summary on the screen unless `quiet`."""
+    """Write figures next to the dataset, and print a summary unless `quiet`."""
     from flexclear.pipeline.post.overview.sweep_figures import figures
 
     file = next(
@@ -217,7 +216,7 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
     for name, content in drawn.items():
         publish(folder / name, content)
     for path in folder.glob(f"{NAME}.*g"):
-        if path.name not in drawn:  # of an earlier state of the sweep
+        if path.name not in drawn:  # from an earlier state of the sweep
             path.unlink()
     if out is not None and out.suffix == sweep_large.SUFFIX:
         sweep_large.write_copy(out, result)
@@ -231,13 +230,13 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
 
 
 def summary(plan: sweep_plan.Plan, result: xr.Dataset, file: Path) -> Iterator[str]:
-    """Points, refusals by their reason, and where the dataset is."""
+    """Yield lines with the number of points, refusals by their reason, and the dataset's file."""
     refused = [str(reason) for reason in result["reason"].values.ravel() if reason]
     shown = [relative(path) for path in (file, file.with_suffix(".png")) if path.exists()]
     yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {', '.join(shown)}"
     kinds: dict[str, list[str]] = {}
     for reason in refused:
-        # the same refusal at another time or size is the same to who reads the summary
+        # to a reader of the summary the same refusal at another time or size is the same
         words = " ".join(word for word in reason.partition("\n")[0].split() if not any(c.isdigit() for c in word))
         kinds.setdefault(words, []).append(reason)
     for same in kinds.values():

@@ -16,7 +16,7 @@ from flexclear.stages.workplace import open_workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
 
@@ -27,21 +27,21 @@ def command(options: argparse.Namespace) -> None:
     for graph in scenes.graphs(options.scenes, options.set):
         stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
         reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
-        others[graph.scene.name] = [text for state in stages for text in elsewhere(state.task.label, state.record)]
+        others[graph.scene.name] = [text for state in stages for text in notes(state.task.label, state.record)]
     print(as_json(reasons) if options.json else text(reasons, others))
 
 
-def elsewhere(label: str, record: Record | None) -> list[str]:
-    """Return what else a fresh result was computed by than this process would: its numbers differ by rounding."""
-    there = record.computed_by if record is not None else {}
-    here = instruction_set() if there else {}
-    names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-    changes = ", ".join(f"{name} {there.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
+def notes(label: str, record: Record | None) -> list[str]:
+    """Return a note on a fresh result that other instructions than this process's computed: rounding differs."""
+    stored = record.computed_by if record is not None else {}
+    here = instruction_set() if stored else {}
+    names = [name for name in {**stored, **here} if stored.get(name) != here.get(name)]
+    changes = ", ".join(f"{name} {stored.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
     return [f"{label} was computed by other instructions, its numbers differ by rounding: {changes}"] if names else []
 
 
 def text(reasons: Mapping[str, Mapping[str, Sequence[str]]], others: Mapping[str, Sequence[str]]) -> str:
-    """For each scene its stages, why each would run again, and which others computed what is fresh."""
+    """Return for each scene its stages, why each would run again, and notes on results of other instructions."""
     lines = []
     for scene, stages in reasons.items():
         lines += [scene, *(f"  note: {shown(note)}" for note in others.get(scene, ()))]

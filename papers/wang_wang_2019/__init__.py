@@ -1,6 +1,6 @@
 """Wang & Wang (2019): the 4-SPS/PS mechanism, its figures, tables and report."""
 
-#: what the report shows of the project's own pages, by name: heading, sections, endings of the pictures
+#: pages of the project that the report shows, by name: heading, sections, endings of the pictures
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "accuracy": ("Accuracy against time", ("What to choose", "sps4/csj", "sps4/far_csj_cb"), ("work_precision.png",)),
     "stability": (

@@ -1,8 +1,7 @@
-"""Differences between two runs, without interpolation, and what the models differ in as numbers.
+"""Differences between two runs, and effects of the paper's models as numbers.
 
-Differences are taken only at times that both runs have.
-
-But for what happens between these: a smooth motion can be interpolated with its accelerations.
+Runs are compared only at their common times, without interpolation. Only for the times in between is a smooth motion
+interpolated, with its accelerations.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ from flexclear.papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLA
 from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, common_times
 from flexclear.pipeline.core.numerics.rotations import angle_about_y, rotation_between
 
-#: what is compared of two runs
+#: variables of two runs that are compared
 COMPARED = ("quaternion", "position", "velocity")
 
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Largest absolute differences of one body between two runs, and the span they are taken over."""
+    """Largest absolute differences of one body between two runs, and the span in which they occur."""
 
     angle: float  #: angle about y [rad]
     rotation: float  #: total rotation [rad]
@@ -32,12 +31,12 @@ class Deviation:
     until: float  #: last time that was compared [s]
 
     def over(self, other: Deviation) -> tuple[float, float, float]:
-        """Angle, displacement and velocity as fractions of another one's."""
+        """Return angle, displacement and velocity as fractions of those of another deviation."""
         return self.angle / other.angle, self.displacement / other.displacement, self.velocity / other.velocity
 
 
 def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: float = np.inf) -> Deviation:
-    """Largest differences of `body` between two runs at their common times up to `until` [s].
+    """Return the largest differences of `body` between two runs at their common times up to `until` [s].
 
     Raises ValueError when the runs have no common time in that span.
     """
@@ -50,9 +49,9 @@ def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: floa
 
 
 def velocity_at_events(run: xr.Dataset, smooth: xr.Dataset, body: str, until: float = np.inf) -> tuple[float, float]:
-    """Largest difference of the velocity along z [m/s] at a run's own times up to `until` [s], events among them.
+    """Return the largest difference of the velocity along z [m/s], and its time [s], up to `until` [s].
 
-    smooth: a motion without impacts, cubic in between by its accelerations.  Returns the time [s] as well.
+    The times are the run's own, events included.  smooth: motion without impacts, interpolated with its accelerations.
     """
     from scipy.interpolate import CubicHermiteSpline
 
@@ -65,7 +64,7 @@ def velocity_at_events(run: xr.Dataset, smooth: xr.Dataset, body: str, until: fl
 
 
 def ensemble_deviations(ensemble: xr.Dataset, reference: xr.Dataset, body: str) -> list[Deviation]:
-    """`max_deviation` of every member over the whole run; members in order."""
+    """Return `max_deviation` of every member over the whole run, in the order of the members."""
     i, j = common_times(ensemble.time.values, reference.time.values)
     members = (ensemble[list(COMPARED)].isel(member=k) for k in range(ensemble.sizes["member"]))
     return [_compare(member, i, reference, j, body) for member in members]
@@ -89,13 +88,13 @@ def _largest(values: np.ndarray) -> float:
 
 #: artifacts by reference, such as ``sps4/csj:run``
 Data = dict[str, xr.Dataset]
-#: two answers differ by more than this fraction, and those of two ensembles also by this many standard deviations of
-#: the members
+#: answers differ when they are more than this fraction apart; those of two ensembles also by this many standard
+#: deviations of the members
 SLIGHT, SEPARATION = 0.1, 2.0
 
 
 def moved(data: Data, model: Model, ideal_model: Model = IDEAL) -> Deviation:
-    """Largest deviations from the ideal model; of a model with an ensemble the means over the members."""
+    """Return the largest deviations from the ideal model; for a model with an ensemble the means over the members."""
     ideal = data[f"{ideal_model.scene}:run"]
     if f"{model.scene}:ensemble" not in data:
         return max_deviation(data[f"{model.scene}:run"], ideal, PLATFORM)
@@ -104,7 +103,7 @@ def moved(data: Data, model: Model, ideal_model: Model = IDEAL) -> Deviation:
 
 
 def sizes(data: Data, ideal_model: Model = IDEAL) -> Deviation:
-    """Largest values of the ideal model's own motion."""
+    """Return the largest values of the ideal model's own motion."""
     run, post = data[f"{ideal_model.scene}:run"], data[f"{ideal_model.scene}:post"]
     z = np.abs(post.displacement.sel(body=PLATFORM, axis="z").values).max()
     v = np.abs(run.velocity.sel(body=PLATFORM, axis="z").values).max()
@@ -113,14 +112,14 @@ def sizes(data: Data, ideal_model: Model = IDEAL) -> Deviation:
 
 
 def effects(data: Data, model: Model) -> dict[str, float]:
-    """Largest differences from the ideal model, that of the force at A1 [N] among them."""
+    """Return the largest differences from the ideal model, with that of the force at A1 [N]."""
     most = moved(data, model)
     newtons = float(np.linalg.norm(difference(data, model, force), axis=1).max())
     return {"angle": most.angle, "displacement": most.displacement, "velocity": most.velocity, "force": newtons}
 
 
 def reaction(data: Data, model: Model) -> float:
-    """Largest force at A1 [N], with clearance the normal one; of ensembles the mean of the members' largest."""
+    """Return the largest force at A1 [N], with clearance the normal one; for ensembles the mean of the maxima."""
     if f"{model.scene}:ensemble" in data:
         return float(data[f"{model.scene}:ensemble"].peak_force.sel(contact=JOINT).mean())
     post = data[f"{model.scene}:post"]
@@ -128,39 +127,39 @@ def reaction(data: Data, model: Model) -> float:
 
 
 def peaks(data: Data, model: Model) -> tuple[float, float]:
-    """Largest force at A1 [N] as of `reaction`, and largest vertical acceleration of the platform [m/s^2]."""
+    """Return the largest force at A1 [N] as of `reaction`, and the platform's largest vertical acceleration [m/s^2]."""
     return reaction(data, model), acceleration(data, model)
 
 
 def acceleration(data: Data, model: Model) -> float:
-    """Largest vertical acceleration of the platform [m/s^2]; of ensembles the mean of the members' largest."""
+    """Return the platform's largest vertical acceleration [m/s^2]; for ensembles the mean of the members' largest."""
     kind = "ensemble" if f"{model.scene}:ensemble" in data else "post"
     return float(data[f"{model.scene}:{kind}"].peak_acceleration.sel(body=PLATFORM, axis="z").mean())
 
 
 def difference(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:
-    """Sizes of the differences from the ideal model at the outputs that both have."""
+    """Return the magnitudes of the differences from the ideal model at the outputs that both have."""
     run, ideal = data[f"{model.scene}:run"], data[f"{IDEAL.scene}:run"]
     i, j = common_times(run.time.values, ideal.time.values)
     return np.abs(of(run)[i] - of(ideal)[j])
 
 
 def vertical(run: xr.Dataset) -> np.ndarray:
-    """The platform's acceleration along z [m/s^2], shape (time,)."""
+    """Return the platform's acceleration along z [m/s^2], shape (time,)."""
     return run.acceleration.sel(body=PLATFORM, axis="z").values
 
 
 def ball_centre(run: xr.Dataset) -> np.ndarray:
-    """The ball_centre of ball A1, world axes [m], shape (time, 3)."""
+    """Return the centre of ball A1, world axes [m], shape (time, 3)."""
     return run.frame_position.sel(frame=BALL_FRAME).values
 
 
 def force(run: xr.Dataset) -> np.ndarray:
-    """What joint A1 transmits [N], shape (time, 3)."""
+    """Return the force that joint A1 transmits [N], shape (time, 3)."""
     return run.joint_force.sel(joint=JOINT).values
 
 
 def differ(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether the means of two ensembles' members do, by `SLIGHT` and by `SEPARATION`."""
+    """Return True when the means of two ensembles' members differ, by `SLIGHT` and by `SEPARATION`."""
     gap, spread = abs(a.mean() - b.mean()), max(a.std(ddof=1), b.std(ddof=1))
     return bool(gap > SLIGHT * abs(b.mean()) and gap > SEPARATION * spread)

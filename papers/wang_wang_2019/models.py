@@ -17,7 +17,7 @@ BALL_FRAME = "ball_A1.centre"
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """One curve of the paper's comparisons. `ours` marks what the paper does not have."""
+    """One curve of the paper's comparisons. `ours` marks a curve that the paper lacks."""
 
     scene: str
     label: str
@@ -45,12 +45,12 @@ FIRST = (FIRST_IDEAL, FIRST_CSJ)
 
 
 def references(models: Sequence[Model], *artifacts: str) -> tuple[str, ...]:
-    """References of these artifacts of each model, such as ``sps4/csj:run``."""
+    """Return references of these artifacts of each model, such as ``sps4/csj:run``."""
     return tuple(f"{model.scene}:{artifact}" for model in models for artifact in artifacts)
 
 
 def mode_set(model: Model) -> str:
-    """The name of a model's modes, such as `free-free`; empty where its rod is rigid."""
+    """Return the name of a model's mode set, such as `free-free`; empty where its rod is rigid."""
     return model.label.partition(", ")[2].split(" ")[0]
 
 
@@ -59,7 +59,7 @@ class Motion:
     """The six quantities of figures 11-13 for one run, in the paper's units."""
 
     model: Model
-    post: xr.Dataset  #: what follows from the run
+    post: xr.Dataset  #: results derived from the run (schema POST)
     time: np.ndarray  #: [s]
     angle: np.ndarray  #: about y0 [rad]
     displacement: np.ndarray  #: z [mm]
@@ -73,7 +73,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What figures show over time. `jumps`: impacts drive it far out of the ideal model's range."""
+    """A quantity that figures show over time. `jumps`: impacts drive it far out of the ideal model's range."""
 
     title: str
     unit: str
@@ -97,13 +97,13 @@ REACTION = Quantity("reaction force at A1", "N", lambda m: m.reaction, ("normal_
 
 
 def minus(motion: Motion, reference: Motion, values: Callable[[Motion], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Times that both motions have, and values of the first minus those of the reference there."""
+    """Return the times that both motions have, and values of the first minus those of the reference there."""
     i, j = common_times(motion.time, reference.time)
     return motion.time[i], values(motion)[i] - values(reference)[j]
 
 
 def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
-    """The paper's quantities of one model out of its run and post artifacts."""
+    """Return the paper's quantities of one model from its run and post artifacts."""
     run, post = data[f"{model.scene}:run"], data[f"{model.scene}:post"]
     platform = run.sel(body=PLATFORM)
     return Motion(
@@ -116,13 +116,13 @@ def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
         acceleration=1e3 * platform.acceleration.sel(axis="z").values,
         reaction=post.reaction.sel(joint=JOINT).values,
         ball=1e3 * run.frame_position.sel(frame=BALL_FRAME).values,
-        horizon=believed_until(post),
+        horizon=comparable_until(post),
         impacts=_impacts(post),
     )
 
 
-def believed_until(post: xr.Dataset) -> float:
-    """Time up to which the run is shown point by point [s]: where its ensemble diverges, or else the perturbed run."""
+def comparable_until(post: xr.Dataset) -> float:
+    """Return the end of pointwise comparison [s]: where the run's ensemble diverges, or else the perturbed run."""
     return float(post.ensemble_horizon if "ensemble_horizon" in post else post.horizon)
 
 

@@ -1,4 +1,4 @@
-"""The numbers that Wang & Wang (2019), Mech. Mach. Theory 137, 83-107, print, in the paper's own units."""
+"""Numbers that Wang & Wang (2019), Mech. Mach. Theory 137, 83-107, print, in the paper's own units."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ TABLE10 = {
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A row of Table 1: mass [kg], length [mm], moments of inertia [kg mm^2] as printed; None where it prints none."""
+    """A row of Table 1: mass [kg], length [mm], moments of inertia [kg mm^2] as printed; None for missing values."""
 
     mass: float | None
     length: float | None
@@ -94,7 +94,7 @@ TABLE6 = {
 }
 
 
-#: where it is in the paper, what is wrong or missing, and what this project does
+#: place in the paper, what is wrong or missing there, and what this project does
 DISCREPANCIES = rows("""
 Fig. 1, section 2 | Joint coordinates, the start height and which way the legs lean are not printed; equal squares above
     each other would be singular. | Of five numbers of a symmetric layout two are fitted to angle and displacement of

@@ -1,4 +1,4 @@
-"""The report page and docs/paper.md, out of what the other stages have made."""
+"""The report page and docs/paper.md, from the results of the other stages."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, from_
 
 #: place, text and scenes
 Assumption = tuple[str, str, tuple[str, ...]]
-#: of a run's attributes, those that the page shows
+#: attributes of a run that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Stage: ``index.html`` and ``paper.md``, out of the results folder.
+    """Stage: write ``index.html`` and ``paper.md`` from the results folder.
 
-    params: the folder, the run of each scene below it, where its values come from, the scene whose film and pictures
-    are shown, and the digest of everything that is shown, so that the page is written again when any of it changes.
+    params: the folder, the run of each scene below it, the sources of its values, the scene of film and pictures, and
+    the digest of everything on the page, so that each change writes the page again.
     """
     results = Path(params["results"])
     attributes = {}
@@ -45,10 +45,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 def collect(
     results: Path, attributes: Mapping[str, Mapping[str, object]], rendered: str, source: Path | None = None
 ) -> Content:
-    """What lies in a results folder (figures/, tables/, runs/<scene>/), and in the sources.
+    """Return the contents of a results folder (figures/, tables/, runs/<scene>/) and of the sources.
 
-    attributes: scene -> attributes of its run.  rendered: the scene whose film and views are shown.  source: folder
-    with `docs` and `scenes`.  Whatever is not there is left out.
+    attributes: scene -> attributes of its run.  rendered: the scene of film and views.  source: folder with `docs` and
+    `scenes`.  Missing files are left out.
     """
     tables = {
         path.stem: from_markdown(path.read_text(encoding="utf-8"))
@@ -77,7 +77,7 @@ def _documents(docs: Path) -> dict[str, str]:
 
 
 def _variants(folder: Path) -> list[tuple[str, str]]:
-    """Name and title of each scene in a folder."""
+    """Return name and title of each scene in a folder."""
     variants = []
     for path in sorted(folder.glob("*.toml")):
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
@@ -86,7 +86,7 @@ def _variants(folder: Path) -> list[tuple[str, str]]:
 
 
 def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> list[Assumption]:
-    """Each assumption once, with the scenes that make it; places in alphabetical order."""
+    """Return each assumption once, with its scenes; the assumed values are in alphabetical order."""
     scenes: dict[tuple[str, str], list[str]] = {}
     for scene, facts in attributes.items():
         for where, text in json.loads(str(facts.get("assumptions", "{}"))).items():
@@ -95,7 +95,7 @@ def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> list[A
 
 
 def paper_markdown(content: Content) -> str:
-    """docs/paper.md: every figure and table with its scenes and command, the tables, assumptions, discrepancies."""
+    """Return docs/paper.md: all figures and tables with scenes and commands, the tables, assumptions, discrepancies."""
     parts = [
         "# The paper, reproduced\n",
         f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
@@ -119,7 +119,7 @@ def paper_markdown(content: Content) -> str:
 
 
 def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
-    """Place, reason and scenes of each assumption; a value of all scenes says so.
+    """Return value, reason and scenes of each assumption; one that all scenes share has the word all.
 
     Values of parts that differ only in their number (leg 1 to 4) share a row.
     """
@@ -131,23 +131,23 @@ def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
     return [(", ".join(f"`{path}`" for path in places), text, where) for (text, where), places in grouped.items()]
 
 
-#: parts on whose values most hangs in these scenes: the joint with clearance, the flexible rod, the layout
+#: parts whose values matter most in these scenes: the joint with clearance, the flexible rod, the layout
 WEIGHTY = ("joint.A1", "body.rod1", "body.ground", "body.platform", "drive", "joint", "body")
 
 
 def weight(where: str) -> int:
-    """The rank of a value among the assumptions; small ones come first."""
+    """Return the rank of a value among the assumptions; small ranks come first."""
     known = [k for k, start in enumerate(WEIGHTY) if where == start or where.startswith(f"{start}.")]
     return known[0] if known else len(WEIGHTY)
 
 
 def scenes_of(name: str) -> tuple[str, ...]:
-    """Scenes that a figure or table reads, in order, each once."""
+    """Return the scenes that a figure or table reads, in order, each once."""
     return tuple(dict.fromkeys(reference.partition(":")[0] for reference in figures.figure(name).needs))
 
 
 def command(name: str) -> str:
-    """What to type for one figure or table."""
+    """Return the command that makes one figure or table."""
     scenes = [scene for scene in scenes_of(name) if "/" in scene]
     return f"flexclear run {' '.join(scenes)} && flexclear report" if scenes else "flexclear report"
 
@@ -172,15 +172,15 @@ def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines) + "\n"
 
 
-#: what generated pages put around what they measured
+#: comments that generated pages put around their measurements
 COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
 
 def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | None = None) -> str:
-    """The text of a page below its title, as HTML; empty where there is no such page.
+    """Return the text of a page below its title, as HTML; empty where the page does not exist.
 
-    headings: only what is below these; "" is what is before the first of them.  pictures: endings of the
-    names of those that are shown; default: all.
+    headings: of the sections to return; "" is the text before the first heading.  pictures: endings of the names of the
+    pictures to show; default: all.
     """
     if not page.is_file():
         return ""
@@ -192,7 +192,7 @@ def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | 
 
 
 def _parts(text: str) -> list[tuple[str, str]]:
-    """Heading and text of each section of second level."""
+    """Return heading and text of each section of second level."""
     pieces = re.split(r"^## (.+)$", re.sub(r"\A# .+\n", "", text), flags=re.MULTILINE)
     return [("", pieces[0].strip()), *((pieces[k].strip(), pieces[k + 1].strip()) for k in range(1, len(pieces), 2))]
 
@@ -224,13 +224,13 @@ def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
 #: the table with a verdict on each statement, and its words
 VERDICTS = "table_verdicts"
 GOOD, BAD = ("holds",), ("does not hold",)
-#: tables that print what the paper gives, the others compare results with it
+#: tables with the paper's given parameters; the others compare results
 GIVEN = ("table01", "table02", "table03", "table04", "table05", "table06")
 
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """All that the page shows."""
+    """Contents of the page."""
 
     tables: Mapping[str, Table]
     assumptions: Sequence[Assumption]
@@ -239,12 +239,12 @@ class Content:
     still: bytes | None
     views: str  #: HTML of the views that can be turned
     facts: Mapping[str, Mapping[str, str]]  #: scene -> run attributes
-    documents: Mapping[str, str]  #: of DOCUMENTS -> HTML
+    documents: Mapping[str, str]  #: name in DOCUMENTS -> HTML
     variants: Sequence[tuple[str, str]]  #: scene and title
 
 
 def html_page(content: Content) -> str:
-    """The report, results/report/index.html: one page, images and film inside."""
+    """Return the report, results/report/index.html: one page with images and film inside."""
     drawn = "".join(media(f"{name}.png", png, figures.figure(name).title) for name, png in content.images.items())
     results = [table for name, table in content.tables.items() if name not in (*GIVEN, VERDICTS)]
     given = [content.tables[name] for name in GIVEN if name in content.tables]
@@ -275,14 +275,14 @@ def html_page(content: Content) -> str:
 
 
 def _answer(content: Content) -> str:
-    """How many of the paper's statements hold, and which do not; empty without verdicts."""
+    """Return how many of the paper's statements hold, and list those that do not; empty without verdicts."""
     table = content.tables.get(VERDICTS)
     if table is None:
         return ""
     verdict = table.columns.index("verdict")
-    said = [row[verdict] for row in table.rows]
-    counts = "; ".join(f"{_word(word)}: {said.count(word)}" for word in dict.fromkeys(said))
-    lines = [f"<li>Of {len(said)} statements of the paper, judged by rules: {counts}.</li>"]
+    verdicts = [row[verdict] for row in table.rows]
+    counts = "; ".join(f"{_word(word)}: {verdicts.count(word)}" for word in dict.fromkeys(verdicts))
+    lines = [f"<li>Of {len(verdicts)} statements of the paper, judged by rules: {counts}.</li>"]
     for row in table.rows:
         if row[verdict] in BAD:
             section, text, word, numbers = row

@@ -1,4 +1,4 @@
-"""The report of the paper: the tasks of every figure and table with all that they need, and of the page."""
+"""Tasks of the paper's report: every figure and table with its inputs, and the page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from flexclear.stages import derived_series, kernels, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, check
 
-#: files that the page shows parts of, below the folder of the sources: pages, their pictures, variants of scenes
+#: files with parts that the page shows, below the folder of the sources: pages, their pictures, variants of scenes
 PAGES = [pattern for name in DOCUMENTS for pattern in (f"docs/{name}.md", f"docs/{name}/*.png")]
 PAGES += ["scenes/sps4/variants/*.toml"]
 #: the scene whose film and pictures the page shows: the paper's full model
@@ -28,27 +28,27 @@ HEADLINE = "sps4/far_csj_cb"
 
 @dataclass(frozen=True)
 class Scenes:
-    """Graphs of scenes by name, and times by family, each built once, so that all figures share their tasks."""
+    """Graphs of scenes by name, and timings by family, each built once, so that all figures share their tasks."""
 
     graphs: dict[str, Graph] = field(default_factory=dict)
     times: dict[str, Task] = field(default_factory=dict)
 
     def graph(self, name: str) -> Graph:
-        """Graph of ``scenes/<name>.toml``."""
+        """Return the graph of ``scenes/<name>.toml``."""
         if name not in self.graphs:
             self.graphs[name] = Graph(load_scene(DATA / "scenes" / f"{name}.toml"))
         return self.graphs[name]
 
     def artifact(self, reference: str) -> Task:
-        """The task behind ``<scene>:<artifact>[/<body>]`` or ``<folder>:timing``."""
+        """Return the task of ``<scene>:<artifact>[/<body>]`` or ``<folder>:timing``."""
         name, _, artifact = reference.partition(":")
         return self.timing(name) if artifact == "timing" else self.graph(name).artifact(artifact)
 
     def timing(self, family: str) -> Task:
-        """Measured times of all scenes that lie directly in a folder below scenes/.
+        """Return the task that times all scenes directly in a folder below scenes/.
 
-        They are seconds of the processor, and so are measured while other tasks run: alone they would be a third of the
-        whole report's time, with all other cores idle.
+        The times are processor seconds, which are measured while other tasks run: run alone they would take a third of
+        the whole report's time, with all other cores idle.
         """
         if family in self.times:
             return self.times[family]
@@ -71,8 +71,8 @@ class Scenes:
 
 
 def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
-    """What only the timing runs on, compiled while other tasks run; kernels of the scenes' own runs are there by
-    then."""
+    """Return tasks for the kernels of the timing alone, compiled while other tasks run; the scenes' runs compile
+    theirs."""
     tasks: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
         for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
@@ -81,10 +81,10 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
 
 
 def bring(workplace: Workplace) -> Outcome:
-    """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
+    """Bring everything in the report, and the page, up to date; the page leaves out what fails."""
     scenes = Scenes()
     drawn = figure_tasks(workplace, scenes)
-    # what takes longest comes first, with all that it needs: film and times
+    # the slowest chains come first: film and timing
     drawn.sort(key=lambda task: all(above.stage != "timing" for above in task.inputs.values()))
     shown = workplace.bring([*scenes.graph(HEADLINE).of("render").values(), *drawn])
     graphs = [graph for graph in scenes.graphs.values() if graph.simulate in shown.records]
@@ -94,7 +94,7 @@ def bring(workplace: Workplace) -> Outcome:
 
 
 def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
-    """One task for each figure and table."""
+    """Return one task for each figure and table."""
     return [
         Task(
             stage="figures",
@@ -112,7 +112,7 @@ def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
 
 
 def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
-    """What each figure and table needs, see `papers.wang_wang_2019.figures.index`."""
+    """Return the needs of each figure and table, see `papers.wang_wang_2019.figures.index`."""
     names = list(figures.NAMES)
     task = Task(
         stage="figures",
@@ -128,7 +128,7 @@ def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
 
 
 def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list[Graph]) -> Task:
-    """The page; it is written again when anything that it shows has changed."""
+    """Return the task of the page; it runs again when anything on the page has changed."""
     return Task(
         stage="report",
         scene="report",

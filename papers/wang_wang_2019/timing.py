@@ -1,5 +1,4 @@
-"""What the runs of some scenes cost, warm, one after the other: at equal error, at equal steps, at the paper's
-tolerance."""
+"""Cost of warm runs of some scenes, one after the other: at equal error, at equal steps, at the paper's tolerance."""
 
 from __future__ import annotations
 
@@ -20,35 +19,35 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
 
-#: equal error: of the velocity of the body with most joints, relative, over this first fraction of the run, where
-#: all scenes can still be predicted point by point
+#: equal error: relative error of the velocity of the body with most joints, over this first fraction of the run, in
+#: which all scenes can still be predicted point by point
 EQUAL_ERROR, FRACTION = 1e-6, 0.05
-#: this fraction of a run, unmeasured, fetches its code
+#: this fraction of a run, unmeasured, loads the compiled code
 WARM = 0.01
-#: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]; which one, they do not say
+#: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]; they do not name the method
 PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5}
-#: their Table 6 prints a tolerance of the integration, too [m], as variable steps have; a method that damps what it
-#: does not resolve then takes few of them where a rod rings. Of what it is a fraction they do not say: the stroke of
-#: eq. (35) [m], or the mechanism's size
+#: their Table 6 also prints a tolerance of the integration [m], as variable steps have; a method that damps unresolved
+#: motion then takes few steps where a rod rings. They do not say which length it refers to: the stroke of eq. (35) [m],
+#: or the mechanism's size
 TOLERANCE, DAMPED, STROKE = 4e-6, "radau", 0.06
-#: the three ways, as variables are called
-WAYS = ("equal", "step", "tolerance")
+#: the three settings, as variables are called
+SETTINGS = ("equal", "step", "tolerance")
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """CPU time [s] of integration and of recording of warm runs, evaluations, steps, largest error of the energy.
+    """Stage: return CPU time [s] of integration and recording of warm runs, evaluations, steps, largest energy error.
 
-    Variables begin with the way: ``equal_*`` at equal error, ``step_*`` at equal steps, ``tolerance_*`` by a damped
-    method at the paper's tolerance as a fraction of the stroke, whatever becomes of the energy, ``size_*`` the same as
-    a fraction of the mechanism's size.
+    Variables begin with the setting: ``equal_*`` at equal error, ``step_*`` at equal steps, ``tolerance_*`` by a damped
+    method at the paper's tolerance as a fraction of the stroke, whatever the energy error, ``size_*`` the same as a
+    fraction of the mechanism's size.
 
-    params: one entry of `params` per scene.  inputs: bundles as ``<scene>:bundle/<body>``; kernels, which are only
-    waited for.  A scene that a way cannot integrate has NaN there, and the reason in the attribute `refused`; repeats
-    that were not needed are NaN, too.
+    params: one entry of `params` per scene.  inputs: bundles as ``<scene>:bundle/<body>``; kernels, which must only
+    exist.  A scene that cannot be integrated at a setting has NaN there, and the reason in the attribute `refused`;
+    repeats that were not needed are NaN, too.
     """
     import xarray as xr
 
-    costs: dict[str, dict[str, Cost | None]] = {way: {} for way in (*WAYS, "size")}
+    costs: dict[str, dict[str, Cost | None]] = {setting: {} for setting in (*SETTINGS, "size")}
     tolerance: dict[str, dict[str, float]] = {"equal": {}, "tolerance": {}, "size": {}}
     refused = []
     for i, name in enumerate(params):
@@ -61,21 +60,21 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         tolerance["tolerance"][name] = damped.solver.rtol
         tolerance["size"][name] = TOLERANCE / equal.length
         costs["size"][name], _ = _measured(damped_scene(scene, TOLERANCE / equal.length), reduced, checked=False)
-        for way, requested in (("step", paper_scene(scene)), ("tolerance", damped)):
-            costs[way][name], why = _measured(requested, reduced, checked=way == "step")
+        for setting, requested in (("step", paper_scene(scene)), ("tolerance", damped)):
+            costs[setting][name], why = _measured(requested, reduced, checked=setting == "step")
             refused += [f"{name}: {why}"] if why else []
     data: dict[str, Any] = {}
-    for way, costs_of_way in costs.items():
-        data |= _variables(way, list(costs_of_way.values()))
-    for way, values in tolerance.items():
-        data[f"{way}_rtol"] = (("scene",), list(values.values()), {"units": "1"})
+    for setting, costs_of_setting in costs.items():
+        data |= _variables(setting, list(costs_of_setting.values()))
+    for setting, values in tolerance.items():
+        data[f"{setting}_rtol"] = (("scene",), list(values.values()), {"units": "1"})
     attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": FRACTION, "step": PAPER["step"]}
     attributes |= {"tolerance": TOLERANCE, "damped": DAMPED, "refused": "; ".join(refused)}
     return {"nc": xr.Dataset(data, coords={"scene": list(params)}, attrs=attributes)}
 
 
-def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
-    """Variables of one way, in the order of the scenes."""
+def _variables(setting: str, costs: list[Cost | None]) -> dict[str, Any]:
+    """Return the variables of one setting, in the order of the scenes."""
     import numpy as np
 
     def of_scenes(name: str) -> list[float]:
@@ -83,31 +82,31 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
 
     error = [float(np.abs(cost.run["energy_error"]).max()) if cost else float("nan") for cost in costs]
     variables: dict[str, Any] = {
-        f"{way}_evaluations": (("scene",), of_scenes("evaluations"), {"units": "1"}),
-        f"{way}_steps": (("scene",), of_scenes("steps"), {"units": "1"}),
-        f"{way}_energy_error": (("scene",), error, {"units": "J"}),
+        f"{setting}_evaluations": (("scene",), of_scenes("evaluations"), {"units": "1"}),
+        f"{setting}_steps": (("scene",), of_scenes("steps"), {"units": "1"}),
+        f"{setting}_energy_error": (("scene",), error, {"units": "J"}),
     }
     for part, dim in (("integration", "repeat"), ("recording", "recorded")):
         repeats = [getattr(cost, part) if cost else () for cost in costs]
         seconds = np.full((len(costs), max(1, *map(len, repeats))), np.nan)
         for row, values in zip(seconds, repeats, strict=True):
             row[: len(values)] = values
-        variables[f"{way}_{part}_seconds"] = (("scene", f"{way}_{dim}"), seconds, {"units": "s"})
+        variables[f"{setting}_{part}_seconds"] = (("scene", f"{setting}_{dim}"), seconds, {"units": "s"})
     return variables
 
 
 def _measured(scene: Scene, bundles: Mapping[str, Labelled], *, checked: bool) -> tuple[Cost | None, str]:
-    """The cost of a run, and why there is none."""
+    """Return the cost of a run, or None and the reason."""
     try:
-        # an unmeasured start fetches the code; reports would be part of what is measured
+        # an unmeasured start loads the compiled code; reports would be part of the measured time
         dynamics.simulate(_edited(scene, {"time.end": _share(scene, WARM)}), bundles, silent)
         return analyses.cost(scene, bundles, silent, checked=checked), ""
     except SolverError as error:
-        return None, str(error).partition(";")[0]  # what else is to be doubted of such a run is of no use here
+        return None, str(error).partition(";")[0]  # the other warnings of such a run are of no use here
 
 
 def _at_equal_error(scene: Scene, bundles: Mapping[str, Labelled]) -> tuple[float, Cost]:
-    """Tolerance and cost at equal error; decade by decade tighter where the whole run is refused."""
+    """Return tolerance and cost at equal error; decade by decade tighter where the whole run is refused."""
     rtol = equal_tolerance(scene, bundles)
     while True:
         cost, why = _measured(_edited(scene, {"solver.rtol": rtol}), bundles, checked=True)
@@ -119,14 +118,14 @@ def _at_equal_error(scene: Scene, bundles: Mapping[str, Labelled]) -> tuple[floa
 
 
 def equal_tolerance(scene: Scene, bundles: Mapping[str, Labelled]) -> float:
-    """The tolerance at which a scene has the common error over the first fraction of its run."""
+    """Return the tolerance at which a scene has the common error over the first fraction of its run."""
     velocity = next(q.name for q in scene.requested() if q.kind == "velocity")
     requested = {"time.end": _share(scene, FRACTION), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
     return float(dynamics.simulate(_edited(scene, requested), bundles, silent).attrs["accuracy_rtol"])
 
 
 def _share(scene: Scene, fraction: float) -> float:
-    """The end of the first fraction of a run [s]."""
+    """Return the end of the first fraction of a run [s]."""
     return scene.time.start + fraction * (scene.time.end - scene.time.start)
 
 
@@ -135,15 +134,15 @@ def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:
 
 
 def paper_solver(scene: Scene) -> dict[str, Any]:
-    """The paper's method as the table of a scene's solver; contacts are noticed at the ends of steps."""
+    """Return the paper's method as the table of a scene's solver; contacts are noticed at the ends of steps."""
     return {**PAPER, **({"events": "at step ends"} if scene.contacts() else {})}
 
 
 def paper_scene(scene: Scene) -> Scene:
-    """A scene with the paper's method."""
+    """Return a scene with the paper's method."""
     return _edited(scene, {"solver": paper_solver(scene)})
 
 
 def damped_scene(scene: Scene, rtol: float) -> Scene:
-    """A scene with the damped method at a tolerance."""
+    """Return a scene with the damped method at a tolerance."""
     return _edited(scene, {"solver": {"integrator": DAMPED, "rtol": rtol}})

@@ -1,1 +1,1 @@
-"""What every tower shares: scenes, artifacts, workflow. Imports nothing from the towers."""
+"""Scenes, artifacts and workflow, which all towers use. Imports nothing from the towers."""

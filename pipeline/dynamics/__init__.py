@@ -1,4 +1,4 @@
-"""The multibody tower: a scene and its bundles in, a run dataset out; other results are in `analyses`."""
+"""The multibody tower: computes a run dataset from a scene and its bundles; `analyses` has other results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
-    """What `simulated` gives, as a dataset; so is what there is of a run that is asked to stop."""
+    """Return the dataset of `simulated`; a stopped run carries its partial dataset."""
     from flexclear.pipeline.core.system.errors import StoppedError
 
     try:
@@ -27,14 +27,14 @@ def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> LabelledArrays:
-    """One run of a scene (schema RUN).
+    """Run a scene once and return its dataset (schema RUN).
 
-    bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called now and then.
-    A scene with `[accuracy]` is run until the estimated error of its time integration is what was asked for; where it
-    names no integrator, by the cheapest.  One that has neither `[accuracy]` nor a method or tolerance in `[solver]` is
-    run at the default tolerance, or, where that is dear, as `accuracy.by_default` says.
-    Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError with what
-    there is of it, marked as incomplete, when it is asked to stop.
+    bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called regularly.
+    A scene with `[accuracy]` is run until the estimated error of its time integration is below the request; where it
+    names no integrator, the cheapest is chosen.  With neither `[accuracy]` nor method or tolerance in `[solver]` it is
+    run at the default tolerance, or, where that is expensive, by `accuracy.by_default`.
+    Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError, with the
+    partial run marked as incomplete, when it is stopped.
     """
     from flexclear.pipeline.core.artifacts.labelled import of
     from flexclear.pipeline.core.artifacts.schema import incomplete
@@ -55,7 +55,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             done = integrate(edited, bundles, progress, judges)
         except StoppedError as stopped:
             there = stopped.partial
-            # another one's motion, such as where the run begins, is nothing of this run
+            # the partial result of another run, such as that of the start, is not part of this run
             stopped.partial = incomplete(recorded(there), str(stopped)) if isinstance(there, Run) else None
             raise
         for sentence in warnings(done):
@@ -75,7 +75,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
     if not scene.by_need():
         return of(accuracy.deliver(scene, compared, progress))
-    suit = way(scene, "method selection")
+    method_costs = way(scene, "method selection")
     if requested:
-        return of(accuracy.deliver(scene, compared, progress, suit(scene, bundles)))
-    return of(accuracy.by_default(scene, compared, progress, lambda edited: suit(edited, bundles)))
+        return of(accuracy.deliver(scene, compared, progress, method_costs(scene, bundles)))
+    return of(accuracy.by_default(scene, compared, progress, lambda edited: method_costs(edited, bundles)))

@@ -1,6 +1,6 @@
-"""What else the tower makes of a scene and its bundles: costs, ensembles, sections, equilibria and vibrations.
+"""Other results of a scene and its bundles: costs, ensembles, sections, equilibria and vibrations.
 
-None of it is in the keys of single runs, which do not reach this module.
+The keys of single runs do not depend on this module.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def cost(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, *, checked: bool = True, brief: bool = False
 ) -> Cost:
-    """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
+    """Run a scene once and measure the costs of integration and recording (`pipeline.dynamics.record.cost.measure`)."""
     from flexclear.pipeline.dynamics.record.cost import measure
 
     require_without_events(scene, "the cost of a run")
@@ -28,7 +28,7 @@ def cost(
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
-    """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
+    """Run all members of a scene's ensemble; return their values at its regular output times (schema ENSEMBLE)."""
     from flexclear.pipeline.dynamics.record.ensemble import ensemble as run
 
     require_without_events(scene, "an ensemble")
@@ -36,7 +36,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
-    """A scene whose laws repeat, sampled once in each period (schema SECTIONS)."""
+    """Sample a scene with periodic laws once in each period (schema SECTIONS)."""
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
     require_without_events(scene, "a section of the motion")
@@ -44,7 +44,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def require_without_events(scene: Scene, what: str) -> None:
-    """InputError for a scene with events, of which there is no such result."""
+    """Raise InputError for a scene with events, for which this result is not available."""
     from flexclear.pipeline.core.system.errors import InputError
 
     if scene.event:
@@ -60,11 +60,11 @@ def equilibrium(
     drives: Mapping[str, float] | None = None,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium close to the scene's start pose, its drives held (schema EQUILIBRIUM).
+    """Return the static equilibrium close to the scene's start pose, with drives held (schema EQUILIBRIUM).
 
-    time: at which the drives' laws give their positions [s]; the start when None.  drives: positions [m or rad] by
-    name instead.  moving: the drives keep the speed of that moment, and the pose is one of steady motion.
-    Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
+    time: at which the drives' laws are evaluated [s]; the start when None.  drives: positions [m or rad] by
+    name instead.  moving: True when the drives keep their speed at that time; the pose is then one of steady motion.
+    Raises InputError for a scene that cannot be built, SolverError when no equilibrium is found.
     """
     from flexclear.pipeline.dynamics.linear import dataset
     from flexclear.pipeline.dynamics.linear.equilibrium import balanced
@@ -81,7 +81,7 @@ def frequencies(
     drives: Mapping[str, float] | None = None,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
+    """Return natural vibrations about `equilibrium`, which has the same arguments (schema LINEAR)."""
     from flexclear.pipeline.dynamics.linear import dataset
     from flexclear.pipeline.dynamics.linear.equilibrium import balanced
     from flexclear.pipeline.dynamics.linear.vibrations import vibrations

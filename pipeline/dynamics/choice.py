@@ -1,4 +1,4 @@
-"""Choice between the kinds present, as compiled branches; one kind needs no branch. And what is repeated."""
+"""Choice between kinds of parts, as compiled branches (one kind needs no branch), and repetition."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def nothing(*given):
-    """Do what the parts do of which a mechanism has none."""
+    """No-op in place of a kernel for parts that a mechanism lacks."""
 
 
 @kernel
 def repeat(turn, d):
-    """Call the kernel `turn` as long as it returns true; on a tape that is a loop (`specialise.trace`)."""
+    """Call the kernel `turn` as long as it returns True; on a tape this is a loop (`specialise.trace`)."""
     while turn(d):
         pass
 
 
 def choose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
-    """chosen(kind, *arguments) over the kernels of the kinds, numbered from `first`."""
+    """Build chosen(kind, *arguments), which calls the kernel of a kind; kinds are numbered from `first`."""
     head = kernels[0]
     if len(kernels) == 1:
 

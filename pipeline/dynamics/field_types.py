@@ -1,6 +1,6 @@
-"""Named fields (`fields`) as Numba types: a pointer each, and loads and stores where a kernel names a field.
+"""Named fields (`fields`) as Numba types: one pointer each, with loads and stores where a kernel names a field.
 
-Only what Numba documents for extensions is used.
+The module uses only Numba's documented extension interface.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ POINTERS = {
 
 
 class Named(types.Type):
-    """What has named fields, or rows of them."""
+    """An object with named fields, or rows of such objects."""
 
 
 class DataType(Named):
-    """The four arrays."""
+    """The four arrays h, f, w and n."""
 
 
 class Table(Named):
-    """A table, by a pointer to its first row."""
+    """A table, as a pointer to its first row."""
 
     def __init__(self, table: str) -> None:
         super().__init__(f"Table({table})")
@@ -49,14 +49,14 @@ class Table(Named):
 
 
 class Row(Named):
-    """A row of a table, by a pointer to its first field."""
+    """A row of a table, as a pointer to its first field."""
 
     def __init__(self, table: str) -> None:
         super().__init__(f"Row({table})")
         self.pointer, self.fields = POINTERS[m.ARRAYS[table]], m.row_fields(table)
 
     def kind(self, field: str) -> Any:
-        """Type of a field."""
+        """Return the type of a field."""
         shape = self.fields[field][1]
         if shape in m.TUPLES:
             return types.UniTuple(self.pointer.dtype, m.TUPLES[shape])
@@ -138,7 +138,7 @@ def _wrapped(context: Any, builder: Any, kind: Any, pointer: Any) -> Any:
 
 
 def _single(context: Any, builder: Any, d: Any, name: str) -> Any:
-    """Pointer to a single integer of n or float of w."""
+    """Return the pointer to a single integer of n or float of w."""
     if name in m.REPORTS:
         return _at(context, builder, d.n, m.REPORTS[name])
     stretch, offset = m.FLOATS[name]

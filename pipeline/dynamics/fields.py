@@ -1,15 +1,15 @@
-"""Named fields of the arrays h, f, w and n: what `memory` declares, as kernels read and write it.
+"""Named fields of the arrays h, f, w and n: kernels read and write the declarations of `memory` by name.
 
-After ``d = data(h, f, w, n)``, ``d.nv`` is a size, ``d.bias[k]`` an entry of a stretch of w, ``d.links[i].parent`` a
-field of a row of a table, ``d.rtol`` a float of w, ``d.evaluation`` an integer of n, and ``d.mode[c]`` an entry of a
+After ``d = data(h, f, w, n)``, ``d.nv`` is a size, ``d.bias[k]`` an entry of an array in w, ``d.links[i].parent`` a
+field of a row of a table, ``d.rtol`` a float of w, ``d.evaluation`` an integer of n, and ``d.mode[c]`` an entry of an
 stretch of n.  The names are those of `memory` in small letters.  ``d.at_y`` and ``d.at_links`` are the indices where
-the stretch y and the table of links begin, for kernels that take indices.  A field of three numbers is a vector and one
+the array y and the table of links begin, for kernels that take indices.  A field of three numbers is a vector and one
 of 3 x 3 numbers a matrix, both tuples that are read and assigned as a whole.  A field of any other shape is indexed
-like a stretch.
+like an array.
 
 Interpreted kernels and the tracer (`specialise`) use the classes here; compiled kernels get the same names from
 `field_types`, as loads and stores.  The compiler assumes that no two pointers of a kernel refer to the same memory, so
-a kernel that writes never gets `d` together with a row or stretch of it.
+a kernel that writes never receives `d` together with a row or array of `d`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Stretch:
 
 
 class Rows(Stretch):
-    """Rows of a table; a subclass for each."""
+    """Rows of a table; each table has a subclass."""
 
     __slots__ = ()
     size: int
@@ -47,7 +47,7 @@ class Rows(Stretch):
 
 
 class Data:
-    """The four arrays, with what they hold by name."""
+    """The four arrays, with their contents by name."""
 
     __slots__ = ("f", "h", "n", "w")
 
@@ -56,7 +56,7 @@ class Data:
 
 
 def _entry(where: Callable[[Any], tuple[Any, Any]]) -> property:
-    """The entry of an array, which `where` finds with its index."""
+    """Return a property for the entry of an array; `where` returns array and index."""
 
     def read(of: Any) -> Any:
         array, index = where(of)
@@ -132,5 +132,5 @@ for _name in m.NAMED:
 
 
 def data(h: Any, f: Any, w: Any, n: Any) -> Any:
-    """The four arrays with named fields; what compiled code calls is in `field_types`."""
+    """Return the four arrays with named fields; compiled code uses the version in `field_types`."""
     return Data(h, f, w, n)

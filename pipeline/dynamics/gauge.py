@@ -1,7 +1,7 @@
-"""Joint coordinates measured from the joint's two frames, so that it does not matter whether the joint closes a loop.
+"""Gauges: joint coordinates measured from the joint's two frames, for joints in the tree and in closures alike.
 
-What a part needs beyond positions and speeds is an internal state of its own, at the end of the ledger: of an angle,
-the full turns that it has made.
+An angle with full turns needs more than positions and speeds: an internal state at the end of the ledger holds
+the angle including its full turns.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, axis, cross, dot, sca
 
 @kernel
 def relative_twist(a, b):
-    """Angular velocity of frame b against frame a, and velocity of its origin there."""
+    """Return the angular velocity of frame b relative to frame a, and the velocity of its origin there."""
     omega, r = a.omega, sub(b.origin, a.origin)
     slide = sub(b.velocity, add(a.velocity, cross(omega, r)))
     return sub(b.omega, omega), slide
@@ -22,7 +22,7 @@ def relative_twist(a, b):
 
 @kernel
 def measure(d, g):
-    """Coordinate of gauge g, its rate, and the wrench (moment, force) of a unit force along it on the second body."""
+    """Return coordinate of gauge g, its rate, and the wrench of a unit force along it on the second body."""
     gauge = d.gauges[g]
     a, b = d.site_frames[gauge.a], d.site_frames[gauge.b]
     F, G, p = a.axes, b.axes, b.origin
@@ -37,13 +37,13 @@ def measure(d, g):
 
 @kernel
 def internal_rate(d, k):
-    """Index in LEDGER_RATE of the rate of internal state k."""
+    """Return the index in LEDGER_RATE of the rate of internal state k."""
     return d.n_ledger - d.n_internal + k
 
 
 @kernel
 def counted(d, g):
-    """As `measure`, an angle with its full turns if the gauge counts them; its state then follows the rate."""
+    """Return the same as `measure`, with the full turns of an angle if the gauge counts them; store their rate."""
     value, rate, moment, force = measure(d, g)
     turn = d.gauges[g].turns
     if turn >= 0:
@@ -54,7 +54,7 @@ def counted(d, g):
 
 @kernel
 def bias(d, g):
-    """Second rate of the coordinate of gauge g at the accelerations that its sites' frames have now."""
+    """Return the second rate of the coordinate of gauge g at the present accelerations of its sites' frames."""
     gauge = d.gauges[g]
     a, b = d.site_frames[gauge.a], d.site_frames[gauge.b]
     side = a if gauge.side == 0 else b

@@ -1,9 +1,9 @@
-"""Kernels become code without being optimised, so that what is called through n kernels is optimised once, and not n
-times.
+"""Compilation of kernels without optimisation, so that code that is reached through n kernels is optimised once instead
+of n times.
 
-It needs parts of Numba that nobody promises to keep, and is taken where they do what they did (`works`), with releases
-that it has been tested with; `kernels` says which. Else kernels are compiled as Numba does it: two to three times as
-long, and just as right.
+The module uses internals of Numba that may change. It is used with tested releases only, and where these internals
+still work (`works`); `kernels` decides. Otherwise Numba compiles kernels in its own way: this takes two to three times
+as long, with equally correct results.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from numba.core.typed_passes import NativeLowering
 
 @contextmanager
 def _taken_for_there(name: str) -> Iterator[None]:
-    """Whoever asks meanwhile for a module has an empty one, and need not import it."""
+    """Replace a module by an empty one during the context, so that it is not imported."""
     if name in sys.modules:
         yield
         return
@@ -38,18 +38,18 @@ def _taken_for_there(name: str) -> Iterator[None]:
         del sys.modules[name]
 
 
-# Numba asks whether SciPy has a BLAS by importing SciPy's linear algebra, which takes as long as a dozen kernels
+# Numba tests for SciPy's BLAS by importing SciPy's linear algebra, which takes as long as compiling a dozen kernels
 with _taken_for_there("scipy.linalg.cython_blas"):
     import numba.np.arraymath  # noqa: F401
 
 
 class Part(JITCodeLibrary):
-    """Unoptimised code of a kernel, and which libraries hold what it calls."""
+    """Unoptimised code of a kernel, and the libraries of the functions that it calls."""
 
     _whole: Any = None
 
     def add_ir_module(self, ir_module: Any) -> None:
-        """The kernel's code, each function with its variables in registers; what it calls is declared only."""
+        """Add the kernel's code, each function with its variables in registers; called functions are only declared."""
         module = llvm.parse_assembly(normalize_ir_text(str(ir_module)))
         module.name, module.data_layout = ir_module.name, self._codegen._data_layout
         passes, builder = _function_passes()
@@ -59,27 +59,27 @@ class Part(JITCodeLibrary):
         self._final_module = module
 
     def finalize(self) -> None:
-        """Link, optimise and assemble nothing."""
+        """Finish without linking, optimising or assembling."""
         self._raise_if_finalized()
         for library in self._linking_libraries:
             self._reload_init.update(library._reload_init)
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
-        """None: there is no machine code to point to."""
+        """Return 0, which stands for no machine code."""
         self._ensure_finalized()
         return 0
 
     @property
     def codegen(self) -> Part:
-        """Receives the function's environment: this, which has nowhere to put it (`set_env`)."""
+        """Receiver of the function's environment: this object, which ignores it (`set_env`)."""
         return self
 
     def set_env(self, env_name: str, env: Any) -> None:
-        """Needed to raise exceptions of Python, which no kernel does."""
+        """Ignore the environment, which only raising Python exceptions needs; no kernel raises any."""
 
     def _get_module_for_linking(self) -> Any:
-        """Code of the kernel and of all that it calls."""
+        """Return the code of the kernel and of all functions that it calls."""
         if self._whole is None:
             whole = self._own().clone()
             for library in self._called():
@@ -92,10 +92,10 @@ class Part(JITCodeLibrary):
         return super()._get_module_for_linking()
 
     def _called(self) -> list[Any]:
-        """Libraries of what it calls, directly or not, each once and after all that call it.
+        """Return the libraries of all functions called, directly or not, each once and after all their callers.
 
-        The linker takes only what is referred to already: of a kernel that one caller names in code that never runs,
-        and another one below calls, nothing would be there.
+        The linker takes only functions referred to already: a kernel that one caller names in code that never runs,
+        and a later one calls, would otherwise be missing.
         """
         called: dict[Any, None] = {}
         open_calls = [(library, False) for library in self._linking_libraries]
@@ -111,14 +111,14 @@ class Part(JITCodeLibrary):
 
 
 class Whole(JITCodeLibrary):
-    """Code of a function that Python calls, with all the kernels that it reaches: optimised for short loops.
+    """Code of a function that Python calls, with all kernels that it reaches, optimised for short loops.
 
-    What goes over the bodies, closures or modes goes round a few times. As Numba has it, loops take several turns at
-    once, in vectors: then most of the time goes to what is left over, and compiling takes twice as long.
+    Loops over bodies, closures or modes are short. By default Numba unrolls and vectorises loops:
+    then the remainders take most of the time, and compiling takes twice as long.
     """
 
     def _optimize_final_module(self) -> None:
-        """LLVM's passes; Numba's also look for references that are counted, of which there are none."""
+        """Run LLVM's passes; Numba's default also prunes reference counts, which kernels do not have."""
         options = llvm.create_pipeline_tuning_options()
         options.speed_level = 3
         options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
@@ -128,7 +128,7 @@ class Whole(JITCodeLibrary):
 
 @cache
 def _function_passes() -> Any:
-    """What Numba lets run over each function before all others, made once instead of for each."""
+    """Return Numba's function passes, which run before all others; created once instead of for each function."""
     return cpu_target.target_context.codegen()._function_pass_manager()
 
 
@@ -140,7 +140,7 @@ class PartLowering(NativeLowering):
     library_class: type[JITCodeLibrary] = Part
 
     def run_pass(self, state: Any) -> bool:
-        """As of any function, but for where its code goes."""
+        """Lower as for any function, but into this class of library."""
         state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
@@ -154,7 +154,7 @@ class WholeLowering(PartLowering):
     library_class = Whole
 
 
-#: passes for what no kernel has: comprehensions, blocks `with`, functions within functions, arrays as operands
+#: passes for features that no kernel uses: comprehensions, `with` blocks, nested functions, arrays as operands
 NEEDLESS = {
     "WithLifting",
     "InlineClosureLikes",
@@ -172,7 +172,7 @@ NEEDLESS = {
 
 
 def _pipeline(state: Any, lowering: type[NativeLowering]) -> list[PassManager]:
-    """Numba's pipeline with another lowering, less what kernels need not; there is no object mode to fall back to."""
+    """Return Numba's pipeline with another lowering, without object mode and passes that kernels do not need."""
     manager = PassManager(lowering.__name__)
     for step, what in DefaultPassBuilder.define_nopython_pipeline(state).passes:
         if step.__name__ not in NEEDLESS:
@@ -181,14 +181,14 @@ def _pipeline(state: Any, lowering: type[NativeLowering]) -> list[PassManager]:
     return [manager]
 
 
-#: types of what kernels compute with
+#: types that kernels compute with
 PLAIN = (types.Number, types.Boolean, types.Literal, types.UniTuple, types.CPointer)
 
 
 class Target:
-    """Numba's context of code, as it was when the function that reaches the kernels began to be compiled.
+    """Numba's target context, frozen when the compilation of the function that reaches the kernels began.
 
-    Looking through all registries for news before each kernel took a twentieth of the time.
+    A refresh of all registries before each kernel took a twentieth of the time.
     """
 
     def __init__(self, context: Any) -> None:
@@ -198,19 +198,19 @@ class Target:
         return getattr(self._context, name)
 
     def refresh(self) -> None:
-        """Nothing."""
+        """Skip the refresh."""
 
 
 class Typing(Target):
-    """Numba's context of types, which remembers what operators and functions make of numbers.
+    """Numba's typing context, with a memory of the result types of operators and functions on numbers.
 
-    Numba tries all that is ever called `+`, arrays first, at each `+` anew.
+    Numba tries all overloads of `+`, arrays first, at each `+` again.
     """
 
     types: ClassVar[dict[tuple[Any, Any], Any]] = {}
 
     def resolve_function_type(self, function: Any, arguments: Any, names: Any) -> Any:
-        """Signature of a call; kernels are compiled for integers, not anew for each integer that is written out."""
+        """Return the signature of a call; kernels are compiled for the integer type, not for each literal integer."""
         if isinstance(function, types.Dispatcher):
             return self._context.resolve_function_type(function, tuple(map(types.unliteral, arguments)), names)
         plain = not names and all(isinstance(kind, PLAIN) for kind in arguments)
@@ -228,8 +228,8 @@ class KernelCompiler(CompilerBase):
         super().__init__(Typing(typing), Target(target), *others)
 
     def define_pipelines(self) -> list[PassManager]:
-        """The only one."""
-        # h, f, w and n are four arrays: what is written into w changes nothing that was read from h
+        """Return the only pipeline."""
+        # h, f, w and n are four arrays: writes to w do not change values read from h
         self.state.flags.noalias = True
         return _pipeline(self.state, PartLowering)
 
@@ -238,12 +238,12 @@ class WholeCompiler(CompilerBase):
     """Compiles a function that Python calls into a `Whole`."""
 
     def define_pipelines(self) -> list[PassManager]:
-        """The only one."""
+        """Return the only pipeline."""
         return _pipeline(self.state, WholeLowering)
 
 
 def works() -> bool:
-    """Whether a function of two kernels is compiled this way and gives what it should; raises what Numba raises."""
+    """Return True when a function of two kernels compiles and gives the right result; raise what Numba raises."""
     compiled = njit(no_cfunc_wrapper=True, no_cpython_wrapper=True, _nrt=False, pipeline_class=KernelCompiler)
     inner = compiled(lambda x: x + 1.0)
     outer = compiled(lambda x: 2.0 * inner(x))

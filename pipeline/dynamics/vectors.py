@@ -1,4 +1,4 @@
-"""Vector and rotation algebra for compiled kernels, on tuples that live in registers.
+"""Vector and rotation algebra for compiled kernels, on tuples that stay in registers.
 
 A vector is ``(x, y, z)``, a matrix its nine entries row by row.
 """
@@ -14,7 +14,7 @@ ZERO, IDENTITY = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @kernel
 def at(a, i):
-    """Vector stored in a flat array from index i."""
+    """Return the vector stored in a flat array from index i."""
     return (a[i], a[i + 1], a[i + 2])
 
 
@@ -34,13 +34,13 @@ def accumulate(a, i, v):
 
 @kernel
 def at9(a, i):
-    """Matrix stored in a flat array from index i."""
+    """Return the matrix stored in a flat array from index i."""
     return (a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5], a[i + 6], a[i + 7], a[i + 8])
 
 
 @kernel
 def at6(a, i):
-    """Symmetric matrix (xx, yy, zz, xy, xz, yz) stored from index i."""
+    """Return the symmetric matrix (xx, yy, zz, xy, xz, yz) stored from index i."""
     return (a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5])
 
 
@@ -53,19 +53,19 @@ def put6(a, i, s):
 
 @kernel
 def add(a, b):
-    """A + b."""
+    """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @kernel
 def add6(a, b):
-    """Return a + b of symmetric matrices."""
+    """Return a + b for symmetric matrices."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
 
 
 @kernel
 def add9(a, b):
-    """Return a + b of matrices."""
+    """Return a + b for matrices."""
     return (
         *(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
         *(a[3] + b[3], a[4] + b[4], a[5] + b[5]),
@@ -75,25 +75,25 @@ def add9(a, b):
 
 @kernel
 def sub(a, b):
-    """A - b."""
+    """Return a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @kernel
 def scale(s, a):
-    """S a."""
+    """Return s a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @kernel
 def dot(a, b):
-    """A . b."""
+    """Return a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
 def dot_wrench(wrench, twist):
-    """Product of a row with moment and force, and one with an angular and a linear part."""
+    """Return the product of a row with moment and force and a row with angular and linear part."""
     return dot(wrench.moment, twist.angular) + dot(wrench.force, twist.linear)
 
 
@@ -113,9 +113,9 @@ def add_twist(row, angular, linear):
 
 @kernel
 def radial(p, v):
-    """Length of p, its rate when p changes at the rate v, direction of p, and the direction's rate."""
+    """Return the length of p, its rate for the rate v of p, the direction of p, and the direction's rate."""
     distance = np.sqrt(dot(p, p))
-    # no length has no direction; any will do for what ends there
+    # a zero vector has no direction; any direction serves its users
     known = distance > 0.0
     direction = scale(1.0 / distance, p) if known else (0.0, 0.0, 1.0)
     rate = dot(direction, v)
@@ -125,13 +125,13 @@ def radial(p, v):
 
 @kernel
 def cross(a, b):
-    """A x b."""
+    """Return a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @kernel
 def turn(m, v):
-    """M v."""
+    """Return m v."""
     return (
         m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
         m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
@@ -141,7 +141,7 @@ def turn(m, v):
 
 @kernel
 def turn_back(m, v):
-    """m^T v."""
+    """Return m^T v."""
     return (
         m[0] * v[0] + m[3] * v[1] + m[6] * v[2],
         m[1] * v[0] + m[4] * v[1] + m[7] * v[2],
@@ -151,7 +151,7 @@ def turn_back(m, v):
 
 @kernel
 def product(a, b):
-    """A b."""
+    """Return a b."""
     return (
         a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
         a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
@@ -167,19 +167,19 @@ def product(a, b):
 
 @kernel
 def transpose(a):
-    """a^T."""
+    """Return a^T."""
     return (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8])
 
 
 @kernel
 def axis(m, k):
-    """Column k of a matrix: axis k of the frame."""
+    """Return column k of a matrix: axis k of the frame."""
     return (m[k], m[3 + k], m[6 + k])
 
 
 @kernel
 def from_quaternion(w, x, y, z):
-    """Rotation matrix of a quaternion of any norm."""
+    """Return the rotation matrix of a quaternion of any norm."""
     s = 2.0 / (w * w + x * x + y * y + z * z)
     return (
         1.0 - s * (y * y + z * z),
@@ -196,12 +196,12 @@ def from_quaternion(w, x, y, z):
 
 @kernel
 def to_quaternion(R):
-    """Quaternion (w, x, y, z) of a rotation matrix, of any norm and sign, by its largest component (Shepperd 1978)."""
+    """Return a quaternion (w, x, y, z) of a rotation matrix, of any norm and sign (Shepperd 1978)."""
     xx, yy, zz = R[0], R[4], R[8]
     w, x, y, z = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz
     wx, wy, wz = R[7] - R[5], R[2] - R[6], R[3] - R[1]
     xy, yz, zx = R[1] + R[3], R[5] + R[7], R[2] + R[6]
-    # four times the products of two components, of one with all of them
+    # four times the products of one component with all four
     if w >= x and w >= y and w >= z:
         x, y, z = wx, wy, wz
     elif x >= y and x >= z:
@@ -215,14 +215,14 @@ def to_quaternion(R):
 
 @kernel
 def about_z(angle):
-    """Rotation matrix of a turn about z [rad]."""
+    """Return the rotation matrix of a rotation about z [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     return (c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 
 
 @kernel
 def quaternion_rate(a, q, u, rate):
-    """Rate of the quaternion stored from q at the angular velocity stored from u, parent axes."""
+    """Store the rate of the quaternion stored from q at the angular velocity stored from u, parent axes."""
     e, x, y, z = a[q], a[q + 1], a[q + 2], a[q + 3]
     p, r, s = a[u], a[u + 1], a[u + 2]
     a[rate] = -0.5 * (p * x + r * y + s * z)
@@ -233,7 +233,7 @@ def quaternion_rate(a, q, u, rate):
 
 @kernel
 def congruence(R, s):
-    """R S R^T of a symmetric S = (xx, yy, zz, xy, xz, yz), returned in the same order."""
+    """Return R S R^T of a symmetric S = (xx, yy, zz, xy, xz, yz), in the same order."""
     a = product(R, (s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]))
     return (
         a[0] * R[0] + a[1] * R[1] + a[2] * R[2],
@@ -247,7 +247,7 @@ def congruence(R, s):
 
 @kernel
 def turn_symmetric(s, v):
-    """S v of a symmetric S = (xx, yy, zz, xy, xz, yz)."""
+    """Return S v of a symmetric S = (xx, yy, zz, xy, xz, yz)."""
     return (
         s[0] * v[0] + s[3] * v[1] + s[4] * v[2],
         s[3] * v[0] + s[1] * v[1] + s[5] * v[2],
@@ -257,7 +257,7 @@ def turn_symmetric(s, v):
 
 @kernel
 def about(v, a, b):
-    """The matrix that takes x to x + a v x x + b v x (v x x)."""
+    """Return the matrix that maps x to x + a v x x + b v x (v x x)."""
     x, y, z = v
     return (
         1.0 - b * (y * y + z * z),
@@ -274,7 +274,7 @@ def about(v, a, b):
 
 @kernel
 def exponential(v):
-    """Rotation matrix of a rotation vector below about one radian (Rodrigues, in series)."""
+    """Return the rotation matrix of a rotation vector below about one radian (Rodrigues, in series)."""
     s = dot(v, v)
     a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
     b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
@@ -283,7 +283,7 @@ def exponential(v):
 
 @kernel
 def _tangent_series(s):
-    """(1 - cos)/s and (sqrt s - sin)/s^1.5 at s = angle^2, and their derivatives in s."""
+    """Return (1 - cos)/s and (sqrt s - sin)/s^1.5 at s = angle^2, and their derivatives in s."""
     a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
     b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0
     da = -(1.0 - s / 15.0 * (1.0 - s / 37.333333333333336 * (1.0 - s / 67.5))) / 24.0
@@ -293,7 +293,7 @@ def _tangent_series(s):
 
 @kernel
 def tangent(v, x):
-    """Angular velocity, parent axes, of the rotation exp(v) when v changes at the rate x."""
+    """Return the angular velocity, parent axes, of the rotation exp(v) when v changes at the rate x."""
     a, b, _, _ = _tangent_series(dot(v, v))
     vx = cross(v, x)
     vvx = cross(v, vx)
@@ -302,7 +302,7 @@ def tangent(v, x):
 
 @kernel
 def tangent_matrix(v):
-    """The matrix of `tangent`: x to angular velocity."""
+    """Return the matrix of `tangent`: x to angular velocity."""
     s = dot(v, v)
     a, b, _, _ = _tangent_series(s)
     return about(v, a, b)
@@ -310,7 +310,7 @@ def tangent_matrix(v):
 
 @kernel
 def tangent_rate(v, x):
-    """Angular acceleration of exp(v) at constant rate x of v: d/dt of `tangent`."""
+    """Return the angular acceleration of exp(v) at constant rate x of v: d/dt of `tangent`."""
     _, b, da, db = _tangent_series(dot(v, v))
     ds = 2.0 * dot(v, x)
     vx = cross(v, x)

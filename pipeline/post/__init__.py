@@ -1,1 +1,1 @@
-"""From datasets to maps, tables, pictures and the report. Reads artifacts, imports no other tower."""
+"""Derived series, maps, tables, pictures and reports from datasets. Reads artifacts, imports no other tower."""

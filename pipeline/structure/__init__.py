@@ -1,1 +1,1 @@
-"""From a recipe to a reduced modal bundle: finite elements (fe) and modes. Depends on: flexclear.pipeline.core."""
+"""Flexible bodies, from recipe to reduced bundle: finite elements (fe), modes and stress. Depends on: core."""

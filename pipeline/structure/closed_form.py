@@ -1,4 +1,4 @@
-r"""Exact natural frequencies of uniform rods, from theory rather than from elements, next to those of a mesh.
+r"""Exact natural frequencies of uniform rods in closed form, for comparison with those of a mesh.
 
 Bending (Euler-Bernoulli, Rayleigh, Timoshenko) about the middle of the span, :math:`|x| \le l = L/2`:
 
@@ -11,8 +11,8 @@ with :math:`s^2 = -\beta^2, \alpha^2` the roots of
 
 Transverse equilibrium gives the shear force, :math:`Q' = -\rho A\omega^2 v`, and so the slope's amplitudes
 :math:`\beta - k/\beta, \alpha + k/\alpha`, :math:`k = \rho\omega^2/\kappa G`. Two conditions hold at each end. Where
-both ends are alike each parity leaves a determinant of its own, else one of four rows; hyperbolic functions are scaled,
-so that none has large numbers.
+both ends are alike each parity has its own 2 x 2 determinant, else it is 4 x 4; hyperbolic functions are scaled,
+so that no determinant has large entries.
 Source: Timoshenko, *Vibration Problems in Engineering*; Han, Benaroya & Wei (1999), J. Sound Vib. 225, 935-988.
 """
 
@@ -26,17 +26,17 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-#: what vanishes at an end, as rows of `_at_end`: deflection 0, slope 1, moment 2, shear force 3
+#: quantities that vanish at an end, as rows of `_at_end`: deflection 0, slope 1, moment 2, shear force 3
 CONDITIONS = {"fixed": [0, 1], "pinned": [0, 2], "guided": [1, 3], "free": [2, 3]}
-#: columns of `_at_end` by parity, and from x = l to x = -l, but for signs of whole rows
+#: columns of `_at_end` by parity; factors from x = l to x = -l, up to the signs of whole rows
 EVEN, ODD, MIRRORED = slice(0, 2), slice(2, 4), np.array([1.0, 1.0, -1.0, -1.0])
-#: step of the search in beta l; neighbouring roots are about pi/2 apart
+#: step of the root search in beta l; neighbouring roots are about pi/2 apart
 STEP = math.pi / 64.0
-#: where the search begins: no elastic root lies below beta l = pi/4 (pinned and guided ends)
+#: step number at which the search begins: no elastic root lies below beta l = pi/4 (pinned and guided ends)
 FIRST_STEP = 8
-#: of bending, torsion and extension, each two words with a hyphen
+#: end conditions of bending, torsion and extension, each two words with a hyphen
 Ends = tuple[str, str, str]
-#: variables of a mesh that no closed form here covers
+#: mesh variables that exclude a closed form here
 BEYOND = ("area_profile", "product_moment", "inertia_product", "lump_node")
 CONSTANTS = ("area", "youngs_modulus", "shear_modulus", "density")
 
@@ -45,7 +45,7 @@ CONSTANTS = ("area", "youngs_modulus", "shear_modulus", "density")
 class Span:
     """A uniform rod in one plane of bending.
 
-    rotary: rho I of the mass; zero for Euler-Bernoulli.  shear: kappa G A; infinite without shear deformation.
+    rotary: rho I of the mass, zero for Euler-Bernoulli.  shear: kappa G A, infinite without shear deformation.
     """
 
     length: float  #: L [m]
@@ -58,17 +58,17 @@ class Span:
 def columns(
     mesh: xr.Dataset, reference: str, families: Sequence[str], interfaces: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
-    """Exact frequencies [Hz] by theory, each of shape (mode,); empty where no closed form applies.
+    """Return exact frequencies [Hz] by theory, each of shape (mode,); empty where no closed form applies.
 
     families: of the retained modes in ascending order, without gaps within a family.
-    interfaces: frames that the reference condition holds, in its order.
+    interfaces: names of the frames that the reference condition holds, in the order of the condition.
     """
     ends = _ends(mesh, reference, interfaces)
     if ends is None or not _uniform(mesh):
         return {}
     tables = {"exact_euler_bernoulli": _table(mesh, ends, families, rotary=False, shear=False)}
     if mesh.attrs["theory"] == "euler-bernoulli":
-        return tables  # such a mesh says nothing of the rotary inertia
+        return tables  # such a mesh does not hold the rotary inertia
     tables["exact_rayleigh"] = _table(mesh, ends, families, rotary=True, shear=False)
     if "shear_coefficient" in mesh:
         tables["exact_timoshenko"] = _table(mesh, ends, families, rotary=True, shear=True)
@@ -76,21 +76,21 @@ def columns(
 
 
 def _ends(mesh: xr.Dataset, reference: str, interfaces: Sequence[str]) -> Ends | None:
-    """Ends of bending, torsion and extension; None for conditions that are not on the rod's two ends."""
+    """Return the end conditions of bending, torsion and extension; None for conditions off the rod's two ends."""
     if reference in ("free-free", "fixed-fixed"):
         return (reference,) * 3
     last = mesh.sizes["node"] - 1
     held = [int(mesh["frame_node"].sel(frame=name)) for name in interfaces]
     if reference == "cantilever" and held and held[0] in (0, last):
         return ("fixed-free",) * 3
-    # the first pin holds the axial motion and the twist too
+    # the first pin also holds the axial motion and the twist
     if reference == "pinned-pinned" and sorted(held[:2]) == [0, last]:
         return "pinned-pinned", "fixed-free", "fixed-free"
     return None
 
 
 def _uniform(mesh: xr.Dataset) -> bool:
-    """Whether a rod is the same all along, carries no masses, and its planes of bending are not coupled."""
+    """Return True for a uniform rod without lumped masses whose planes of bending are not coupled."""
     constants = [mesh[name].values for name in (*CONSTANTS, "second_moment", "inertia_moment")]
     return not any(np.ptp(values, axis=0).any() for values in constants) and not any(name in mesh for name in BEYOND)
 
@@ -112,7 +112,7 @@ def _series(mesh: xr.Dataset, ends: Ends, family: str, count: int, *, rotary: bo
         return rod(math.sqrt(E / rho), length, extension, count)
     if family == "torsion":
         return rod(math.sqrt(G * second[0] / (rho * inertia[0])), length, torsion, count)
-    # deflection in y bends about z, and the other way round
+    # deflection in y bends about z, deflection in z about y
     axis, across = (2, 1) if family == "bending_y" else (1, 2)
     kappa = float(mesh["shear_coefficient"].values[0, across]) if shear else math.inf
     span = Span(length, E * float(second[axis]), rho * area, rho * float(inertia[axis]) * rotary, kappa * G * area)
@@ -120,9 +120,9 @@ def _series(mesh: xr.Dataset, ends: Ends, family: str, count: int, *, rotary: bo
 
 
 def rod(wave_speed: float, length: float, ends: str, count: int) -> np.ndarray:
-    """Axial or torsional frequencies [Hz], shape (count,): n c / 2 L for ends alike, (n - 1/2) c / 2 L else.
+    """Return axial or torsional frequencies [Hz], (count,): n c / 2 L for equal ends, (n - 1/2) c / 2 L for unequal.
 
-    wave_speed: sqrt(E/rho), or sqrt(G J / rho I_p) [m/s].  ends: of ``fixed`` and ``free``, with a hyphen.
+    wave_speed: sqrt(E/rho), or sqrt(G J / rho I_p) [m/s].  ends: ``fixed`` or ``free`` for each end, with a hyphen.
     """
     first, last = ends.split("-")
     shift = 0.0 if first == last else 0.5
@@ -130,13 +130,13 @@ def rod(wave_speed: float, length: float, ends: str, count: int) -> np.ndarray:
 
 
 def bending(span: Span, ends: str, count: int) -> np.ndarray:
-    """The `count` lowest bending frequencies [Hz], rigid ones left out, shape (count,).
+    """Return the `count` lowest elastic bending frequencies [Hz], shape (count,).
 
     ends: conditions at both ends, two words of CONDITIONS with a hyphen, as in ``fixed-free``.
     """
     first, last = (CONDITIONS[end] for end in ends.split("-"))
     if first == last:
-        # of either parity about every second mode; one more on each side is enough for the sorted lowest
+        # each parity has about every second mode; one more on each side suffices for the sorted lowest ones
         parities = (lambda shapes: shapes[first, EVEN], lambda shapes: shapes[first, ODD])
         roots = [root for parity in parities for root in _roots(parity, span, count // 2 + 2)]
     else:
@@ -145,10 +145,10 @@ def bending(span: Span, ends: str, count: int) -> np.ndarray:
 
 
 def _at_end(span: Span, omega: float) -> np.ndarray:
-    """Deflection, slope, moment / EI and shear force / rho A omega^2 at x = l of cos, cosh, sin and alpha sinh, (4, 4).
+    """Return deflection, slope, moment / EI and shear force / rho A omega^2 at x = l of the four shapes, (4, 4).
 
-    At x = -l deflection and moment of the even ones are the same, slope and shear force the opposite; of the odd ones
-    it is the other way round.
+    From x = l to x = -l, deflection and moment of the even shapes (cos, cosh) keep their sign, slope and shear force
+    change it. The odd shapes (sin, sinh) behave the opposite way.
     """
     half, k = 0.5 * span.length, span.line_mass * omega**2 / span.shear
     b = omega**2 * span.rotary / span.bending + k
@@ -168,24 +168,24 @@ def _at_end(span: Span, omega: float) -> np.ndarray:
 
 
 def _hyperbolic(square: float, half: float) -> tuple[float, float]:
-    """cosh(alpha l) and sinh(alpha l)/alpha, both times exp(-alpha l) where alpha is real."""
+    """Return cosh(alpha l) and sinh(alpha l)/alpha, both times exp(-alpha l) where alpha is real."""
     if square > 0.0:
         alpha = math.sqrt(square)
         decay = math.exp(-2.0 * alpha * half)
         return 0.5 * (1.0 + decay), 0.5 * (1.0 - decay) / alpha
-    # above the cut-off of the second wave it travels too
+    # above its cut-off the second wave propagates too
     gamma = math.sqrt(-square)
     return math.cos(gamma * half), half * float(np.sinc(gamma * half / math.pi))
 
 
 def _roots(rows: Callable[[np.ndarray], np.ndarray], span: Span, count: int) -> list[float]:
-    """The `count` lowest omega [rad/s] at which the rows of the shapes' end values depend on each other."""
+    """Return the `count` lowest omega [rad/s] at which the rows of the shapes' end values are linearly dependent."""
 
     def at(omega: float) -> float:
         return float(np.linalg.det(rows(_at_end(span, omega))))
 
     roots: list[float] = []
-    # rigid roots lie at zero
+    # rigid modes have roots at zero, below the first step
     step = FIRST_STEP
     low = _omega(span, step * STEP / (0.5 * span.length))
     while len(roots) < count:
@@ -198,7 +198,7 @@ def _roots(rows: Callable[[np.ndarray], np.ndarray], span: Span, count: int) -> 
 
 
 def _omega(span: Span, beta: float) -> float:
-    """Frequency of the first wave with the wave number beta: the lower root of the characteristic equation."""
+    """Return omega [rad/s] of the first wave with wave number beta, the lower root of the characteristic equation."""
     a = span.line_mass * span.rotary / span.shear
     b = span.bending * beta**2 / span.shear * span.line_mass + span.rotary * beta**2 + span.line_mass
     c = span.bending * beta**4

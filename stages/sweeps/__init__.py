@@ -1,1 +1,1 @@
-"""Points of a sweep: planned, handed to processes or a cluster, stored."""
+"""Points of a sweep: planned, run by processes or a cluster, stored."""

@@ -1,4 +1,4 @@
-"""Who runs the points of a sweep: this process, the cores of this machine, or a Dask cluster; with equal results."""
+"""Executors of sweeps: this process, the cores of this machine, or a Dask cluster, with equal results."""
 
 from __future__ import annotations
 
@@ -18,28 +18,29 @@ from flexclear.pipeline.core.workflow import stopping, workers
 from flexclear.pipeline.core.workflow.schedule import TICK
 from flexclear.stages.sweeps.sweep_points import source_digest, work
 
-#: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
+#: seconds of work in a batch, largest number of points in a batch, submitted batches per worker
 BATCH_SECONDS, MOST_POINTS, QUEUED = 0.5, 1000, 2
-#: towards the end less is handed out, a fraction of what is left, so that all workers finish together; least seconds of
-#: it
+#: least seconds of work in a batch: towards the end batches shrink with the remaining work, so that all workers finish
+#: together
 LEAST_SECONDS = 0.02
-#: evaluations of a point from which on it is run together with others, and of all that wait, for which code is made
+#: least evaluations of a point that is run together with others, and of all waiting points that are worth compiling for
 WORTH_TOGETHER, WORTH_CODE = 5_000, 5_000_000
-#: so many, where each worker has as many, and seconds of work of several times as many: fewer wait for their last ones
+#: points evaluated together, where each worker gets as many; seconds of work in their batches, long enough for several
+#: groups, since each group waits for its last point
 POINTS_TOGETHER, BATCH_SECONDS_TOGETHER = 8, 5.0
-#: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
+#: least seconds of work in a batch per worker: many workers with less would exceed the scheduler's capacity
 PER_WORKER = 5e-3
-#: seconds in which a scheduler must have answered
+#: seconds within which a scheduler must answer
 SCHEDULER_TIMEOUT = 10.0
-#: seconds after which a cluster is asked again how many workers it has
-LOOK = 5.0
-#: how often in a row processes of this machine may be lost before it is for good
-LOSSES = 3
+#: interval at which a cluster is asked for its number of workers [s]
+POLL_INTERVAL = 5.0
+#: losses of worker processes in a row after which the sweep stops
+MOST_LOSSES = 3
 
 
 @dataclass(frozen=True)
 class Job:
-    """A point to be run. family: its key; point: path in the scene -> value."""
+    """A point to run. family: key of its family; point: key path in the scene -> value."""
 
     key: str
     family: str
@@ -48,15 +49,15 @@ class Job:
 
 Done = Callable[[Sequence[tuple[Job, Point]], float], None]
 Points = list[dict[str, Any]]
-#: gives `stages.sweeps.sweep_points.work` to whoever does it, with its first five arguments
+#: submits `stages.sweeps.sweep_points.work` with its first five arguments
 Submit = Callable[[str, bytes, Points, bool, bool], Future[Any]]
 
 
 @dataclass(frozen=True)
 class Engine:
-    """Who does the work, and on how many tasks at a time; whether on this machine.
+    """Executor of a sweep; `width` returns how many tasks run at a time, `here` is True on this machine.
 
-    renew: called where a worker has died and taken the others with it, before work is given out again.
+    renew: called after a dying worker has broken the process pool, before work is submitted again.
     """
 
     submit: Submit
@@ -65,34 +66,34 @@ class Engine:
     renew: Callable[[], None] = lambda: None
 
     def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
-        """Run points; `done` receives finished ones and their processor time [s], in any order of the batches.
+        """Run points; `done` receives finished points and their processor time [s], batches in any order.
 
-        families: what `stages.sweeps.sweep_points.work` is given of each.  Raises ResourceError when workers keep
-        dying, StoppedError when all is to stop.
+        families: the argument `packed` of `stages.sweeps.sweep_points.work`, by family. Raises ResourceError when
+        workers keep dying, StoppedError when the work is to stop.
         """
         waiting, running, seconds_each, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
-        evaluations, together = 0.0, False  # of the points that were finished last; whether code is made for several
+        evaluations, together = 0.0, False  # evaluations per point in the last batch; whether points are run together
         while waiting or running:
             stopping.check()
-            # nothing is compiled twice: until the first point is there nothing else begins
+            # only the first point runs until it is finished, so that no kernel is compiled twice
             width = self.width()
             while waiting and len(running) < (QUEUED * width if seconds_each else 1):
                 left = sum(map(len, waiting))
                 enough = together or (left >= POINTS_TOGETHER * width and left * evaluations >= WORTH_CODE)
                 together = evaluations >= WORTH_TOGETHER and enough
                 mine = _take(waiting, _portion(left, seconds_each, width, together) if seconds_each else 1)
-                running[self._given(mine, families, alone=not seconds_each, together=together)] = mine
+                running[self._given(mine, families, others_idle=not seconds_each, together=together)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
                 try:
                     points, seconds = future.result()
                 except BrokenProcessPool:
-                    # whose fault it was is not known: every batch on its way is lost, and made again
+                    # the batch at fault is unknown, and all running batches are lost: each is run again
                     again = [mine, *running.values()]
                     running.clear()
                     lost += 1
-                    if lost > LOSSES:
+                    if lost > MOST_LOSSES:
                         text = f"worker processes were killed {lost} times in a row; is the memory full?"
                         raise ResourceError(text) from None
                     waiting += [list(reversed(batch)) for batch in again]
@@ -100,14 +101,14 @@ class Engine:
                     break
                 done(list(zip(mine, points, strict=True)), seconds)
                 evaluations = sum(point.evaluations for point in points) / len(points)
-                first, lost = not seconds_each, 0  # what the first one took held compiling and fetching
+                first, lost = not seconds_each, 0  # the first batch's time includes compiling and fetching
                 seconds_each = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
-    def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, together: bool) -> Future[Any]:
+    def _given(self, mine: list[Job], families: dict[str, bytes], *, others_idle: bool, together: bool) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
         try:
-            return self.submit(family, families[family], points, alone, together)
-        except (BrokenProcessPool, ConnectionError, EOFError) as error:  # the others: of one killed while it starts
+            return self.submit(family, families[family], points, others_idle, together)
+        except (BrokenProcessPool, ConnectionError, EOFError) as error:  # the latter two: worker killed at its start
             if not self.here:
                 raise
             failed: Future[Any] = Future()
@@ -116,7 +117,7 @@ class Engine:
 
 
 def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
-    """Jobs in stretches of one family, the next one last."""
+    """Return the jobs in lists of one family each, in reversed order, as `_take` takes from the end."""
     families: dict[str, list[Job]] = {}
     for job in jobs:
         families.setdefault(job.family, []).append(job)
@@ -124,14 +125,14 @@ def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
 
 
 def _portion(left: int, seconds_each: float, width: int, together: bool) -> int:
-    """Points that are handed out at a time. left: those that wait; seconds_each: seconds of each.
+    """Return the number of points in the next batch. left: waiting points; seconds_each: processor time of each [s].
 
-    together: whether they are run side by side; of few, most would wait for the last one.
+    together: whether points are evaluated together; with few in a batch, most would wait for the last point.
     """
     asking = PER_WORKER * width
     seconds_of_work = BATCH_SECONDS_TOGETHER if together else BATCH_SECONDS
     seconds = min(max(seconds_of_work, asking), max(LEAST_SECONDS, asking, left * seconds_each / (QUEUED * width)))
-    if together and left < POINTS_TOGETHER * width:  # the last ones
+    if together and left < POINTS_TOGETHER * width:  # the last points
         return max(POINTS_TOGETHER // 2, ceil(left / width))
     if together:
         return POINTS_TOGETHER * min(
@@ -150,7 +151,7 @@ def _take(waiting: list[list[Job]], count: int) -> list[Job]:
 
 @contextmanager
 def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
-    """The engine of a sweep: a Dask cluster at an address, that many processes here, or this one."""
+    """Yield the executor of a sweep: a Dask cluster at an address, `width` processes here, or this process."""
     if scheduler is not None:
         with _cluster(scheduler) as runner:
             yield runner
@@ -177,7 +178,7 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
 
 
 def _here(*given: Any) -> Future[Any]:
-    """The work, done in this process at once."""
+    """Call `work` in this process at once; return its result as a finished future."""
     future: Future[Any] = Future()
     future.set_result(work(*given))
     return future
@@ -185,7 +186,7 @@ def _here(*given: Any) -> Future[Any]:
 
 @contextmanager
 def _cluster(address: str) -> Iterator[Engine]:
-    """The workers of a Dask scheduler; InputError when there are none, or they run other sources."""
+    """Yield the workers of a Dask scheduler; raise InputError without workers, or when workers run other sources."""
     where = f"--scheduler {address}"
     try:
         from distributed import Client, KilledWorker
@@ -210,7 +211,7 @@ def _cluster(address: str) -> Iterator[Engine]:
         raise ResourceError(text) from None
     except (CancelledError, FutureCancelledError, CommClosedError):
         raise ResourceError(f"{where}: the scheduler has gone; finished results are stored") from None
-    except ImportError as error:  # of a worker that has joined since
+    except ImportError as error:  # from a worker that joined after the check
         raise InputError(where, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:
         stack.close()
@@ -218,7 +219,7 @@ def _cluster(address: str) -> Iterator[Engine]:
 
 @contextmanager
 def _quiet(library: str) -> Iterator[None]:
-    """Meanwhile a library logs nothing: what happens to it is reported in one sentence, without its traceback."""
+    """Silence the loggers of a library: its failures are reported in one sentence, without tracebacks."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == library]
     levels = {logger: logger.level for logger in map(logging.getLogger, names)}
     for logger in levels:
@@ -231,22 +232,22 @@ def _quiet(library: str) -> Iterator[None]:
 
 
 def _on_cluster(client: Any, where: str) -> Engine:
-    """The engine of a cluster; points that are lost with a worker are run by another one, as its scheduler sees to."""
-    executor, seen = client.get_executor(), [time.monotonic(), _threads(client, where)]
+    """Return the executor of a cluster; its scheduler reruns points that are lost with a worker."""
+    executor, last_poll = client.get_executor(), [time.monotonic(), _threads(client, where)]
     held: dict[str, Any] = {}
 
     def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
-        # sent once; workers fetch it from each other, and the scheduler has it made again when it is lost with one
+        # sent once; workers fetch it from each other, and the scheduler recreates it when it is lost with a worker
         if family not in held:
             held[family] = client.submit(bytes, packed, key=f"family-{family}", pure=False)
         future: Future[Any] = executor.submit(work, family, held[family], *rest, source_digest())
         return future
 
     def width() -> int:
-        """Workers may come and go."""
-        if time.monotonic() - seen[0] > LOOK:
-            seen[:] = time.monotonic(), sum(client.nthreads().values())
-        return max(1, int(seen[1]))
+        """Return the current number of threads; workers may join and leave."""
+        if time.monotonic() - last_poll[0] > POLL_INTERVAL:
+            last_poll[:] = time.monotonic(), sum(client.nthreads().values())
+        return max(1, int(last_poll[1]))
 
     return Engine(submit, width, here=False)
 
@@ -254,7 +255,7 @@ def _on_cluster(client: Any, where: str) -> Engine:
 def _threads(client: Any, where: str) -> int:
     """Return how many tasks the workers run at a time.
 
-    Raises InputError where there are none, or they run other sources, ResourceError where one keeps silent.
+    Raises InputError when there are no workers or they run other sources, ResourceError when a worker does not answer.
     """
     end = inf
     while True:

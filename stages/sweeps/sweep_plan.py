@@ -1,4 +1,4 @@
-"""What a sweep comes to: its points checked, distinguished by the flexible bodies they need, and named by content."""
+"""The plan of a sweep: its points checked, grouped by the flexible bodies that they need, and named by content."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from flexclear.stages.sweeps.sweep_engine import Job
 from flexclear.stages.sweeps.sweep_points import Family as Work
 from flexclear.stages.workplace import Workplace, check
 
-#: numeric values of a parameter that are all checked beforehand; of more, the least and the largest
+#: up to so many numeric values of a parameter are all checked beforehand; of more, the smallest and the largest
 CHECKED = 200
-#: what a path in the scene decides that cannot be in one series
+#: key paths that set the output times, which all points of one series share
 TIMES = ("time.start", "time.end", "output.interval")
-#: and what decides how many sections there are
+#: key paths that set the number of sections
 COUNTS = ("sections.periods",)
-#: represents what is varied in the facts of a family
+#: stands for varied values in the facts of a family
 VARIED = "varied"
 
 
 @dataclass(frozen=True)
 class Family:
-    """Points that share their flexible bodies: what workers are given, and the facts that decide all of them."""
+    """Points that share their flexible bodies: the work given to workers, and the facts that decide all results."""
 
     work: Work
     facts: Mapping[str, str]
@@ -57,7 +57,7 @@ class Family:
 
     @property
     def folder(self) -> tuple[str, str]:
-        """Stage of its batches in the store, and a name there that no batch has."""
+        """Stage of the family's batches in the store, and a name there that no batch has."""
         return f"sweep/{self.key}", FAMILY
 
     def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded], here: bool = True) -> None:
@@ -67,14 +67,14 @@ class Family:
         store.put(self.folder[0], name, {"nc": batch}, self.facts, computed_by)
 
     def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
-        """All points of the family that are stored and sound, with their values of the `recorded` quantities."""
-        points: dict[str, Point] = {}
+        """Return all points of the family in sound stored batches, with their values of the `recorded` quantities."""
+        points_by_key: dict[str, Point] = {}
         for _, batch in self.batches(store):
-            points |= results.unpacked(batch, recorded)
-        return points
+            points_by_key |= results.unpacked(batch, recorded)
+        return points_by_key
 
     def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
-        """What `keep` has stored, as far as it is sound."""
+        """Yield the sound batches that `keep` has stored, with their records."""
         for path in sorted((store.root / "cache" / self.folder[0]).glob("*.json")):
             record = store.find(self.folder[0], path.stem)
             if record is not None:
@@ -83,10 +83,10 @@ class Family:
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep whose paths, values and quantities are known to fit its scene.
+    """A sweep whose key paths, values and quantities have been checked against its scene.
 
-    scene: with what is set, at the first point.
-    families, jobs: once the flexible bodies are there; see `prepare`.
+    scene: with the sweep's `set` values, at the first point. families, jobs: filled by `prepare`, once the flexible
+    bodies exist.
     """
 
     sweep: Sweep
@@ -97,7 +97,7 @@ class Plan:
     jobs: tuple[Job, ...] = ()
 
     def dataset(self, points: Mapping[str, Point]) -> xr.Dataset:
-        """The sweep's dataset of the points that are finished."""
+        """Return the sweep's dataset of the finished points."""
         attributes: dict[str, str | int] = {"sweep": self.sweep.name, "scene": self.scene.name}
         attributes |= {"title": self.sweep.title} if self.sweep.title else {}
         attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
@@ -115,47 +115,47 @@ class Plan:
         )
 
     def rows(self, first: int, last: int) -> Plan:
-        """The part of the plan with these entries of the first dimension, up to the last one or the end."""
+        """Return the part of the plan with entries `first` to `last` (excluded) of the first dimension."""
         axes, each = self.design.axes, prod(self.design.shape[1:])
         cut = [replace(axis, values=axis.values[first:last]) for axis in (axes[:1] if self.design.grid else axes)]
-        made = Design((*cut, *axes[len(cut) :]), self.design.grid)
-        return replace(self, design=made, jobs=self.jobs[first * each : last * each])
+        part = Design((*cut, *axes[len(cut) :]), self.design.grid)
+        return replace(self, design=part, jobs=self.jobs[first * each : last * each])
 
     @property
     def time(self) -> np.ndarray:
-        """Of the recorded series [s]."""
+        """Times of the recorded series [s]."""
         return regular_times(self.scene.time, self.scene.output)
 
     @property
     def sections(self) -> int:
-        """How many there are of each point, where they are recorded."""
+        """Number of sections per point, where sections are recorded."""
         return (self.scene.sections or Sections()).periods
 
     @property
     def statistics(self) -> list[str]:
-        """Of `points.STATISTICS`, those that are asked for."""
+        """Names of the requested ones among `points.STATISTICS`."""
         asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
         return [statistic for statistic, requested in asked.items() if requested]
 
 
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
-    """The plan of a sweep, all of it checked before anything is run.
+    """Return the plan of a sweep after checking all of it, before anything is run.
 
-    where: the sweep's file, for messages.  Raises InputError for paths that the scene does not have, values that it
-    refuses, and quantities that nothing of it has.
+    where: the sweep's file, for messages. Raises InputError for key paths that the scene does not have, values that it
+    refuses, and quantities that none of its components has.
     """
     try:
         base = edited(scene, {**sweep.set, "accuracy": None}) if sweep.set else edited(scene, {"accuracy": None})
     except InputError as error:
         raise _placed(f"{where} [set]", error) from None
     check_members(sweep.members or 0, base.limits, f"{where} [members]")
-    made = design(sweep)
-    _check_values(base, made, where)
-    base = edited(base, made.points()[0])
-    recorded = tuple(_kept(base, name, where) for name in sweep.keep)
-    _check_recorded(sweep, base, made, recorded, where)
-    _check_units(base, made, recorded, where)
-    return Plan(sweep, base, made, recorded)
+    sweep_design = design(sweep)
+    _check_values(base, sweep_design, where)
+    base = edited(base, sweep_design.points()[0])
+    recorded = tuple(_recorded(base, name, where) for name in sweep.keep)
+    _check_recorded(sweep, base, sweep_design, recorded, where)
+    _check_units(base, sweep_design, recorded, where)
+    return Plan(sweep, base, sweep_design, recorded)
 
 
 def _placed(where: str, error: InputError) -> InputError:
@@ -163,29 +163,29 @@ def _placed(where: str, error: InputError) -> InputError:
     return InputError(where, problem, remedy)
 
 
-def _check_values(base: Scene, made: Design, where: str) -> None:
-    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are examined.
+def _check_values(base: Scene, sweep_design: Design, where: str) -> None:
+    """Raise InputError for a value that the scene refuses; of a sample with many points the extreme ones are examined.
 
-    In a grid each value is next to the first ones of the others: what some combinations mean for the mechanism is
-    known when they are run.
+    In a grid each value is combined with the first values of the other parameters: whether all combinations suit the
+    mechanism is known only when they are run.
     """
-    points = made.points()
+    points = sweep_design.points()
     try:
         edited(base, points[0])
     except InputError as error:
-        raise _placed(f"{where} [vary{_guilty(base, made)}]", error) from None
-    for axis in made.axes:
-        for k in _looked_at(axis):
-            chosen = points[k] if not made.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
+        raise _placed(f"{where} [vary{_refused_parameter(base, sweep_design)}]", error) from None
+    for axis in sweep_design.axes:
+        for k in _checked_indices(axis):
+            chosen = points[k] if not sweep_design.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
             try:
                 with_numbers(base, chosen)
             except InputError as error:
                 raise _placed(f"{where} [vary.{axis.name}]", error) from None
 
 
-def _guilty(base: Scene, made: Design) -> str:
-    """The parameter whose first value the scene does not take by itself, with a dot before it; or nothing."""
-    for axis in made.axes:
+def _refused_parameter(base: Scene, sweep_design: Design) -> str:
+    """Return the parameter whose first value the scene refuses on its own, after a dot; or an empty string."""
+    for axis in sweep_design.axes:
         try:
             edited(base, dict.fromkeys(axis.places, axis.values[0]))
         except InputError:
@@ -193,7 +193,7 @@ def _guilty(base: Scene, made: Design) -> str:
     return ""
 
 
-def _looked_at(axis: Axis) -> Sequence[int]:
+def _checked_indices(axis: Axis) -> Sequence[int]:
     numbers = axis.coordinate
     if len(numbers) <= CHECKED or isinstance(numbers[0], str):
         return range(len(numbers))
@@ -201,15 +201,15 @@ def _looked_at(axis: Axis) -> Sequence[int]:
     return by_size[0], by_size[-1]
 
 
-def _kept(base: Scene, name: str, where: str) -> Recorded:
+def _recorded(base: Scene, name: str, where: str) -> Recorded:
     try:
         return parse_recorded(name, base.owners())
     except ValueError as error:
         raise InputError(f"{where} [keep]", str(error)) from None
 
 
-def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
-    varied = {path for axis in made.axes for path in axis.places}
+def _check_recorded(sweep: Sweep, base: Scene, sweep_design: Design, recorded: Sequence[Recorded], where: str) -> None:
+    varied = {path for axis in sweep_design.axes for path in axis.places}
     timed = sorted(varied & set(TIMES))
     for one in recorded:
         if one.reduction == "series" and timed:
@@ -238,11 +238,11 @@ def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[
         )
 
 
-def _check_units(base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
-    """InputError for a quantity that is about an axis at some of the points only."""
-    for axis, scene in _worded(base, made):
+def _check_units(base: Scene, sweep_design: Design, recorded: Sequence[Recorded], where: str) -> None:
+    """Raise InputError for a quantity whose unit differs between points."""
+    for axis, scene in _worded(base, sweep_design):
         for one in recorded:
-            if _kept(scene, one.name, where).unit != one.unit:
+            if _recorded(scene, one.name, where).unit != one.unit:
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
                     f"'{one.name}' is a force at some points and a torque at others",
@@ -250,18 +250,18 @@ def _check_units(base: Scene, made: Design, recorded: Sequence[Recorded], where:
                 )
 
 
-def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
-    """The scene at a point with each value that is no number, and so may name other parts."""
-    points = made.points()
-    for axis in made.axes:
+def _worded(base: Scene, sweep_design: Design) -> Iterator[tuple[Axis, Scene]]:
+    """Yield the scene at a point for each value that is text, and so may name other parts."""
+    points = sweep_design.points()
+    for axis in sweep_design.axes:
         texts = list(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else []
         for k in (texts.index(text) for text in dict.fromkeys(texts)):
-            chosen = points[0] | dict.fromkeys(axis.places, axis.values[k]) if made.grid else points[k]
+            chosen = points[0] | dict.fromkeys(axis.places, axis.values[k]) if sweep_design.grid else points[k]
             yield axis, edited(base, chosen)
 
 
 def prepare(requested: Plan, workplace: Workplace) -> Plan:
-    """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
+    """Bring the flexible bodies up to date; return the plan with its families and with its points by key."""
     points = requested.design.points()
     groups = dict(_group(requested.scene, point) for point in points)
     graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
@@ -288,14 +288,14 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
         given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)
         inputs = {name: workplace.store.load(record) for name, record in records.items()}
         keep = tuple(one.name for one in requested.recorded)
-        limited = {**simulate, "limits": graph.scene.limits.written()}  # no facts, and a point may ask for more
+        limited = {**simulate, "limits": graph.scene.limits.written()}  # limits are no facts; a point may raise them
         work = Work(key(given), limited, inputs, keep, requested.sweep.members or 0, requested.sweep.error)
         families[text] = Family(work, given)
     jobs = []
     for point in points:
         text, own = _group(requested.scene, point)
         family = families[text].key
-        # what decides the bodies is in the family's scene, whose bodies are numbers by now
+        # values that decide the bodies are already in the family's scene, whose bodies are numbers
         rest = {name: value for name, value in point.items() if name not in own}
         content = json.dumps([family, dict(sorted(point.items()))], default=str)
         jobs.append(Job(hashlib.sha256(content.encode()).hexdigest()[:32], family, rest))
@@ -303,16 +303,16 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
 
 
 def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Those values of a point that decide the bodies which recipes describe, and their text."""
+    """Return the values of a point that decide the bodies which recipes describe: as text, and by key path."""
     bodies = tuple(f"body.{name}." for name in scene.recipes())
     mine = {where: value for where, value in point.items() if where.startswith(bodies)} if bodies else {}
     return json.dumps(mine, sort_keys=True, default=str), mine
 
 
 def _modules(requested: Plan) -> tuple[str, ...]:
-    """Modules that any point reaches by the names of its parts: values that are no numbers may name others.
+    """Return the modules that any point reaches by the names of its parts: values that are text may name others.
 
-    A number, too, may call for some: a tolerance of frames for what fits them.
+    A number may require a module, too: a tolerance of frames requires the module that fits them.
     """
     fitting = module_of("flexclear.pipeline.dynamics.run", "frames to a tolerance")
     modules = {*simulation.modules(requested.scene), fitting}
@@ -322,9 +322,9 @@ def _modules(requested: Plan) -> tuple[str, ...]:
 
 
 def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters of a run without what differs from point to point, so that a sweep may be extended.
+    """Return the parameters of a run without the values that differ between points, so that a sweep can be extended.
 
-    own: values that are those of a whole family.
+    own: values that all points of the family share.
     """
     table = copy.deepcopy(dict(simulate))
     for where in point:

@@ -1,4 +1,4 @@
-"""Points of a sweep in a worker, on this machine or another one."""
+"""Points of a sweep in a worker, on this or another machine."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.record.point import Runner
     from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place
 
-#: runners that a worker keeps
+#: runners that a worker holds in memory
 RUNNERS = 8
 
 
@@ -38,8 +38,8 @@ RUNNERS = 8
 class Family:
     """Points that share a scene and its flexible bodies.
 
-    simulate: the scene, as of the simulate stage.  inputs: those of that stage by name.  keep: names of what is
-    kept.  members: of each point, 0 for the scene's own start.  error: whether errors are estimated.
+    simulate: the scene, as parameters of the simulate stage. inputs: those of that stage by name. keep: names of the
+    recorded quantities. members: per point, 0 for the scene's own start. error: whether errors are estimated.
     """
 
     key: str
@@ -52,7 +52,7 @@ class Family:
 
 @lru_cache(maxsize=RUNNERS)
 def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
-    """The scene of a family and what runs its points; stored by a worker, since it holds the compiled functions."""
+    """Return scene and runner of a family; cached, since the runner holds the compiled functions."""
     from flexclear.pipeline.dynamics.record.point import Runner
 
     family: Family = pickle.loads(packed)
@@ -65,21 +65,21 @@ def work(
     key: str,
     packed: bytes,
     points: Sequence[Mapping[str, Any]],
-    alone: bool,
+    others_idle: bool,
     together: bool = False,
     sources: str = "",
 ) -> tuple[list[Point], float]:
-    """Points of a family, and the processor time that they took [s].
+    """Run points of a family; return them and the processor time that they took [s].
 
-    packed: the pickled `Family`.  points: path in the scene -> value.  alone: whether no other worker is busy.
-    together: whether they are evaluated together; no point depends on it.
-    sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
-    of a worker that has joined since.
+    packed: the pickled `Family`. points: key path in the scene -> value. others_idle: whether no other worker is busy.
+    together: whether points are evaluated together; no result depends on it. sources: digest of the caller's sources
+    when the caller is on another machine; InputError when this worker's differ, as those of a worker that joined later
+    may.
     """
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
-    cores.set_idle(alone)
-    threadpool_limits(1)  # whoever loaded NumPy first, with however many threads
+    cores.set_idle(others_idle)
+    threadpool_limits(1)  # NumPy may have been loaded with more threads
     scene, runner = _opened(key, packed)
     begun = time.process_time()
     results = _together(runner, scene, points) if together else [_point(runner, scene, point) for point in points]
@@ -87,7 +87,7 @@ def work(
 
 
 def _together(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]]) -> list[Point]:
-    """Points concurrently, each in a thread, where that can be."""
+    """Run points concurrently, each in a thread, where batched evaluation is possible."""
     places = runner.places(scene, len(points))
 
     def one(k: int, alive: Progress) -> Point:
@@ -109,10 +109,10 @@ def _point(
 
 @cache
 def source_digest() -> str:
-    """Digest of the sources that a worker runs, to be compared with those of who asks it."""
+    """Return the digest of the sources that a worker runs, to be compared with the caller's."""
     digest = hashlib.sha256()
     for folder in ("commands", "papers", "pipeline", "stages"):
-        # by the one import name, under which a checkout and an installed flexclear have the same files
+        # below the import name, a checkout and an installed flexclear have the same files
         for path in sorted((TREE / "flexclear" / folder).rglob("*.py")):
             digest.update(path.relative_to(TREE).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()

@@ -22,6 +22,8 @@ RECIPE = {
     "frames": {"bottom": {"x": 0.0}, "top": {"x": PAPER_ROD.length}},
     "interfaces": ["bottom", "top"],
 }
+#: a section by its constants
+GENERAL = {"type": "general", "area": 3e-4, "torsion": 1e-8, "second_y": 8e-9, "second_z": 5e-9}
 #: what a recipe of segments takes over
 WITHOUT_SHAPE = {name: RECIPE[name] for name in ("material", "frames", "interfaces")}
 #: motions of the section, as indices of ux uy uz rx ry rz in rod axes

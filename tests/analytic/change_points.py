@@ -11,7 +11,6 @@ from tests.properties.mechanisms import Table
 
 #: a + d = b + c, to the bit in sums of these
 FOUR_BAR = (0.2, 0.4, 0.3, 0.5)
-PARALLELOGRAM = (0.2, 0.5, 0.2, 0.5)
 GRAVITY = 9.81
 #: masses and lengths of Scott-Russell's mechanism [kg], [m]
 CRANK, ROD, SLIDER, RADIUS = 0.5, 0.8, 0.3, 0.2

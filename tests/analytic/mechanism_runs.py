@@ -3,20 +3,18 @@
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pytest
 import xarray as xr
 
 from flexclear.commands import scenes as stages
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.workplace import Workplace, open_workplace
 from tests.properties.mechanisms import simulated
 
@@ -106,16 +104,17 @@ def platform_deviations(scene: str, ideal: str) -> tuple[float, float, float]:
 @cache
 def frequencies(name: str, overrides: Overrides = (), time: float | None = None, *, moving: bool = False) -> xr.Dataset:
     """The equilibrium and the natural vibrations of a scene; overrides as of runs."""
-    from flexclear.pipeline.dynamics import analyses
-
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
     return analyses.frequencies(scene, bundles(scene), silent, time, None, moving)
 
 
-def refusal(name: str, text: str, folder: Path) -> str:
-    """What is said of a scene with more text at its end, before anything is compiled."""
-    path = folder / "wrong.toml"
-    path.write_text((TREE / "scenes" / f"{name}.toml").read_text() + f"\n{text}\n")
-    with pytest.raises(InputError) as error:
-        tabulate(build(load_scene(path), {}))
-    return str(error.value)
+def with_sections(name: str, changes: dict[str, Any]) -> tuple[Scene, dict[str, xr.Dataset]]:
+    """A scene whose flexible bodies are all recorded, and their bundles with what stress recovery needs."""
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", override=changes)
+    scene = edited(scene, {"output.stress": list(scene.flexible())})
+    return scene, bundles(scene)
+
+
+def run_with_sections(name: str, changes: dict[str, Any]) -> xr.Dataset:
+    """The run of such a scene."""
+    return simulated(*with_sections(name, changes))

@@ -1,18 +1,16 @@
-"""Section constants against quadrature, tables and a solution of the torsion problem, and sections in skew axes."""
+"""Section constants against tables and exact solutions, sections in skew axes; recipes of beams that are wrong."""
 
 from typing import Any
 
 import numpy as np
 import pytest
-import scipy.linalg
-import scipy.sparse as sp
-import scipy.sparse.linalg
 
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import section
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
-from tests.analytic.beam_models import RECIPE, build, lowest
+from tests.analytic.beam_models import GENERAL, RECIPE, WITHOUT_SHAPE, build, lowest
 
 # Timoshenko & Goodier, *Theory of Elasticity*, sec. 109: J = k1 b a^3 by b/a, printed digits
 PRINTED_TORSION = {1.0: 0.1406, 1.2: 0.166, 1.5: 0.196, 2.0: 0.229, 2.5: 0.249, 3.0: 0.263, 4.0: 0.281, 10.0: 0.312}
@@ -25,43 +23,6 @@ def test_torsion_of_rectangles_is_the_printed_one(ratio: float) -> None:
     found = section.rectangle_torsion(0.02 * ratio, 0.02) / (ratio * 0.02**4)
     assert found == pytest.approx(PRINTED_TORSION[ratio], abs=6e-4)  # three digits are printed
     assert section.rectangle_torsion(0.02, 0.02 * ratio) == section.rectangle_torsion(0.02 * ratio, 0.02)
-
-
-@pytest.mark.parametrize("ratio", [1.0, 1.7, 4.0])
-def test_torsion_of_rectangles_is_that_of_prandtls_membrane(ratio: float) -> None:
-    """Laplace(phi) = -2 on the rectangle, J = 2 int phi, by finite differences and extrapolation."""
-    coarse, fine = (_membrane(ratio, n) for n in (40, 80))
-    # second order: a third of the difference is left
-    expected = fine + (fine - coarse) / 3.0
-    # the extrapolated rest is of fourth order, with a logarithm from the corners: 7e-6 for the longest
-    assert section.rectangle_torsion(ratio, 1.0) == pytest.approx(expected, rel=1e-5)
-
-
-def _membrane(ratio: float, n: int) -> float:
-    lines = []
-    for length in (ratio, 1.0):
-        h = length / n
-        lines.append(sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n - 1, n - 1)) / h**2)
-    eye = sp.eye_array(n - 1)
-    A = sp.csc_array(sp.kron(lines[0], eye) + sp.kron(eye, lines[1]))
-    phi = scipy.sparse.linalg.spsolve(A, np.full((n - 1) ** 2, 2.0))
-    return float(2.0 * phi.sum() * ratio / n**2)
-
-
-def test_second_moments_are_those_of_the_area() -> None:
-    node, weight = np.polynomial.legendre.leggauss(3)
-    y, z = np.meshgrid(0.015 * node, 0.01 * node, indexing="ij")
-    dA = 0.015 * 0.01 * np.outer(weight, weight)
-    found = section.rectangle(0.03, 0.02)
-    assert found.area == pytest.approx(dA.sum(), rel=1e-14)
-    assert found.second_y == pytest.approx((dA * z**2).sum(), rel=1e-14)
-    assert found.second_z == pytest.approx((dA * y**2).sum(), rel=1e-14)
-
-
-def test_a_tube_is_a_circle_less_a_circle() -> None:
-    tube, outer, inner = section.tube(0.02, 0.015), section.circle(0.02), section.circle(0.015)
-    for name in ("area", "torsion", "second_y", "second_z", "polar"):
-        assert getattr(tube, name) == pytest.approx(getattr(outer, name) - getattr(inner, name), rel=1e-14)
 
 
 def test_shear_coefficients_are_cowpers() -> None:
@@ -135,3 +96,91 @@ def test_euler_bernoulli_rods_spin_but_do_not_rock() -> None:
     assert inertia[0, 0] == pytest.approx(mass * 0.01**2 / 2.0, rel=1e-12)
     modal_mass = np.einsum("kkij->ij", data["mode_mode_moment"].values)
     np.testing.assert_allclose(modal_mass, np.eye(7), atol=1e-10)
+
+
+# Wrong recipes: one clear message each, with the place and what to do ------------------------------------------------
+
+CIRCLE = {"type": "circle", "radius": "10 mm"}
+
+
+def segmented(*cuts: tuple[float, float], **more: Any) -> dict[str, Any]:
+    segments = [{"start": a, "end": b, "elements": 3, "section": CIRCLE, **more} for a, b in cuts]
+    return {**WITHOUT_SHAPE, "shape": {"type": "segmented-beam", "length": 0.24, "segments": segments}}
+
+
+WRONG: dict[str, tuple[dict[str, Any], str]] = {
+    "gap": (
+        segmented((0.0, 0.1), (0.12, 0.24)),
+        r"\[shape\].*between segment 0 \(0\.1 m\) and segment 1 \(0\.12 m\).*gap",
+    ),
+    "overlap": (segmented((0.0, 0.13), (0.12, 0.24)), r"\[shape\].*there is an overlap"),
+    "too short": (
+        segmented((0.0, 0.1), (0.1, 0.2)),
+        r"\[shape\].*segment 1 \(0\.2 m\) and the rod's end \(0\.24 m\).*gap",
+    ),
+    "late start": (segmented((0.02, 0.24)), r"\[shape\].*between the rod \(0 m\) and segment 0 \(0\.02 m\).*gap"),
+    "backwards": (segmented((0.24, 0.0)), r"\[shape\.segments\.0\].*ends after it starts"),
+    "no segments": (segmented(), r"\[shape\].*between the rod \(0 m\) and the rod's end \(0\.24 m\).*gap"),
+    "negative area": (RECIPE | {"section": GENERAL | {"area": "-3 mm^2"}}, r"\[section\.area\].*greater than 0"),
+    "impossible product": (RECIPE | {"section": GENERAL | {"product": 7e-9}}, r"\[section\].*its square is below"),
+    "negative inertia": (
+        RECIPE | {"section": GENERAL | {"inertia": [1e-8, -1e-9, 1e-9]}},
+        r"\[section\].*not negative",
+    ),
+    "wall": (
+        RECIPE | {"section": {"type": "tube", "radius": "5 mm", "inner_radius": "6 mm"}},
+        r"\[section\].*leaves no wall",
+    ),
+    "no kappa": (
+        RECIPE | {"section": GENERAL, "theory": "timoshenko"},
+        r"section: a Timoshenko beam needs the shear coefficient.*give shear_coefficient",
+    ),
+    "no kappa in a segment": (
+        segmented((0.0, 0.24), section=GENERAL) | {"theory": "timoshenko"},
+        r"\[shape\.segments\.0\.section\]: a Timoshenko beam needs the shear coefficient",
+    ),
+    "kappa above one": (
+        RECIPE | {"section": CIRCLE | {"shear_coefficient": 1.2}},
+        r"\[section\.shear_coefficient\].*at most 1",
+    ),
+    "unknown theory": (RECIPE | {"theory": "reissner"}, r"\[theory\].*'euler-bernoulli', 'rayleigh' or 'timoshenko'"),
+    "unknown degree": (RECIPE | {"torsion": "cubic"}, r"\[torsion\].*'linear' or 'quadratic'"),
+    "unknown shape": (
+        RECIPE | {"shape": {"type": "strait-beam"}},
+        r"\[shape\.type\](.|\n)*did you mean 'straight-beam'",
+    ),
+    "no shape": ({k: v for k, v in RECIPE.items() if k != "shape"}, r"\[shape\.type\]: is missing"),
+    "taper of another type": (
+        RECIPE | {"end_section": {"type": "rectangle", "width": 0.01, "height": 0.01}},
+        r"taper keeps the type of the section; it cannot go from circle to rectangle",
+    ),
+    "taper of a general section": (RECIPE | {"section": GENERAL, "end_section": GENERAL}, "no dimensions to taper"),
+    "kappa said twice": (RECIPE | {"end_section": CIRCLE | {"shear_coefficient": 0.9}}, "is said once, in `section`"),
+    "mass at no node": (
+        RECIPE | {"masses": {"ball": {"x": "67 mm", "mass": 1.0}}},
+        r"\[masses\.ball\.x\]: 67 mm lies on no node.*60 mm and 80 mm(.|\n)*move the mass",
+    ),
+    "negative mass": (
+        RECIPE | {"masses": {"ball": {"x": 0.0, "mass": -1.0}}},
+        r"\[masses\.ball\.mass\].*greater than 0",
+    ),
+    "impossible inertia": (
+        RECIPE | {"masses": {"ball": {"x": 0.0, "mass": 1.0, "inertia": [1.0, 1.0, 3.0]}}},
+        r"\[masses\.ball\.inertia\].*belong to no body",
+    ),
+    "two orientations": (
+        RECIPE | {"pose": {"rotation_vector": [0, 0, 1], "quaternion": [1, 0, 0, 0]}},
+        r"\[pose\].*orientation is given once",
+    ),
+    "section next to segments": (segmented((0.0, 0.24)) | {"section": CIRCLE}, r"\[section\]: unknown key"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_recipes_are_refused_in_words(name: str) -> None:
+    recipe, message = WRONG[name]
+    with pytest.raises(InputError, match=message) as caught:
+        kind.build(recipe, where="rod.toml")
+    assert caught.value.exit_code == 2
+    # one mistake, one message; the hint is a line of its own
+    assert len([line for line in str(caught.value).splitlines() if line.startswith("rod.toml")]) == 1

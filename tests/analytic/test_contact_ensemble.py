@@ -19,15 +19,16 @@ from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.adaptive import LEAST_NORM
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.record import ensemble
+from flexclear.pipeline.dynamics.record.ensemble import difference_of_starts
 from flexclear.pipeline.dynamics.run import trajectory
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engines
-from flexclear.pipeline.post.single_run.series import derive
-from tests.analytic.mechanism_runs import TREE, run
-from tests.properties.mechanisms import joint, rigid, simulated
+from flexclear.pipeline.dynamics.run.run import engine_of, engines
+from tests.analytic.mechanism_runs import TREE
+from tests.properties.mechanisms import Table, frame, ground, joint, rigid, simulated
 from tests.properties.mechanisms import scene as written
 from tests.reference import contact_solutions as exact
 
@@ -155,19 +156,6 @@ def test_of_concurrent_members_the_first_that_fails_is_reported(monkeypatch: pyt
     assert ended in ([], [2])  # it may not have begun
 
 
-def test_statistics_of_the_members_are_in_the_post_artifact() -> None:
-    post = derive(run("checks/bounce", (("time.end", END),)), members())
-    peaks = members().peak_force.sel(contact="contact").values
-    found = post.peak_force_quantile.sel(contact="contact").values
-    assert found == pytest.approx(np.quantile(peaks, post["quantile"].values), rel=1e-14)
-    assert (np.diff(found) > 0.0).all()
-    assert float(post.impact_count_mean.sel(contact="contact")) == 1.0
-    assert float(post.contact_time_share_mean.sel(contact="contact")) > 0.0
-    speed = members().velocity.sel(body="ball", axis="z").values
-    # rounding of means of speeds of some m/s
-    assert post.velocity_mean.sel(ensemble_body="ball", axis="z").values == pytest.approx(speed.mean(axis=0), abs=1e-12)
-
-
 def carried(**path: Any) -> Scene:
     """A ball in the socket of a block that swings along a rail on a path, for which the rail's force is asked."""
     swing = {"type": "harmonic", "amplitude": 0.01, "frequency": 10.0}
@@ -210,3 +198,38 @@ def test_the_next_step_knows_the_error_of_the_last_one() -> None:
     trajectory.integrate(engine, consistent_start(engine), silent)
     assert 0.0 < engine.control[m.NORM] <= 1.0
     assert engine.control[m.LAST_NORM] == max(engine.control[m.NORM], LEAST_NORM)
+
+
+# By how much members start apart where the scene does not say --------------------------------------------------------
+
+
+def swinging_bar(size: float) -> Table:
+    """A bar of 0.4 sizes on a hinge, whose swing ends at a stop."""
+    bar = rigid(1.0, 0.01 * size**2, {"p": {}, "e": frame((0.4 * size, 0.0, 0.0))}, com=[0.2 * size, 0.0, 0.0], pose={})
+    normal = {"law": "hunt-crossley", "restitution": 0.8, "stiffness": 1e3 * size**2}
+    return written(
+        {"ground": ground(o=(0, 0, 0)), "bar": bar},
+        {"A": joint("revolute", "ground.o", "bar.p")},
+        end=0.1,
+        stop={"A": {"joint": "A", "lower": -0.5, "normal": normal}},
+        load={"gravity": {"type": "gravity", "acceleration": [0.0, -9.81 * size, 0.0]}},
+    )
+
+
+def made(scene: Scene) -> tuple[Engine, float]:
+    engine = engine_of(scene, {}, silent)
+    return engine, difference_of_starts(engine, consistent_start(engine)).perturbation
+
+
+@pytest.mark.parametrize("size", [1e-5, 1.0, 1e3])
+def test_an_angle_differs_by_as_much_whatever_the_size(size: float) -> None:
+    engine, difference = made(Scene.model_validate(swinging_bar(size)))
+    # 2.5e-8 of the size, in rad
+    assert difference / arms(engine.model.mechanism)[0] == pytest.approx(2.5e-8, rel=1e-12)
+
+
+def test_a_ball_differs_by_a_thousandth_of_its_clearance() -> None:
+    scene = load_scene(TREE / "scenes/checks/clearance_pendulum.toml")
+    _, difference = made(scene)
+    clearance = min(joint.clearance for joint in scene.contacts().values())
+    assert difference == pytest.approx(1e-3 * clearance, rel=1e-12)

@@ -62,36 +62,6 @@ def test_unlocated_events_lie_on_the_grid_and_latch_the_speed_there() -> None:
 
 
 @pytest.mark.slow
-def test_unlocated_events_cost_the_order() -> None:
-    """Ten times shorter steps make ten times smaller errors, not 10^4."""
-    known = exact.bounces(1.0, 1e8, 0.7, 9.81, 0.1, 0.2)[0]
-
-    def rebound_error(step: float, **events: object) -> float:
-        made = impacts(run(BOUNCE, (*solver(integrator="rk4", step=step, **events), ("time.end", 0.2))))
-        return float(abs(made["separation"][0] - known.separation))
-
-    late = [rebound_error(step, **LATE) for step in (1e-4, 1e-6)]
-    located = [rebound_error(step) for step in (1e-4, 1e-5)]
-    assert located[1] < 0.1 * located[0]
-    assert late[1] > 1e-7
-    assert located[1] < late[1]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "overrides, times",
-    [(solver(integrator="radau", rtol=1e-10), 1e-6), (solver(integrator="generalized-alpha", rtol=3e-10), 1e-5)],
-    ids=["radau", "generalized-alpha"],
-)
-def test_integrators_agree_on_the_mechanisms_impacts(overrides: Overrides, times: float) -> None:
-    """28 impacts in 0.18 s; perturbations grow two to ten times."""
-    found, known = impacts(run(CSJ, overrides)), impacts(run(CSJ, solver(rtol=1e-12)))
-    assert len(found["start"]) == len(known["start"])
-    assert found["start"] == pytest.approx(known["start"], abs=times)
-    assert np.abs(found["approach"] - known["approach"]).max() <= 1e3 * times  # accelerations of 1e3 m/s^2
-
-
-@pytest.mark.slow
 def test_the_papers_predictor_corrector_without_location_finds_other_impacts() -> None:
     """At the paper's step of 1e-5 s: some mm/s off, and more impacts than there are."""
     paper = run(CSJ, solver(integrator="adams-bashforth-moulton", step=STEP, **LATE))
@@ -106,7 +76,7 @@ def test_the_papers_predictor_corrector_without_location_finds_other_impacts() -
 
 #: sixteen impacts in 23 ms, then a contact that lasts, in which ball and rod vibrate at some 4 kHz
 PRESSED = TREE / "scenes" / "sps4" / "variants" / "far_csj_cb_damped.toml"
-SHORT = {"time.end": "40 ms", "output.interval": "1 ms"}
+SHORT = {"time.end": "30 ms", "output.interval": "1 ms"}
 
 
 def without_friction(scene: Scene) -> Scene:
@@ -124,7 +94,7 @@ def pressed_run(integrator: str, rtol: float) -> xr.Dataset:
 def velocity_error(integrator: str, rtol: float) -> float:
     """Largest error of the platform's velocity at the outputs, as a share of the largest velocity."""
     made, known = (
-        one.velocity.sel(body="platform").values[np.searchsorted(one.time, 1e-3 * np.arange(41) - 1e-9)]
+        one.velocity.sel(body="platform").values[np.searchsorted(one.time, 1e-3 * np.arange(31) - 1e-9)]
         for one in (pressed_run(integrator, rtol), pressed_run("dop853", 1e-12))
     )
     return float(np.abs(made - known).max() / np.abs(known).max())

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from flexclear.pipeline.core.scene.schema import Scene
@@ -20,8 +19,7 @@ from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BALL
 from flexclear.pipeline.dynamics.effects.joint_friction.equations import eliminate, find_loads
 from flexclear.pipeline.dynamics.specialise import dual
 from tests.analytic.mechanism_runs import run
-from tests.properties.mechanisms import GRAVITY, Table, joint, scene, simulate
-from tests.reference.rubbing_slider_crank import released
+from tests.properties.mechanisms import GRAVITY, Table, joint, rigid, scene, simulate
 
 G = 9.81
 COULOMB = {"law": "modified-coulomb", "static": 0.2, "dynamic": 0.2, "v_static": 1e-3, "v_dynamic": 2e-3}
@@ -39,12 +37,13 @@ STEEP, FLAT = np.arctan(0.5), np.arctan(0.1)
 #: guides: length, and how far next to them a force of 50 N pushes; the second one locks, as 2 * 0.2 * 0.15 > 0.04
 LENGTH, ARMS, PUSH = 0.04, {"free": 0.05, "locked": 0.15}, 50.0
 RADIUS, MASS, INERTIA = 0.01, 2.0, 0.005
-#: pin of the pendulum next to its mass centre [m]
-HANGING = 0.15
-#: the cart with a rod on it that friction may jam: masses, angle of the rod, coefficient
+#: the cart with a rod on it that friction may jam: masses, angle of the rod
 CART, BOB, TILT = 0.1, 1.0, np.radians(30.0)
+#: what its rail carries without friction [N]
+SINE, COSINE = np.sin(TILT), np.cos(TILT)
+SMOOTH_LOAD = CART * G + COSINE * BOB * (G * COSINE - SINE * BOB * G * SINE * COSINE / (CART + BOB * SINE**2))
 #: at this coefficient friction of the cart has no solution any more while it moves towards the bob's side
-JAMMING = (CART + BOB * np.sin(TILT) ** 2) / (BOB * np.sin(TILT) * np.cos(TILT))
+JAMMING = (CART + BOB * SINE**2) / (BOB * SINE * COSINE)
 
 
 def guide(slope: float) -> Table:
@@ -56,35 +55,27 @@ def guide(slope: float) -> Table:
 ACROSS: Table = {"axes": {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}}
 
 
-def rigid(pose: Table | None = None, frames: Table | None = None, **more: Any) -> Table:
-    return {
-        "type": "rigid",
-        "mass": MASS,
-        "inertia": [INERTIA] * 3,
-        "pose": pose or {},
-        "frames": frames or {"centre": {}},
-        **more,
-    }
+def part(frames: Table | None = None, pose: Table | None = None, **more: Any) -> Table:
+    return rigid(MASS, INERTIA, frames or {"centre": {}}, pose=pose or {}, **more)
 
 
 def workshop(coefficient: float = 0.5) -> Table:
-    """Blocks on slopes, guides pushed next to their axes, a pendulum, wheels, a ball, shaft, cardan joint and cart."""
+    """Blocks on slopes, guides pushed next to their axes, wheels, a ball, shaft, cardan joint and cart."""
     bodies: Table = {"ground": {"type": "ground", "frames": {"steep": guide(STEEP), "flat": guide(FLAT), "O": {}}}}
     bodies["ground"]["frames"] |= {"across": ACROSS, "level": guide(0.0), "cardan": {}}
-    bodies["slider"] = rigid(guide(STEEP))
-    bodies["creeper"] = rigid(guide(FLAT))
-    bodies["bristly"] = rigid(guide(FLAT))
+    bodies["slider"] = part(pose=guide(STEEP))
+    bodies["creeper"] = part(pose=guide(FLAT))
+    bodies["bristly"] = part(pose=guide(FLAT))
     for name, arm in ARMS.items():
-        bodies[name] = rigid(frames={"centre": guide(0.0), "beside": {"position": [0.0, arm, 0.0]}})
-    bodies["pendulum"] = rigid(frames={"pin": ACROSS}, com=[HANGING, 0.0, 0.0])
-    bodies["wheel"] = rigid(frames={"pin": ACROSS}, angular_velocity=[0.0, 30.0, 0.0])
-    bodies["motor"] = rigid(frames={"pin": ACROSS})
-    bodies["ball"] = rigid(angular_velocity=[6.0, 3.0, 6.0])
-    bodies["shaft"] = rigid(frames={"pin": ACROSS}, com=[0.0, 0.03, 0.02], angular_velocity=[0.0, 5.0, 0.0])
-    bodies["cross"] = rigid(com=[0.02, 0.03, -0.1], angular_velocity=[2.0, 1.0, 0.0])
+        bodies[name] = part({"centre": guide(0.0), "beside": {"position": [0.0, arm, 0.0]}})
+    bodies["wheel"] = part({"pin": ACROSS}, angular_velocity=[0.0, 30.0, 0.0])
+    bodies["motor"] = part({"pin": ACROSS})
+    bodies["ball"] = part(angular_velocity=[6.0, 3.0, 6.0])
+    bodies["shaft"] = part({"pin": ACROSS}, com=[0.0, 0.03, 0.02], angular_velocity=[0.0, 5.0, 0.0])
+    bodies["cross"] = part(com=[0.02, 0.03, -0.1], angular_velocity=[2.0, 1.0, 0.0])
     moving = {"velocity": [-1.0, 0.0, 0.0]}
-    bodies["cart"] = rigid(frames={"rail": guide(0.0), "pin": ACROSS}, **moving) | {"mass": CART}
-    bodies["bob"] = rigid({"rotation_vector": [0.0, TILT, 0.0]}, {"pin": ACROSS}, **moving)
+    bodies["cart"] = part({"rail": guide(0.0), "pin": ACROSS}, **moving) | {"mass": CART}
+    bodies["bob"] = part({"pin": ACROSS}, {"rotation_vector": [0.0, TILT, 0.0]}, **moving)
     bodies["bob"] |= {"mass": BOB, "inertia": [0.0] * 3, "com": [0.0, 0.0, 0.5]}
 
     def rubs(kind: str, first: str, second: str, law: Table, **sizes: float) -> Table:
@@ -94,7 +85,6 @@ def workshop(coefficient: float = 0.5) -> Table:
         "slide": rubs("prismatic", "ground.steep", "slider.centre", COULOMB),
         "creep": rubs("prismatic", "ground.flat", "creeper.centre", COULOMB),
         "bristle": rubs("prismatic", "ground.flat", "bristly.centre", BRISTLES),
-        "pin": rubs("revolute", "ground.across", "pendulum.pin", COULOMB, radius=RADIUS),
         "hub": rubs("revolute", "ground.across", "wheel.pin", COULOMB, radius=RADIUS, preload=5.0),
         "driven": rubs("revolute", "motor.pin", "ground.across", COULOMB, radius=RADIUS),
         "socket": rubs("spherical", "ground.O", "ball.centre", COULOMB, radius=RADIUS),
@@ -177,36 +167,6 @@ def test_wheel_ball_and_motor_feel_the_moment_of_their_weight() -> None:
     assert torque == pytest.approx(0.2 * RADIUS * MASS * G, rel=1e-10)
 
 
-def test_a_pendulum_loses_what_its_pin_takes() -> None:
-    """The pin's force depends on the acceleration, and that on friction: both solved here by bisection."""
-    pin = INERTIA + MASS * HANGING**2
-
-    def force(theta: float, omega: float, alpha: float) -> float:
-        along = MASS * (G * np.sin(theta) + HANGING * omega**2)
-        across = MASS * (G * np.cos(theta) - HANGING * alpha)
-        return float(np.hypot(along, across))
-
-    def acceleration(theta: float, omega: float) -> float:
-        mu = float(coefficient(RADIUS * omega)) * np.sign(omega)
-
-        def left(alpha: float) -> float:
-            push = MASS * G * HANGING * np.cos(theta) - mu * RADIUS * force(theta, omega, alpha)
-            return push - pin * alpha
-
-        return float(brentq(left, -1e3, 1e3, xtol=1e-13, rtol=1e-14))
-
-    def rates(_: float, y: np.ndarray) -> list[float]:
-        alpha = acceleration(y[0], y[1])
-        lost = abs(coefficient(RADIUS * y[1]) * RADIUS * y[1]) * force(y[0], y[1], alpha)
-        return [y[1], alpha, float(lost)]
-
-    t = made().time.values
-    known = solve_ivp(rates, (0.0, t[-1]), [0.0, 0.0, 0.0], "RK45", t_eval=t, rtol=1e-9, atol=1e-11).y
-    # both to 1e-9 or better over one fall; in the first 0.1 ms friction sets in
-    assert made()["joint_position"].sel(coordinate="pin").values == pytest.approx(known[0], abs=1e-7)
-    assert made()["joint_friction_loss"].sel(rubbing="pin").values == pytest.approx(known[2], abs=1e-7)
-
-
 def of_wrench(kind: str, sizes: dict[str, Any], axis: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
     """Normal forces in a bearing for what its joint carries; shape (time,)."""
     if kind == "spherical":
@@ -259,10 +219,10 @@ def test_bearings_carry_what_newton_and_euler_say_of_the_motion() -> None:
 
 def test_friction_that_feeds_itself_grows_to_the_limit_beyond_which_it_jams() -> None:
     """A cart with a rod on it: N = N_0/(1 - mu k) when it moves to the rod's side, and nothing from mu k = 1 on."""
-    s, c = np.sin(TILT), np.cos(TILT)
-    smooth = CART * G + c * BOB * (G * c - s * BOB * G * s * c / (CART + BOB * s * s))
     load = made()["joint_bearing_load"].sel(rubbing="rail").values[0]
-    assert load == pytest.approx(smooth / (1.0 - 0.5 / JAMMING), rel=1e-9)  # rounding, times some digits of the limit
+    assert load == pytest.approx(
+        SMOOTH_LOAD / (1.0 - 0.5 / JAMMING), rel=1e-9
+    )  # rounding, times some digits of the limit
     with pytest.raises(SolverError, match=r"joint rail presses the joint the more.*Painleve"):
         simulate(workshop(1.01 * JAMMING))
 
@@ -283,9 +243,7 @@ def cart(tilt: float, speed: float, coefficient: float, spin: float = 0.0) -> Ta
 def test_friction_that_takes_load_off_is_what_it_grows_to_not_another_solution() -> None:
     """N = |N_0 - 3 N| has a second solution, which Newton's method finds from N_0: friction is turned on in strides."""
     found = simulate(cart(TILT, 1.0, 3.0 * JAMMING) | {"time": {"end": 1e-3}, "output": {"interval": 1e-3}})
-    s, c = np.sin(TILT), np.cos(TILT)
-    smooth = CART * G + c * BOB * (G * c - s * BOB * G * s * c / (CART + BOB * s * s))
-    assert found.joint_bearing_load.values[0, 0] == pytest.approx(smooth / 4.0, rel=1e-9)  # rounding
+    assert found.joint_bearing_load.values[0, 0] == pytest.approx(SMOOTH_LOAD / 4.0, rel=1e-9)  # rounding
 
 
 def test_strides_begin_afresh_where_newtons_method_ends_nowhere() -> None:
@@ -331,21 +289,6 @@ def test_joints_that_cannot_rub_so_are_refused(kind: str, friction: Table, words
     table["joint"]["slide"] = joint(kind, "ground.steep", "slider.centre") | {"friction": friction}
     with pytest.raises(ValueError, match=words):
         Scene.model_validate(table)
-
-
-def test_a_slider_crank_with_friction_in_every_joint_moves_as_derived_in_other_coordinates() -> None:
-    dataset = run("checks/rubbing_slider_crank")
-    known = released()
-    # the run is good to 1e-9 or better; friction changes the angle by half a radian
-    angle = dataset["joint_position"].sel(coordinate="O").values
-    assert angle - angle[0] == pytest.approx(known.angle - known.angle[0], abs=1e-6)
-    assert dataset["joint_velocity"].sel(coordinate="P").values == pytest.approx(known.speed, abs=1e-5)
-    for k, name in enumerate("OABP"):
-        load = dataset["joint_bearing_load"].sel(rubbing=name).values
-        assert load == pytest.approx(known.loads[k], rel=1e-4, abs=1e-4)
-    assert dataset.dissipated.values[-1] == pytest.approx(known.lost, rel=1e-6)
-    assert known.lost > 0.1
-    assert "friction of O, A, B, P follows reactions" in dataset.attrs["warnings"]
 
 
 @pytest.mark.slow

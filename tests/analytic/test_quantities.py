@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.post.overview import comparison
 from flexclear.pipeline.post.overview.curves import curves
-from tests.analytic import stress_runs
+from tests.analytic.mechanism_runs import run_with_sections
 from tests.properties import mechanisms
 from tests.properties.mechanisms import frame, joint, rigid, simulated
 
@@ -70,7 +70,7 @@ def driven() -> Scene:
 @cache
 def run(name: str) -> xr.Dataset:
     if name == FLEXIBLE:
-        return stress_runs.run(FLEXIBLE, {"time.end": "2 ms"})
+        return run_with_sections(FLEXIBLE, {"time.end": "2 ms"})
     return simulated(scene(name))
 
 

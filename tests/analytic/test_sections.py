@@ -1,4 +1,4 @@
-"""Sections of mechanisms whose periodic motion is known otherwise: exponents, contraction, refusals."""
+"""Chaos: diagnostics on maps and flows of known nature, and sections of mechanisms with known periodic motion."""
 
 import csv
 from pathlib import Path
@@ -15,7 +15,89 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.post.sections.verdict import derive
+from flexclear.pipeline.post.sections import chaos
+from flexclear.pipeline.post.sections.verdict import derive, judge
+
+N = 600
+
+
+def logistic(r: float, n: int = N) -> tuple[np.ndarray, np.ndarray]:
+    """States and logarithms of the derivative of x -> r x (1 - x), after 500 steps."""
+    x, states, growth = 0.2345, [], []
+    for k in range(500 + n):
+        if k >= 500:
+            states.append(x)
+            growth.append(np.log(abs(r * (1.0 - 2.0 * x))))
+        x = r * x * (1.0 - x)
+    return np.array(states)[:, None], np.array(growth)
+
+
+def circle(coupling: float, winding: float, n: int = N) -> tuple[np.ndarray, np.ndarray]:
+    """The circle map as a point on a circle; its derivative's logarithm."""
+    angle, states, growth = 0.1, [], []
+    for _ in range(n):
+        states.append([np.cos(angle), np.sin(angle)])
+        growth.append(np.log(abs(1.0 - coupling * np.cos(angle))))
+        angle += 2.0 * np.pi * winding - coupling * np.sin(angle)
+    return np.array(states), np.array(growth)
+
+
+def test_the_logistic_map_at_four_is_chaotic_with_exponent_log_two() -> None:
+    states, growth = logistic(4.0)
+    found = judge(states, growth, 1.0, 1.0)
+    assert found.kind == "chaotic"
+    assert found.numbers["exponent_low"] < np.log(2.0) < found.numbers["exponent_high"]
+    # the standard deviation of one logarithm is pi / sqrt(12) = 0.91, of 600 correlated ones below 0.04
+    assert found.numbers["exponent"] == pytest.approx(np.log(2.0), abs=0.12)
+
+
+@pytest.mark.parametrize("r, after", [(2.9, 1), (3.2, 2), (3.5, 4)])
+def test_the_logistic_map_doubles_its_period_before_that(r: float, after: int) -> None:
+    states, growth = logistic(r)
+    found = judge(states, growth, 1.0, 1.0)
+    assert (found.kind, found.numbers["returns_after"]) == ("periodic", after)
+    assert found.numbers["exponent_high"] < 0.0
+
+
+def test_its_approach_to_the_fixed_point_contracts_by_the_derivative_there() -> None:
+    x, states = 0.3, []
+    for _ in range(60):
+        states.append([x])
+        x = 2.8 * x * (1.0 - x)
+    # derivative at the fixed point 1 - 1/r: 2 - r; the first steps are not linear yet
+    assert chaos.contraction(np.array(states)[5:]) == pytest.approx(0.8, rel=0.02)
+
+
+def test_the_circle_map_below_its_critical_coupling_is_quasi_periodic() -> None:
+    found = judge(*circle(0.3, 0.5 * (np.sqrt(5.0) - 1.0)), 1.0, 1.0)
+    assert found.kind == "quasi-periodic"
+    assert found.numbers["zero_one"] < 0.1
+
+
+def test_a_damped_linear_oscillator_is_periodic_and_contracts_at_its_decay() -> None:
+    decay, frequency, period = 0.1, 1.7, 1.0
+    k = np.arange(300)
+    turn = np.exp(-decay * period * k) * np.exp(1j * frequency * period * k)
+    states = np.stack([3.0 + turn.real, turn.imag], axis=1)
+    found = judge(states, np.full(200, -decay * period), period, 1.0)
+    assert (found.kind, found.numbers["returns_after"]) == ("periodic", 1)
+    assert found.numbers["exponent"] == pytest.approx(-decay)
+    assert found.numbers["contraction"] == pytest.approx(np.exp(-decay * period), rel=1e-3)
+
+
+def test_too_few_periods_are_undecided() -> None:
+    states, growth = logistic(3.569946, 40)  # at the end of the cascade: neither periodic nor chaotic
+    assert judge(states, growth, 1.0, 1.0).kind == "undecided"
+
+
+def test_white_noise_is_no_quasi_periodic_motion() -> None:
+    noise = np.random.default_rng(3).normal(size=(N, 2))
+    found = judge(noise, np.zeros(200), 1.0, 1.0)
+    assert found.kind == "undecided"
+    assert found.numbers["few_lines"] < 0.5
+
+
+# Sections of mechanisms ----------------------------------------------------------------------------------------------
 
 #: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
 CHAOTIC = 0.112
@@ -33,7 +115,7 @@ def with_torque(scene: Scene, amplitude: float, **sections: object) -> Scene:
 
 
 def test_a_pendulum_that_is_driven_hard_is_chaotic_with_the_exponent_of_its_tangent_equations(pendulum: Scene) -> None:
-    found = analyses.sections(edited(pendulum, {"sections.exponent_periods": 400}), {}, silent)
+    found = analyses.sections(edited(pendulum, {"sections.exponent_periods": 200}), {}, silent)
     verdict = derive(found)
     assert verdict.attrs["verdict"] == "chaotic"
     assert float(verdict.exponent_low) < CHAOTIC < float(verdict.exponent_high)
@@ -41,20 +123,9 @@ def test_a_pendulum_that_is_driven_hard_is_chaotic_with_the_exponent_of_its_tang
     assert float(verdict.exponent) == pytest.approx(CHAOTIC, rel=0.3)
 
 
-def test_a_page_of_verdicts_has_them_for_programs_too(pendulum: Scene, tmp_path: Path) -> None:
-    gentle = with_torque(pendulum, 1e-3, transient=0, periods=30, exponent_periods=30)
-    found = analyses.sections(gentle, {}, silent)
-    verdict = derive(found)
-    write_page({"checks/pendulum": verdict}, {"checks/pendulum": found}, {}, tmp_path / "chaos.md")
-    with (tmp_path / "chaos/verdicts.csv").open(newline="") as file:
-        (row,) = csv.DictReader(file)
-    assert (row["scene"], row["verdict"], row["periods"]) == ("checks/pendulum", "periodic", "30")
-    # three digits are written
-    assert float(row["exponent"]) == pytest.approx(float(verdict.exponent), rel=5e-3)
-    assert "| `checks/pendulum` | periodic |" in (tmp_path / "chaos.md").read_text()
-
-
-def test_a_pendulum_that_is_driven_gently_is_periodic_and_forgets_its_start_at_its_damping(pendulum: Scene) -> None:
+def test_a_pendulum_that_is_driven_gently_is_periodic_and_forgets_its_start_at_its_damping(
+    pendulum: Scene, tmp_path: Path
+) -> None:
     # small swings: exp(-t / 4) whatever the phase, so that the torque's period leaves exp(-T / 4)
     gentle = with_torque(pendulum, 1e-3, transient=0, periods=30, exponent_periods=30)
     found = analyses.sections(gentle, {}, silent)
@@ -64,6 +135,14 @@ def test_a_pendulum_that_is_driven_gently_is_periodic_and_forgets_its_start_at_i
     assert int(verdict.returns_after) == 1
     # a neighbour's distance swings about its decay: in 30 periods by no more than twofold over all of 283 s
     assert float(verdict.exponent) == pytest.approx(-0.25, abs=2.0 * np.log(4.0) / (30 * period))
+    # a page of verdicts has it for programs too
+    write_page({"checks/pendulum": verdict}, {"checks/pendulum": found}, {}, tmp_path / "chaos.md")
+    with (tmp_path / "chaos/verdicts.csv").open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert (row["scene"], row["verdict"], row["periods"]) == ("checks/pendulum", "periodic", "30")
+    # three digits are written
+    assert float(row["exponent"]) == pytest.approx(float(verdict.exponent), rel=5e-3)
+    assert "| `checks/pendulum` | periodic |" in (tmp_path / "chaos.md").read_text()
 
 
 def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Scene) -> None:

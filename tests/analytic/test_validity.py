@@ -1,4 +1,4 @@
-"""A run says, with amounts and remedies, when it left what its model carries; what means nothing is refused."""
+"""Runs say, with amounts and remedies, when they left what their model carries; what means nothing is refused."""
 
 import re
 from collections.abc import Mapping
@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear import load_scene
-from flexclear.pipeline.core.scene.load import edited
+from benchmarks.families import classes
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
 from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulated
+from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate, simulated
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it
 FIRST = 3.798
@@ -133,3 +135,121 @@ def test_a_deep_contact_is_reported_and_a_ball_that_leaves_through_its_socket_re
 def test_an_ensemble_whose_balls_leave_through_their_sockets_is_refused() -> None:
     with pytest.raises(SolverError, match=r"joint j: the surfaces went 0\.0451 m deep"):
         analyses.ensemble(edited(dropped(4.5e-2), {"ensemble": {"members": 2}}), {}, silent)
+
+
+# Energy that is off, motion that diverges ----------------------------------------------------------------------------
+
+
+def bounce(solver: dict[str, Any]) -> xr.Dataset:
+    """A ball falls by 0.2 m on a hard plane and rebounds without loss: 1.96 J are exchanged."""
+    return simulated(classes.bounce(**solver))
+
+
+@pytest.mark.parametrize(
+    "solver",
+    [
+        {"integrator": "adams-bashforth-moulton", "step": 1e-3, "events": "at step ends"},
+        {"integrator": "rk4", "step": 0.05, "events": "located"},
+    ],
+    ids=["contact at step ends", "a step longer than the contact"],
+)
+def test_a_run_that_gains_more_than_a_tenth_of_its_energy_is_refused(solver: dict[str, Any]) -> None:
+    words = r"energy balance does not close.*tolerance 0\.1, \[solver\.ledger_tolerance\]"
+    with pytest.raises(SolverError, match=words):
+        bounce(solver)
+
+
+def test_a_scene_may_allow_an_error_and_the_run_warns_of_it() -> None:
+    solver = {"integrator": "rk4", "step": 0.05, "ledger_tolerance": 1.0}
+    allowed = bounce(solver)
+    error = float(np.abs(allowed.energy_error).max())
+    assert f"the energy balance is off by {error:.3g} J" in allowed.attrs["warnings"]
+
+
+def test_a_run_that_closes_warns_of_nothing() -> None:
+    closed = bounce({"integrator": "dop853"})
+    assert closed.attrs["warnings"] == ""
+    assert np.abs(closed.energy_error).max() < 1e-6 * 1.96
+
+
+@pytest.mark.parametrize("size, end", [(1e-6, 6.0), (1.0, 6.0), (1.0, 0.3), (1e3, 0.3), (1e3, 6.0)])
+def test_a_controller_that_makes_the_motion_unstable_is_refused(size: float, end: float) -> None:
+    """A held force after 0.1 s: each sample multiplies the deviation by about 1 - 5000 (0.1)^2 / 2 = -24.
+
+    Also in short runs, which end before the speed is beyond mechanics: 1 km beyond a reference of 0.1 m after 0.3 s.
+    """
+    bodies = {"ground": {"type": "ground", "frames": {"o": {}}}, "slide": rigid(1.0, 0.01, {"o": {}})}
+    gains = {"proportional": 5000.0, "derivative": 0.0, "period": 0.1}
+    load = {"c": {"type": "sampled-pid", "joint": "p", "reference": 0.1 * size, **gains}}
+    rail = {"p": joint("prismatic", "ground.o", "slide.o")}
+    with pytest.raises(SolverError, match=r"the motion diverges: controller c has its coordinate at .* m"):
+        simulate(scene(bodies, rail, end, load=load, output={"interval": 0.01}, solver={}))
+
+
+# Stops, gears, controllers and bushings that cannot be, before anything is compiled ----------------------------------
+
+HERTZ = {"law": "hertz", "stiffness": 1.0}
+STOP = {"joint": "A", "upper": 0.1, "normal": HERTZ}
+PID = {"type": "pid", "joint": "A", "reference": 1.0}
+NONE = [0.0] * 6
+
+
+def mount(stiffness: list[Any]) -> dict[str, Any]:
+    return {"type": "bushing", "between": ["ground.O", "block.centre"], "stiffness": stiffness}
+
+
+#: scene and part -> what is wrong of it, and what is said
+WRONG: dict[tuple[str, str], list[tuple[dict[str, Any], tuple[str, ...]]]] = {
+    ("stops", "stop.s"): [
+        ({"joint": "A", "normal": HERTZ}, ("neither",)),
+        (STOP | {"normal": {"law": "hertz"}}, ("normal.stiffness",)),
+        (STOP | {"upper": "3 deg"}, ("stop.s.upper", "an angle", "length")),
+        (STOP | {"lower": 0.2}, ("lower = 0.2", "below")),
+        (STOP | {"joint": "K"}, ("stop.s.joint", "no joint 'K'")),
+        (STOP | {"normal": HERTZ | {"law": "kelvin-voigt", "restitution": 0.5}}, ("effective_mass",)),
+        (STOP | {"normal": HERTZ | {"law": "flores"}}, ("stop.s.normal", "restitution")),
+        (STOP | {"floor": -1.0}, ("stop.s.floor", "positive")),
+    ],
+    ("gears", "gear.g"): [
+        ({"first": "sun", "second": "sun", "ratio": 2.0}, ("couples two coordinates",)),
+        ({"first": "sun", "second": "moon", "ratio": 2.0}, ("gear.g.second", "no joint 'moon'", "known: P1")),
+        ({"first": "sun", "second": "P1", "ratio": "2 mm/rad"}, ("gear.g.ratio", "length per angle")),
+        ({"first": "wheel", "second": "rack", "ratio": "2 N"}, ("gear.g.ratio", "length per angle", "m/rad")),
+        ({"first": "sun", "second": "P1", "ratio": 0.0}, ("ratio is 0", "drive")),
+        ({"first": "ring_fixed", "second": "P1", "ratio": 1.0}, ("gear.g.first", "no coordinate")),
+    ],
+    ("controllers", "load.c"): [
+        (PID, ("needs a gain",)),
+        (PID | {"reference": "3 deg", "proportional": 1.0}, ("load.c.reference", "an angle", "length")),
+        (PID | {"proportional": "2 N"}, ("load.c", "a stiffness belongs here")),
+        (PID | {"measured": "K", "proportional": 1.0}, ("load.c.measured", "no joint 'K'")),
+        (PID | {"integral": 1.0, "limits": [0.0, 1.0]}, ("tracking_time",)),
+        (PID | {"integral": 1.0, "limits": [1.0, 1.0]}, ("1 is not below 1",)),
+        (PID | {"type": "sampled-pid", "integral": 1.0, "period": 1e-9}, ("load.c.period", "1e+09 samples")),
+    ],
+    ("bushing", "load.mount"): [
+        (mount([1.0, 2.0]), ("[x, y, z, rx, ry, rz]",)),
+        (mount(["1 N/m", 0, 0, "1 N/m", 0, 0]), ("torsional stiffness",)),
+        (mount([-1.0, 0, 0, 0, 0, 0]), ("must not be negative", "along x is -1")),
+        (
+            mount([[1.0, 2.0, *NONE[2:]], [1.0, 1.0, *NONE[2:]], *[NONE] * 4]),
+            ("must be symmetric", "between y and x are 1 and 2"),
+        ),
+        (
+            mount([[1.0, 2.0, *NONE[2:]], [2.0, 1.0, *NONE[2:]], *[NONE] * 4]),
+            ("positive semidefinite", "source of energy"),
+        ),
+        (mount([[1, 0, 2, 0, 0, 0], [0, 1, 0, 0, 0, 0], [2.0, *NONE[1:]], *[NONE] * 3]), ("z has none of its own",)),
+        (mount(NONE), ("it has neither",)),
+    ],
+}
+
+
+@pytest.mark.parametrize("scene, part, table, words", [(*at, *case) for at, cases in WRONG.items() for case in cases])
+def test_what_is_no_stop_gear_controller_or_bushing_is_refused_in_words(
+    scene: str, part: str, table: dict[str, Any], words: tuple[str, ...]
+) -> None:
+    with pytest.raises(InputError) as error:
+        tabulate(build(load_scene(TREE / "scenes" / "checks" / f"{scene}.toml", {part: table}), {}))
+    assert part in str(error.value)
+    assert [word for word in words if word not in str(error.value)] == []

@@ -4,17 +4,19 @@ All are installed in a copy of the sources; a scene that names one runs there fr
 is compared with a closed form. Uncompiled, because they take some hundred evaluations, and compiling takes longer.
 """
 
+import json
 import re
 import shutil
 from math import exp, sinh
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from tests.processes import copied, python
+from tests.processes import copied, printed, python
 
 #: example -> folder that its module is put in
 PLACES = {
@@ -56,10 +58,14 @@ def tree(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def flexclear(tree: Path, *arguments: str) -> str:
+def interpreted(tree: Path, *arguments: str) -> str:
+    """What Python prints in the tree."""
     own = {"PYTHONPATH": str(tree), "FLEXCLEAR_RESULTS": str(tree / "results"), "NUMBA_DISABLE_JIT": "1"}
-    own["FLEXCLEAR_KERNELS"] = str(tree / "kernels")
-    return python("-m", "flexclear", *arguments, cwd=tree, **own).stdout
+    return python(*arguments, cwd=tree, FLEXCLEAR_KERNELS=str(tree / "kernels"), **own).stdout
+
+
+def flexclear(tree: Path, *arguments: str) -> str:
+    return interpreted(tree, "-m", "flexclear", *arguments)
 
 
 def ran(tree: Path, name: str) -> xr.Dataset:
@@ -183,3 +189,152 @@ def test_the_page_shows_the_folder_of_an_effect(root: Path, name: str) -> None:
 
 def test_every_example_is_tested(root: Path) -> None:
     assert {path.stem for path in examples(root).iterdir()} == set(PLACES)
+
+
+# An integrator with steps of its own choice, in every place where integrators are named -------------------------------
+
+HEUN = '''"""Heun's method of order 2, with Euler's as its error estimate."""
+
+import numpy as np
+
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import hermite
+from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from flexclear.pipeline.dynamics.integrate.norms import error_scale
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.dynamics.kernels import kernel
+
+A = np.array([[0.0, 0.0], [1.0, 0.0]])
+B, C = np.array([0.5, 0.5]), np.array([0.0, 1.0])
+
+
+@kernel
+def error(d, step):
+    total = 0.0
+    for c in range(d.ny):
+        total += (0.5 * step * (d.w[slope(d, 1) + c] - d.w[slope(d, 0) + c]) / error_scale(d, c)) ** 2
+    return np.sqrt(total / d.ny)
+
+
+def make_kernels(evaluate, retract):
+    _, proceed = make_stages(evaluate, A, B, C)
+    return begin_afresh, proceed, error, hermite.make_extend(2), keep_nothing
+
+
+METHOD = Method(
+    traits=INTEGRATORS["heun"],
+    room=m.Room(4, hermite.ROWS),
+    last=2,
+    make_kernels=make_kernels,
+    staged=True,
+    interpolate=hermite.interpolate,
+    error_order=1,
+)
+'''
+LINE = '"heun": Traits("heun_euler", 2, hands_over_to=STIFF, tolerances=TO_1E_9, steps=STEPS),'
+ABOVE = '"dopri5": Traits('
+#: a quarter of the pendulum's period, IFToMM benchmark A01 [s]
+QUARTER = 2.367841947576237 / 4.0
+#: all that is asked of the tree about Heun's method, in one process
+ASKED = """
+import json
+from pathlib import Path
+from flexclear.commands import cost_design
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.json_schema import scene_schema
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import FlexclearError
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.dynamics.compile.functions import digest
+from flexclear.pipeline.dynamics.compile.sources import sources
+from flexclear.pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.post.cost.work_precision import LOOKS
+from flexclear.stages import simulation
+
+silent = lambda share, text: None
+new, own = load_scene("new.toml"), load_scene("own.toml")
+ends, refused = [], []
+for solver in ({"integrator": "hunn"}, {"integrator": "heun", "rtol": 1e-7, "evaluations": 40}):
+    try:
+        dynamics.simulate(load_scene("own.toml", {"solver": solver}), {}, silent)
+    except FlexclearError as error:
+        refused.append([error.exit_code, str(error)])
+for solver in ({"rtol": 1e-6}, {"step": 0.004}):
+    scene = load_scene("new.toml", {"solver": {"integrator": "heun", **solver}})
+    run = dynamics.simulate(scene, {}, silent)
+    ends.append([run.attrs["method"], *run.position.sel(body="bob").values[-1].tolist()])
+designs = [(d.group, d.scene.solver) for d in cost_design.wide(own, ("heun",))]
+closure = Sources(Path.cwd()).closure
+print(json.dumps({
+    "schema": scene_schema()["$defs"]["Solver"]["properties"]["integrator"]["enum"],
+    "ends": ends,
+    "refused": refused,
+    "designs": [[group, solver.rtol, solver.step] for group, solver in designs if solver.integrator == "heun"],
+    "looks": LOOKS,
+    "keys": [sorted(closure(["flexclear.stages.simulation", *simulation.modules(s)])) for s in (new, own)],
+    "code": CODE,
+}))
+"""
+#: machine code of another integrator, by the digests of its sources
+CODE = """{name: digest(text) for name, text in sources(
+    Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",)), Scheme("dop853")).items()}"""
+IMPORTS = ASKED[: ASKED.index("silent = ")]
+
+
+@pytest.fixture(scope="module")
+def heun(root: Path, tree: Path) -> dict[str, Any]:
+    """What the tree answers when Heun's method is added to it by a module and a line."""
+    (tree / "pipeline/dynamics/integrate/heun_euler.py").write_text(HEUN)
+    listed = tree / "pipeline/core/scene/integrators.py"
+    before, above, after = listed.read_text().partition(ABOVE)
+    assert above
+    listed.write_text(f"{before}{LINE}\n        {above}{after}")
+    scene = (root / "scenes/checks/pendulum.toml").read_text().replace('"10 s"', str(QUARTER))
+    for name, solver in {"new": 'integrator = "heun"\nrtol = 1e-7', "own": ""}.items():
+        (tree / f"{name}.toml").write_text(f"{scene}\n[solver]\n{solver}\n")
+    return dict(json.loads(interpreted(tree, "-c", ASKED.replace("CODE", CODE))))
+
+
+def test_the_schema_of_scenes_knows_a_new_integrator(heun: dict[str, Any]) -> None:
+    assert "heun" in heun["schema"]
+
+
+def test_refusals_name_a_new_integrator_and_its_remedy(heun: dict[str, Any]) -> None:
+    (misspelt, nearest), (used_up, why) = heun["refused"]
+    assert (misspelt, used_up) == (2, 3)
+    assert "did you mean 'heun'" in nearest
+    assert "at last by heun" in why
+    assert "radau where contacts or friction are stiff" in why
+
+
+def test_a_scene_runs_with_chosen_and_with_fixed_steps_of_it(heun: dict[str, Any]) -> None:
+    """After a quarter of its period the pendulum hangs straight down."""
+    for method, x, y, _ in heun["ends"]:
+        assert method == "heun"
+        # fixed steps of order 2 leave some (0.004 s * 4.4 rad/s)^2 / 10 of a radian, chosen ones less; the height is
+        # off by half of the square of that
+        assert abs(x) < 3e-4
+        assert abs(y + 1.0) < 1e-7
+
+
+def test_a_cost_study_compares_it(heun: dict[str, Any]) -> None:
+    mine = heun["designs"]
+    assert [rtol for group, rtol, _ in mine if group == "tolerance"] == [10.0**-k for k in range(3, 10)]
+    assert [step for group, _, step in mine if group == "step"] == [1e-4, 3e-5, 1e-5, 3e-6]
+
+
+def test_figures_distinguish_it_from_all_others(heun: dict[str, Any]) -> None:
+    assert len({tuple(look) for look in heun["looks"].values()}) == len(heun["looks"])
+    assert "heun" in heun["looks"]
+
+
+def test_keys_hold_its_module_and_what_goes_on_for_it(heun: dict[str, Any]) -> None:
+    new, own = map(set, heun["keys"])
+    package = "flexclear.pipeline.dynamics.integrate"
+    assert {f"{package}.heun_euler", f"{package}.radau"} <= new
+    assert f"{package}.heun_euler" not in own
+
+
+def test_it_makes_no_other_integrator_compile_anew(heun: dict[str, Any]) -> None:
+    assert heun["code"] == json.loads(printed(f"{IMPORTS}print(json.dumps({CODE}))"))

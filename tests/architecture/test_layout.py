@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -53,28 +54,36 @@ def test_import_rules_hold(root: Path):
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize(
-    "module, line, broken",
-    [
-        ("pipeline/post/single_run/series.py", "import flexclear.pipeline.dynamics.memory", "three towers"),
-        ("pipeline/core/scene/units.py", "import flexclear.papers.wang_wang_2019.deviations", "three towers"),
-        ("pipeline/dynamics/memory.py", "import flexclear.stages.graph", "three towers"),
-        ("papers/wang_wang_2019/deviations.py", "import meshio", "finite elements"),
-        ("stages/graph.py", "import skfem", "finite elements"),
-        ("pipeline/dynamics/memory.py", "import matplotlib", "plots"),
-        ("papers/wang_wang_2019/deviations.py", "import pyvista", "shapes"),
-        ("pipeline/dynamics/model/tree.py", "import flexclear.pipeline.dynamics.integrate.method", "dynamics follows"),
-        ("pipeline/dynamics/joints/free.py", "import flexclear.pipeline.dynamics.contact.forces", "dynamics follows"),
-        ("pipeline/structure/fe/model.py", "import flexclear.pipeline.structure.modes.eigen", "no circles"),
-    ],
-)
-def test_import_rules_can_be_broken(tmp_path: Path, module: str, line: str, broken: str):
-    """Each rule notices a violation, so that the test above means something."""
-    path = copied(tmp_path) / module
-    path.write_text(path.read_text() + f"\n{line}\n")
+#: module, what it must not import, and the beginning of the rule that says so
+VIOLATIONS = [
+    ("pipeline/post/single_run/series.py", "flexclear.pipeline.dynamics.memory", "three towers"),
+    ("pipeline/core/scene/units.py", "flexclear.papers.wang_wang_2019.deviations", "three towers"),
+    ("pipeline/dynamics/memory.py", "flexclear.stages.graph", "three towers"),
+    ("papers/wang_wang_2019/deviations.py", "meshio", "finite elements"),
+    ("stages/graph.py", "skfem", "finite elements"),
+    ("pipeline/dynamics/memory.py", "matplotlib", "plots"),
+    ("papers/wang_wang_2019/deviations.py", "pyvista", "shapes"),
+    ("pipeline/dynamics/model/tree.py", "flexclear.pipeline.dynamics.integrate.method", "dynamics follows"),
+    ("pipeline/dynamics/joints/free.py", "flexclear.pipeline.dynamics.contact.forces", "dynamics follows"),
+    ("pipeline/structure/fe/model.py", "flexclear.pipeline.structure.modes.eigen", "no circles"),
+]
+
+
+def test_import_rules_can_be_broken(tmp_path: Path):
+    """Each rule notices each violation, so that the test above means something."""
+    copied(tmp_path)
+    for module, other, _ in VIOLATIONS:
+        with (tmp_path / module).open("a") as file:
+            file.write(f"\nimport {other}\n")
     done = _lint_imports(tmp_path)
     assert done.returncode != 0
-    assert re.search(rf"^{broken}.* BROKEN", done.stdout, re.MULTILINE), done.stdout
+    broken = done.stdout.partition("Broken contracts")[2]
+    parts = re.split(r"^(\w.*)\n-+\n", broken, flags=re.MULTILINE)
+    said = {rule: " ".join(text.split()) for rule, text in zip(parts[1::2], parts[2::2], strict=True)}
+    for module, other, begins in VIOLATIONS:
+        (rule,) = (rule for rule in said if rule.startswith(begins))
+        importer = f"flexclear.{module.removesuffix('.py').replace('/', '.')}"
+        assert (".fe -> .modes" if rule == "no circles" else f"{importer} -> {other}") in said[rule]
 
 
 def test_nothing_below_the_commands_names_a_module_of_them(root: Path):
@@ -176,3 +185,49 @@ def test_the_lowest_versions_are_those_that_are_declared(root: Path):
         name, _, bounds = requirement.lower().partition(">=")
         bound = bounds.partition(",")[0]
         assert lowest[name] == bound or lowest[name].startswith(f"{bound}."), requirement
+
+
+# What a wheel of this project holds, as setuptools finds it; nothing is built, downloaded or written ------------------
+
+
+#: folders at the top that are packages below `flexclear`
+TOPS = ("pipeline", "stages", "papers", "scenes", "meshes")
+
+
+@pytest.fixture(name="project")
+def _project(root: Path) -> dict[str, Any]:
+    return tomllib.loads((root / "pyproject.toml").read_text())
+
+
+def test_a_wheel_holds_every_package_and_no_other(root: Path, project: dict[str, Any]) -> None:
+    modules = {p.relative_to(root) for top in ("papers", "pipeline", "stages") for p in (root / top).rglob("*.py")}
+    packages = {".".join(("flexclear", *p.parent.parts)) for p in modules} | {"flexclear.commands"}
+    assert set(project["tool"]["setuptools"]["packages"]) == packages | {
+        "flexclear",
+        "flexclear.scenes",
+        "flexclear.meshes",
+    }
+
+
+def test_folders_of_packages_do_not_depend_on_links(root: Path, project: dict[str, Any]) -> None:
+    folders = project["tool"]["setuptools"]["package-dir"]
+    assert folders == {"flexclear": "flexclear"} | {f"flexclear.{top}": top for top in TOPS}
+    assert not any((root / folder).is_symlink() for folder in folders.values())
+
+
+def test_a_wheel_brings_scenes_meshes_and_templates(root: Path, project: dict[str, Any]) -> None:
+    setuptools = project["tool"]["setuptools"]
+    brought = {
+        file
+        for package, patterns in setuptools["package-data"].items()
+        for pattern in patterns
+        for file in (root / package.removeprefix("flexclear.").replace(".", "/")).glob(pattern)
+    }
+    data = {p for top in ("scenes", "meshes", "stages/templates") for p in (root / top).rglob("*") if p.is_file()}
+    assert len(data) > 60
+    assert data <= brought
+    assert root / "flexclear" / "py.typed" in brought
+
+
+def test_there_is_one_script_and_it_is_the_command(project: dict[str, Any]) -> None:
+    assert project["project"]["scripts"] == {"flexclear": "flexclear.commands.__main__:main"}

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ast
+import doctest
 import re
 from collections import defaultdict
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import grimp
@@ -120,15 +123,15 @@ def test_the_way_of_the_data_leads_through_modules_that_exist(root: Path) -> Non
     assert [name for name in names if not exists(root, name)] == []
 
 
-# Names --------------------------------------------------------------------------------------------------------------
+# Names -------------------------------------------------------------------------------------------------------------
 
 #: what stands in backticks and looks like a file or module of the project, but for names in angles and asterisks
 FILE = re.compile(r"[\w.*<>-]+(/[\w.*<>-]+)+/?|[\w*<>]+\.(py|md|toml|json|jsonl)")
 MODULE = re.compile(r"(pipeline|stages|tests|benchmarks)(\.\w+)+")
 #: folders that names below begin in: `model/tree` is `pipeline/dynamics/model/tree.py`
-FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs")
-#: first parts of names that are no sources: written by runs, quantities, units, scenes by name, symbols
-ELSEWHERE = {".venv", "results", "sps4", "checks", "mesh", "modes", "bundle", "figures", "tables", "report"}
+FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs", "scenes")
+#: first parts of names that are no sources: written by runs, quantities, units, symbols
+ELSEWHERE = {".venv", "results", "mesh", "modes", "bundle", "figures", "tables", "report"}
 #: files that runs or users make
 MADE = {"slider_crank.toml", "rod.toml", "run.nc", "cost.json", "timing.nc"}
 
@@ -146,7 +149,7 @@ def exists(root: Path, name: str) -> bool:
     return any(
         next(root.joinpath(folder).glob(pattern + ending), None) is not None
         for folder in FROM
-        for ending in ("", ".py")
+        for ending in ("", ".py", ".toml")
     )
 
 
@@ -205,3 +208,48 @@ def test_equations_and_the_functions_that_theory_names_name_each_other(root: Pat
                 found += 1
                 assert equations(numbers) <= equations(functions[name]), f"{path}: {name}"
     assert found == 13
+
+
+# Examples in docstrings do what they show -----------------------------------------------------------------------------
+
+
+ROOT = Path(__file__).parents[2]
+MODULES = [
+    "flexclear." + ".".join(path.relative_to(ROOT / "flexclear").with_suffix("").parts)
+    for folder in ("", "commands", "papers", "pipeline", "stages")
+    for path in sorted((ROOT / "flexclear" / folder).glob("**/*.py" if folder else "*.py"))
+    if ">>> " in path.read_text()
+]
+
+
+def test_what_is_called_from_python_has_examples() -> None:
+    assert "flexclear.public" in MODULES
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_show_what_happens(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    module = import_module(name)
+    failed, tried = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert tried > 0
+    assert failed == 0
+
+
+# First sentences of docstrings ----------------------------------------------------------------------------------------
+
+#: first words of fragments that only a reader of the code understands: "Whether it is.", "Of each row, by name."
+FRAGMENTS = {"Of", "By", "As", "In", "From", "With", "Its", "Those", "That", "Meanwhile"}
+FRAGMENTS |= {"What", "Whether", "Which", "Where", "When", "Why", "How", "Itself"}
+
+
+def _functions(path: Path) -> Iterator[tuple[str, str]]:
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef) and (text := ast.get_docstring(node)):
+            yield f"{path.relative_to(ROOT)}: {node.name}", text
+
+
+def test_docstrings_of_functions_begin_with_a_sentence() -> None:
+    folders = [ROOT / folder for folder in ("pipeline", "stages", "papers", "flexclear/commands")]
+    functions = [one for folder in folders for path in sorted(folder.rglob("*.py")) for one in _functions(path)]
+    assert len(functions) > 1000
+    assert [name for name, text in functions if text.split()[0].strip(",.:;") in FRAGMENTS] == []

@@ -6,6 +6,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.single_run.series import derive
+from flexclear.pipeline.structure.modes.solution import solve
+from tests.analytic.beam_models import build
 from tests.paper import synthetic
 
 #: deviations of the made-up runs from the made-up ideal one: wobble of z [m]
@@ -16,7 +18,6 @@ FIXED_CIRCLE = (1577.003, 1577.003, 4316.202, 4316.202, 6553.024, 8370.848, 8370
 FIXED_SQUARE = (1576.805, 1576.805, 4314.206, 4314.206, 6403.648, 8362.726, 8362.726)
 FREE_CIRCLE = (1564.488, 1564.488, 4259.460, 4259.460, 6553.024, 8221.007, 8221.007)
 FREE_SQUARE = (1563.712, 1563.712, 4254.919, 4254.919, 6403.648, 8206.455, 8206.455)
-KINDS = ("bending",) * 4 + ("torsion",) + ("bending",) * 2
 
 
 @cache
@@ -39,10 +40,11 @@ def everything() -> dict[str, xr.Dataset]:
         "free_circle": FREE_CIRCLE,
     }
     for name, frequency in sections.items():
-        data[f"sps4/frequencies/{name}:modes/rod"] = synthetic.modes(frequency, KINDS)
-        data[f"sps4/frequencies/{name}:fine-modes/rod"] = synthetic.modes(tuple(f - REFINING for f in frequency), KINDS)
+        made = solve(build(), "fixed-fixed" if "fixed" in name else "free-free", 7)
+        for kind, finer in (("modes", 0.0), ("fine-modes", REFINING)):
+            data[f"sps4/frequencies/{name}:{kind}/rod"] = made.assign(frequency=("mode", np.array(frequency) - finer))
         data[f"sps4/frequencies/{name}:bundle/rod"] = synthetic.bundle(7, frequency=np.array(frequency))
-    data["sps4/far_cb:mesh/rod1"] = synthetic.mesh()
+    data["sps4/far_cb:mesh/rod1"] = build()
     return data
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline.core.artifacts.schema import BUNDLE, ENSEMBLE, MODES, RUN, conform
+from flexclear.pipeline.core.artifacts.schema import BUNDLE, ENSEMBLE, RUN, conform
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 
 END, INTERVAL = 0.18, 1e-4
@@ -242,36 +242,6 @@ def bundle(count: int = 7, nodes: int = 13, frequency: np.ndarray | None = None)
         "radius": (("cell",), np.full(nodes - 1, 0.01)),
     }  # fmt: skip
     return conform(xr.Dataset(data, {"frame": ["bottom", "top"]}), BUNDLE, title="made-up rod")
-
-
-def mesh() -> xr.Dataset:
-    """What table 2 reads of a mesh: twelve elements of aluminium."""
-    cells = np.ones(12)
-    data = {
-        "density": (("cell",), 2740.0 * cells),
-        "youngs_modulus": (("cell",), 7.17e10 * cells),
-        "shear_modulus": (("cell",), 7.17e10 / 2.66 * cells),
-        "area": (("cell",), np.pi * 1e-4 * cells),
-        "abscissa": (("node",), np.linspace(0.0, 0.24, 13)),
-    }
-    return xr.Dataset(data)
-
-
-def modes(frequency: tuple[float, ...], kinds: tuple[str, ...]) -> xr.Dataset:
-    """A made-up artifact of schema MODES with the given frequencies."""
-    shape = np.zeros((13, 6, len(frequency)))
-    shape[:, :3] = rod_shapes(len(frequency))
-    place = np.zeros((13, 3))
-    place[:, 0] = np.linspace(0.0, 0.24, 13)
-    data = {
-        "frequency": (("mode",), np.array(frequency)),
-        "shape": (("node", "dof", "mode"), shape),
-        "node_position": (("node", "axis"), place),
-        "cell_node": (("cell", "corner"), np.stack([np.arange(12), np.arange(1, 13)], axis=1)),
-        "vector": (("unknown", "mode"), shape.reshape(-1, len(frequency))),
-        "kind": (("mode",), np.array(kinds)),
-    }
-    return conform(xr.Dataset(data), MODES, title="made-up modes")
 
 
 def timing() -> xr.Dataset:

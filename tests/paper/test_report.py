@@ -73,21 +73,15 @@ def test_an_empty_results_folder_gives_a_page_without_figures(tmp_path):
     assert "Discrepancies" in page
 
 
-def test_assumptions_are_merged_over_scenes():
-    reported = {
-        "a": {"assumptions": json.dumps({"x": REASON, "y": REASON})},
-        "b": {"assumptions": json.dumps({"x": REASON})},
-    }
-    merged = report.merged_assumptions(reported)
-    assert merged == [("x", REASON, ("a", "b")), ("y", REASON, ("a",))]
-
-
-def test_assumptions_that_differ_between_scenes_are_all_listed():
-    reported = {
-        "a": {"assumptions": json.dumps({"x": "assumed: 1"})},
-        "b": {"assumptions": json.dumps({"x": "assumed: 2"})},
-    }
-    assert [text for _, text, _ in report.merged_assumptions(reported)] == ["assumed: 1", "assumed: 2"]
+def test_equal_assumptions_of_scenes_are_listed_once_and_different_ones_all():
+    said = {"a": {"x": REASON, "y": REASON, "z": "assumed: 1"}, "b": {"x": REASON, "z": "assumed: 2"}}
+    reported = {scene: {"assumptions": json.dumps(texts)} for scene, texts in said.items()}
+    assert report.merged_assumptions(reported) == [
+        ("x", REASON, ("a", "b")),
+        ("y", REASON, ("a",)),
+        ("z", "assumed: 1", ("a",)),
+        ("z", "assumed: 2", ("b",)),
+    ]
 
 
 def test_paper_page_lists_every_figure_with_its_command(content):

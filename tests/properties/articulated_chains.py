@@ -186,9 +186,9 @@ def reduced(scene: Scene) -> dict[str, xr.Dataset]:
     }
 
 
-def tabulated(monkeypatch: pytest.MonkeyPatch, scene: Scene, articulated: bool) -> Model:
+def tabulated(scene: Scene, articulated: bool) -> Model:
     """The model with a given way of factoring the mass matrix."""
-    with monkeypatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(modelling, "articulated", lambda numbering: articulated)
         return tabulate(build(scene, reduced(scene)))
 

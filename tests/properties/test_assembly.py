@@ -208,3 +208,11 @@ def test_lengths_that_cannot_meet_where_the_drive_is_are_refused() -> None:
     table["body"]["rocker"]["frames"]["far"] = frame((0.15, 0.0, 0.0))
     with pytest.raises(InputError, match=r"\[drive.motor.law\]: the joints fit together, but not where the drives"):
         start_of(table)
+
+
+def test_a_second_drive_out_of_reach_is_distinguished_from_joints_that_do_not_fit() -> None:
+    """From the poses given: the rocker's drive begins where the crank's does not let it."""
+    table = driven(0.9, 0.9)
+    table["drive"]["far"] = {"joint": "j3", "law": angles(0.9)[2] + 0.01}
+    with pytest.raises(InputError, match=r"\[drive\.\w+\.law\]: the joints fit together, but not where the drives"):
+        start_of(table)

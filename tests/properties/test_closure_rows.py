@@ -8,13 +8,12 @@ import pytest
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model import initial, selection, tree
+from flexclear.pipeline.dynamics.model import selection, tree
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.specialise.trace import Trace
 from tests.analytic.mechanism_runs import TREE
+from tests.properties.articulated_chains import evaluated
 from tests.properties.mechanisms import LEAN, frame, joint, two_loops
-from tests.properties.test_specialised import keep_independent, rates_kernel
 
 #: rows of closures that are solved for, per scene
 SCENES = {
@@ -39,23 +38,16 @@ def dense_factor(envelope: np.ndarray, entries: np.ndarray) -> np.ndarray:
 
 
 def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
-    """L^-1 J^T, the factor of J M^-1 J^T, and accelerations that keep the loops closed; made without a compiler."""
+    """L^-1 J^T, the factor of J M^-1 J^T, and accelerations that keep the loops closed."""
     model = tabulate(build(scene, {}))
-    space = model.arrays.work_space(m.Room(2, 0))
-    h, w, y, dy = space.h, space.w, int(space.h[m.Y]), int(space.h[m.SLOPES])
-    state = initial.start_state(model)
-    state[model.speeds] += np.random.default_rng(4).normal(size=model.nv)
-    w[y : y + model.ny] = state
-    kernel = rates_kernel(model)
-    keep_independent(model, h, y, dy, w.copy(), space.n.copy(), kernel)
+    found = evaluated(model, speeds=1.0)
+    h, w = found.h, found.w
+    assert found.report == m.OK
     assert model.arrays.table(m.CLOSURES, h)["n_kept"].tolist() == rows
-    Trace(0).plain(kernel)(h.tolist(), model.arrays.f, w, space.n, y, dy)
-    assert space.n[m.EVALUATION] == m.OK
-
     J, S = (selection.dense(model, h, w[h[place] :][: h[m.JACOBIAN_SIZE]]) for place in (m.JACOBIAN, m.SPREAD))
     L = dense_factor(model.arrays.table(m.ENVELOPE), w[h[m.MASS] :])
     C = dense_factor(model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)], w[h[m.SCHUR] :])
-    bias = w[h[m.GAMMA] :][selection.kept_places(model, h)]
+    bias = w[h[m.GAMMA] :][selection.selected_indices(model, h)]
     accelerations = w[h[m.DU] :][: model.nv]
     assert np.abs(S @ L.T - J).max() < ROUNDING * np.abs(J).max()
     assert np.abs(C @ C.T - S @ S.T).max() < ROUNDING * np.abs(S @ S.T).max()

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.artifacts.quantities import standard_error
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post.cost import answer, causes, work_precision
+from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
 from flexclear.pipeline.post.cost.study import Point, assemble, resolved
 
 POSITION = Quantity("slider", "position")
@@ -46,37 +48,40 @@ def run(error: float, *, seconds=(0.2, 0.1, 0.3), evaluations=100, impacts=3, ho
     return xr.Dataset(data, coordinates, attributes)
 
 
-def study(uncertainty: float = 1e-8, horizon: float | None = None, **extra: xr.Dataset):
-    """dop853 at three tolerances, rk4 at two steps of which one is refused."""
+REFUSED = xr.Dataset(attrs={"refused": "it blew up; take another"})
+
+
+def study(uncertainty: float = 1e-8, horizon: float | None = None, **changed: xr.Dataset):
+    """dop853 at three tolerances, rk4 at two steps of which one is refused; some runs changed."""
     points = [Point("best", "reference", {}), Point("other", "confirmation", {})]
     runs = {"best": run(0.0, horizon=horizon), "other": run(uncertainty)}
     for k, (rtol, error) in enumerate(((1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-7))):
         points.append(Point(f"d{k}", "tolerance", {"adaptive_integrator": "dop853", "rtol": rtol}))
         runs[f"d{k}"] = run(error, evaluations=100 * (k + 1))
-    for step, made in (
-        (1e-3, run(1e-4, evaluations=50)),
-        (1e-2, xr.Dataset(attrs={"refused": "it blew up; take another"})),
-    ):
-        points.append(Point(f"r{step}", "step", {"fixed_integrator": "rk4", "step": step}))
-        runs[f"r{step}"] = made
+    for name, step, made in (("fine", 1e-3, run(1e-4, evaluations=50)), ("coarse", 1e-2, REFUSED)):
+        points.append(Point(name, "step", {"fixed_integrator": "rk4", "step": step}))
+        runs[name] = made
+    runs |= changed
     return assemble(points, runs, [POSITION, TIMES]), points, runs
 
 
-def test_errors_are_relative_to_the_size_of_the_quantity():
-    found, *_ = study()
+@pytest.fixture(scope="module")
+def found() -> xr.Dataset:
+    return study()[0]
+
+
+def test_errors_are_relative_to_the_size_of_the_quantity(found: xr.Dataset):
     error = found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-6)
     assert float(error.sel(quantity="slider.position")) == pytest.approx(1e-5 / SIZE)
     assert float(error.sel(quantity="pin.impact_times")) == pytest.approx(1e-5 / 0.6)  # last impact at 0.6 s
 
 
-def test_costs_are_medians_with_their_spread():
-    found, *_ = study()
+def test_costs_are_medians_with_their_spread(found: xr.Dataset):
     assert float(found.cpu_seconds_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-3)) == 0.2
     assert float(found.cpu_spread_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-3)) == pytest.approx(0.2)
 
 
-def test_refused_points_are_gaps_with_their_reason():
-    found, *_ = study()
+def test_refused_points_are_gaps_with_their_reason(found: xr.Dataset):
     assert np.isnan(found.error_by_step.sel(fixed_integrator="rk4", step=1e-2)).all()
     assert "it blew up" in found.attrs["refused"]
     assert "take another" not in found.attrs["refused"]
@@ -99,34 +104,27 @@ def test_errors_beyond_the_horizon_do_not_count():
 
 def test_the_horizon_of_the_confirmation_counts_too():
     """An impact that only one of both has, beyond what the confirmation can predict, is no uncertainty."""
-    _, points, runs = study(horizon=0.7)
-    runs["other"] = run(1e-8, impacts=2)
-    assert np.isinf(assemble(points, runs, [TIMES]).reference_uncertainty).all()
-    runs["other"] = run(1e-8, impacts=2, horizon=0.5)
-    found = assemble(points, runs, [TIMES])
-    assert found.attrs["horizon"] == 0.5
-    assert float(found.reference_uncertainty[0]) < 1e-7
+    later, *_ = study(horizon=0.7, other=run(1e-8, impacts=2))
+    sooner, *_ = study(horizon=0.7, other=run(1e-8, impacts=2, horizon=0.5))
+    assert np.isinf(later.reference_uncertainty.sel(quantity=TIMES.name))
+    assert sooner.attrs["horizon"] == 0.5
+    assert float(sooner.reference_uncertainty.sel(quantity=TIMES.name)) < 1e-7
 
 
 def test_a_reference_that_is_not_confirmed_is_drawn_as_one():
-    _, points, runs = study()
-    runs["other"] = run(1e-8, impacts=2)
-    found = assemble(points, runs, [POSITION, TIMES])
+    found, *_ = study(other=run(1e-8, impacts=2))
     assert set(work_precision.make("w", found, "t")) == {"w.png", "w.svg"}
 
 
 def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheapest():
-    _, points, runs = study()
-    runs["d2"] = run(0.0, impacts=2, evaluations=1)
-    again = assemble(points, runs, [POSITION, TIMES])
-    assert np.isinf(again.error_by_tolerance.sel(rtol=1e-9, quantity="pin.impact_times")).all()
-    chosen = answer.cheapest(again, 1e-3)
+    found, *_ = study(d2=run(0.0, impacts=2, evaluations=1))
+    assert np.isinf(found.error_by_tolerance.sel(rtol=1e-9, quantity="pin.impact_times")).all()
+    chosen = answer.cheapest(found, 1e-3)
     assert chosen is not None
     assert chosen.evaluations > 1
 
 
-def test_the_cheapest_way_to_each_accuracy():
-    found, *_ = study()
+def test_the_cheapest_way_to_each_accuracy(found: xr.Dataset):
     assert answer.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
     assert answer.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
     assert answer.cheapest(found, 1e-12) is None
@@ -136,8 +134,7 @@ def test_the_cheapest_way_to_each_accuracy():
     assert "1.8e-07 at best" in rows[2][4]
 
 
-def test_each_quantity_has_a_price_of_its_own():
-    found, *_ = study()
+def test_each_quantity_has_a_price_of_its_own(found: xr.Dataset):
     rows = {row[0]: row for row in answer.by_quantity(found, "t").rows}
     # 1e-7 m of 2 m and 1e-7 s of 0.6 s, each with the reference's uncertainty of a tenth of it
     assert [rows[name][-1] for name in ("slider.position", "pin.impact_times")] == ["5.5e-08", "1.8e-07"]
@@ -151,30 +148,28 @@ def test_an_error_below_the_references_uncertainty_is_not_claimed():
 
 
 def test_a_study_of_which_every_run_is_refused_says_so():
-    _, points, runs = study()
-    refused = {p.key: xr.Dataset(attrs={"refused": "no"}) for p in points if p.group not in ("reference",)}
-    table = answer.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t")
+    found, *_ = study(**dict.fromkeys(("other", "d0", "d1", "d2", "fine", "coarse"), REFUSED))
+    table = answer.price_list(found, "t")
     assert all(row[1] == "cannot be had" for row in table.rows)
     assert any("Not confirmed: other was refused" in note for note in table.notes)
     assert any("every run is refused" in note for note in table.notes)
 
 
 def test_a_study_without_its_reference_is_refused_with_the_reason():
-    _, points, runs = study()
-    runs["best"] = xr.Dataset(attrs={"refused": "it blew up"})
     with pytest.raises(SolverError, match=r"reference \(best\) is refused: it blew up"):
-        assemble(points, runs, [POSITION])
+        study(best=REFUSED)
 
 
-def test_what_cannot_be_had_is_explained():
-    rounded, *_ = study(uncertainty=1e-7)
-    assert any("rounding errors" in note for note in answer.price_list(rounded, "t").notes)
-    coarse, *_ = study(uncertainty=1e-12)
-    assert any("best setting that was tried reaches" in note for note in answer.price_list(coarse, "t").notes)
-    _, points, runs = study()
-    runs["other"] = run(0.0, impacts=2)
-    other = answer.price_list(assemble(points, runs, [POSITION, TIMES]), "t")
-    assert any("do not agree on the number of impacts" in note for note in other.notes)
+@pytest.mark.parametrize(
+    "made, words",
+    [
+        ({"uncertainty": 1e-7}, "rounding errors"),
+        ({"uncertainty": 1e-12}, "best setting that was tried reaches"),
+        ({"other": run(0.0, impacts=2)}, "do not agree on the number of impacts"),
+    ],
+)
+def test_what_cannot_be_had_is_explained(made: dict[str, Any], words: str):
+    assert any(words in note for note in answer.price_list(study(**made)[0], "t").notes)
 
 
 def test_a_scene_that_is_refused_as_it_is_has_no_causes():
@@ -234,11 +229,10 @@ def test_causes_come_from_pairs_that_differ_in_one_thing():
     assert located == pytest.approx(1e-12 * 1e-3 / 0.5 / 0.6)  # share of the clearance, over speed, over the span
 
 
-def test_the_least_time_decides_and_evaluations_only_where_times_are_alike():
-    _, points, runs = study()
-    assert answer.cheapest(assemble(points, runs, [POSITION, TIMES]), 1e-3).name == "rk4, step 0.001 s"
-    runs["r0.001"] = run(1e-4, evaluations=50, seconds=(0.3, 0.3, 0.3))  # of dop853: 200 in 0.2 s
-    assert answer.cheapest(assemble(points, runs, [POSITION, TIMES]), 1e-3).name == "dop853, rtol 1e-06"
+def test_the_least_time_decides_and_evaluations_only_where_times_are_alike(found: xr.Dataset):
+    assert answer.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
+    slow, *_ = study(fine=run(1e-4, evaluations=50, seconds=(0.3, 0.3, 0.3)))  # of dop853: 200 in 0.2 s
+    assert answer.cheapest(slow, 1e-3).name == "dop853, rtol 1e-06"
 
 
 def test_a_cause_that_changes_the_number_of_impacts_dominates():
@@ -268,8 +262,7 @@ def written(found: xr.Dataset, tables: tuple[str, ...] = (), pictures: Mapping[s
     return answer.markdown((said,), "docs/accuracy.md")
 
 
-def test_the_page_says_what_each_digit_costs():
-    found, *_ = study()
+def test_the_page_says_what_each_digit_costs(found: xr.Dataset):
     text = written(found, ("| a table |",), {"Error": "x/y.png"})
     assert "flexclear cost a/scene \\\n        --page docs/accuracy.md" in text
     assert "0.001 takes rk4, step 0.001 s (0.2 s)" in text
@@ -298,19 +291,13 @@ def test_the_page_says_how_far_it_holds_and_what_to_refine():
     assert "an ensemble, which the scene can ask for" in alone
 
 
-def test_figures_are_drawn():
-    found, *_ = study()
-    mark = work_precision.Mark("paper's choice", 0.5, {"slider.position": 1e-3})
-    assert set(work_precision.make("w", found, "t", (mark,))) == {"w.png", "w.svg"}
-
-
-def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size():
-    found, *_ = study()
+def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size(found: xr.Dataset):
     track = {"name": "peer", "note": "n", "seconds": [1.0, 2.0], "error": {"slider.position": [1e-3, 1e-4]}}
     (curve,) = work_precision.peers(found, [track])
     assert curve.error[:, 0] == pytest.approx([1e-3 / SIZE, 1e-4 / SIZE])
     assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
-    assert set(work_precision.make("w", found, "t", (), [curve])) == {"w.png", "w.svg"}
+    mark = work_precision.Mark("paper's choice", 0.5, {"slider.position": 1e-3})
+    assert set(work_precision.make("w", found, "t", (mark,), [curve])) == {"w.png", "w.svg"}
     assert answer.price_list(found, "t", ("said",)).notes[-1] == "said"
 
 
@@ -320,3 +307,43 @@ def test_runs_left_undone_are_named_with_their_reason():
     assert budget == "Not run within the budget: rk4, step 1e-06 s."
     assert "used up its evaluations" in method
     assert method.endswith("radau, rtol 1e-09.")
+
+
+# Ensembles of chaotic runs: how well they know their means, from made-up members --------------------------------------
+
+
+def test_larger_ensembles_know_their_mean_better():
+    values = np.random.default_rng(3).normal(10.0, 1.0, size=64)
+    errors = [statistics.relative_error(values[:size]) for size in statistics.growing(64)]
+    assert statistics.growing(64) == [8, 16, 32, 64]
+    # 1.96 standard deviations of 0.1 over the root of 64, from one draw of them
+    assert errors[-1] == pytest.approx(1.96 * 0.1 / 8.0, rel=0.2)
+    assert errors[-1] < errors[1]
+
+
+def test_the_figure_of_ensembles_is_drawn():
+    random = np.random.default_rng(1)
+    data = {name: (("member", "contact"), random.uniform(1, 2, (16, 1))) for name in statistics.STATISTICS}
+    one = xr.Dataset(data, {"contact": ["pin"]}, {"cpu_seconds": 0.5})
+    assert set(statistics.make("s", {"rtol 1e-06": one, "rtol 1e-08": one}, "t")) == {"s.png", "s.svg"}
+
+
+def test_the_standard_error_of_a_series_is_that_of_its_members_mean():
+    random = np.random.default_rng(5)
+    values = random.normal(0.0, 1.0, (400, 3, 1, 3)) * np.array([0.0, 1.0, 2.0])[:, None, None]
+    ensemble = xr.Dataset({"position": (("member", "time", "body", "axis"), values)}, {"body": ["slider"]})
+    # the last time: deviation 2 on each of three axes, over the root of 400
+    assert standard_error(ensemble, POSITION) == pytest.approx(2.0 * np.sqrt(3.0) / 20.0, rel=0.1)
+    assert standard_error(ensemble, Quantity("other", "position")) is None
+    assert standard_error(ensemble, Quantity("slider", "orientation")) is None
+    assert standard_error(ensemble, TIMES) is None
+
+
+def test_bootstrap_intervals_hold_the_mean_of_the_population_as_often_as_they_say():
+    random = np.random.default_rng(1)
+    hits = 0
+    for _ in range(200):
+        found = statistics.estimate(random.normal(size=16))
+        hits += found.low < 0.0 < found.high
+    # 95 % intervals of the percentile kind from 16 members cover 88 to 96 %
+    assert 0.85 < hits / 200 < 0.98

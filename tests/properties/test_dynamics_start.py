@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.assembly import assembled
-from flexclear.pipeline.dynamics.model.given_start import moved
+from flexclear.pipeline.dynamics.model.given_start import corrected_starts
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
@@ -168,7 +168,7 @@ def test_whole_turns_contradict_nothing_and_bodies_without_a_pose_go_where_the_d
 
 def test_the_moves_of_an_assembly_are_reported_with_amounts() -> None:
     mechanism = start_of(driven(1.5, 1.45))
-    (reported,) = moved(mechanism, [link.start for link in mechanism.links])
+    (reported,) = corrected_starts(mechanism, [link.start for link in mechanism.links])
     before, after = angles(1.5), angles(1.45)
     # three digits are printed
     amounts = dict(zip(("crank", "coupler", "rocker"), np.abs(np.subtract(before, after)), strict=True))
@@ -182,7 +182,7 @@ def test_the_moves_of_an_assembly_are_reported_with_amounts() -> None:
     assert "crank moved" not in reported
     assert mechanism.start_residual == pytest.approx(0.05, rel=1e-9)
     fitting = start_of(driven(1.5, 1.5))
-    assert moved(fitting, [link.start for link in fitting.links]) == []
+    assert corrected_starts(fitting, [link.start for link in fitting.links]) == []
 
 
 @pytest.mark.slow

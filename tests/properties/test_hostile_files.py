@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from flexclear.commands import cost, scenes
-from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts import maintenance
 from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
 from flexclear.pipeline.core.artifacts.store import Store, read_record
 from flexclear.pipeline.core.scene.load import load_scene
@@ -29,7 +29,8 @@ from flexclear.pipeline.post.render import forms
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.solid import imported
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
-from tests.properties.test_hostile_scenes import BASE
+from flexclear.stages.graph import Graph
+from tests.properties.test_scene_words import BASE
 
 #: processor time [s] after which work counts as endless: refusals take 0.3 s, and what they refuse takes hours
 SECONDS = 60.0
@@ -38,12 +39,13 @@ HARMONIC = '{ type = "harmonic", amplitude = 1, frequency = 1 }'
 
 
 @contextmanager
-def refused(words: str) -> Iterator[None]:
+def refused(words: str | None = None) -> Iterator[None]:
     begun = time.process_time()
     with pytest.raises(FlexclearError, match=words) as caught:
         yield
     assert time.process_time() - begun < SECONDS
     assert len(str(caught.value).encode()) < 4000
+    assert "\x1b" not in str(caught.value)
 
 
 SCENES = {
@@ -67,6 +69,15 @@ SCENES = {
     "keys of many parts in quotation marks": ('"a".' * 200_000 + "b = 1", "more than 50 parts"),
     "a million unknown keys": ("".join(f"k{i}=1\n" for i in range(90_000)), "unknown key"),
     "more text than any scene": ("#\n" * 600_000, "larger than 1 MB"),
+    "a key of many parts": ("a." * 300_000 + "b = 1", "more than 50 parts"),
+    "a quantity with much white space": (f'time.end = "1 a{" " * 60_000}"', "unknown unit"),
+    "a number of 5000 digits": (f"time.end = {'9' * 5000}", "Exceeds the limit"),
+    "a number of 400 digits": (f"time.end = {'9' * 400}", r"\[time.end\]"),
+    "a part called source": ('[body.source]\ntype = "ground"', "source"),
+    "a frame called source": ('[body.a]\ntype = "ground"\nframes.source = {}', "source"),
+    "control characters": ('[body."\\u001b[31m"]\ntype = "ground"', "is no name"),
+    "a long key": (f"{'k' * 60_000} = 1", "unknown key"),
+    "a line of many numbers": ("x = " + "1 m " * 30_000, "is not TOML"),
 }
 
 
@@ -76,6 +87,23 @@ def test_a_scene_that_asks_for_endless_work_is_refused_at_once(name: str, tmp_pa
     (tmp_path / "scene.toml").write_text(text)
     with refused(words):
         load_scene(tmp_path / "scene.toml")
+
+
+def test_paths_that_are_no_files_are_refused(tmp_path: Path) -> None:
+    """Reading the first of them would never end, the second would wait for a writer."""
+    pipe, loop, dots = (tmp_path / f"{name}.toml" for name in ("pipe", "loop", ".."))
+    os.mkfifo(pipe)
+    loop.symlink_to(loop)
+    dots.write_text('title = "a"')
+    paths = {"/dev/zero": "no ordinary file", pipe: "no ordinary file", loop: None, dots: "is no name for a scene"}
+    for path, words in {**paths, "a\0b.toml": None, "x" * 5000 + ".toml": None}.items():
+        with refused(words):
+            load_scene(path)
+    body = 'title = "a"\ntime.end = 1\n[body.b]\ntype = "flexible"\nmodes = { reference = "x", count = 1 }\nmesh = '
+    for mesh in ("/dev/zero", str(pipe), "x" * 5000, "a\\u0000b"):
+        (tmp_path / "scene.toml").write_text(f'{body}"{mesh}"')
+        with refused():
+            Graph(load_scene(tmp_path / "scene.toml")).up_to("mesh")
 
 
 def test_a_long_row_of_scenes_that_extend_each_other_is_refused(tmp_path: Path) -> None:
@@ -231,12 +259,12 @@ def test_what_is_pruned_lies_in_the_cache(tmp_path: Path) -> None:
     (record.parent / "key.x").mkdir()
     altered(record, files={"x/../../../../precious.txt": sha256(b"other")})
     assert read_record(record) is None
-    assert upkeep.inventory(store, whole=True).unreadable == (record,)
+    assert maintenance.inventory(store, whole=True).unreadable == (record,)
     for stage in ("../stage", "stage/../..", "/stage", ""):
         altered(record, stage=stage, files={"txt": sha256(b"content")})
         assert read_record(record) is None
-    for artifact in upkeep.prunable(store, upkeep.inventory(store, whole=True), -1.0):
-        upkeep.remove(store, artifact)
+    for artifact in maintenance.prunable(store, maintenance.inventory(store, whole=True), -1.0):
+        maintenance.remove(store, artifact)
     assert (tmp_path / "precious.txt").read_text() == "precious"
 
 

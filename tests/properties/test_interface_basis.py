@@ -9,13 +9,12 @@ import pytest
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.model import initial, numbering
+from flexclear.pipeline.dynamics.model import numbering
 from flexclear.pipeline.dynamics.model.interface_basis import InterfaceBasis, basis, modes_of
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
-from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.specialise.trace import Trace
+from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.articulated_chains import evaluated
 from tests.properties.mechanisms import joint, rigid
 from tests.properties.mechanisms import scene as written
 
@@ -91,23 +90,6 @@ def eigenmodes(mechanism: Mechanism, link: int) -> InterfaceBasis:
     return InterfaceBasis(np.eye(bundle.sizes["mode"]), 0)
 
 
-def evaluated(model: Model) -> np.ndarray:
-    """Rates of the state some way off the start, by the kernels without a compiler; contacts closed."""
-    scope: dict[str, Any] = {}
-    exec(sources.straight(model.parts, ()).partition("WIRING")[0], scope)
-    space, random = model.arrays.work_space(m.Room(1, 0)), np.random.default_rng(1)
-    h, w, n = space.h, space.w, space.n
-    y, dy, start = int(h[m.Y]), int(h[m.SLOPES]), initial.start_state(model)
-    start[model.speeds] += 0.1 * random.normal(size=model.nv)
-    for link, modes in model.numbering.modal_positions.items():
-        start[modes] += 1e-4 * model.links[link].mass ** 0.5 * random.normal(size=len(modes))
-    w[y : y + model.ny], n[n[m.MODE] :] = start, 1
-    w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
-    Trace(0).plain(scope["rates"])(h.tolist(), model.arrays.f, w, n, y, dy)
-    assert n[m.EVALUATION] == m.OK
-    return w[dy : dy + model.ny].copy()
-
-
 @pytest.mark.parametrize(
     "name, held, tolerance",
     # rounding times the condition of the mass matrix with a unit diagonal: of the two rods, where the lower one turns
@@ -129,7 +111,7 @@ def test_accelerations_are_those_of_coupled_eigenmodes(
     assert mixed.arrays.table(m.FLEXES)["n_held"].tolist() == held
     monkeypatch.setattr(numbering, "interface_basis", eigenmodes)
     plain = tabulate(mechanism)
-    one, other = evaluated(mixed), evaluated(plain)
+    one, other = evaluated(mixed).rates, evaluated(plain).rates
     speeds = mixed.speeds
     assert np.abs(one[: mixed.nq] - other[: mixed.nq]).max() < 1e-13 * np.abs(other[: mixed.nq]).max()
     assert np.abs(one[speeds] - other[speeds]).max() < tolerance * np.abs(other[speeds]).max()

@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.post.render import film_speed, forms, gl, joint_view, player, surfaces, vibrations
 from flexclear.pipeline.post.render.forms import Seat, equivalent, wheels
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
-from flexclear.pipeline.post.render.pictures import Shown, make
+from flexclear.pipeline.post.render.pictures import MAKERS, Shown, make
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, surface
 from flexclear.pipeline.structure.kinds import kind
@@ -175,7 +175,7 @@ def test_the_viewer_bends_a_rod_as_the_run_does():
     run, bundle = synthetic.run("sps4/far_cb", modes=7), synthetic.bundle()
     (rod,) = mechanism(run, {"rod1": bundle}, Looks(exaggeration=1.0)).flexible
     step = run.sizes["time"] // 2
-    rest = surfaces_of(bundle)
+    rest = surface(bundle, np.zeros(bundle.sizes["mode"]))[0]
     q = run.modal_coordinate.values[step, rod.columns]
     fields = player.linear_fields(rod.bundle)
     points = rest - bundle.first_moment.values / float(bundle.mass) + np.tensordot(q, fields, axes=1)
@@ -183,12 +183,6 @@ def test_the_viewer_bends_a_rod_as_the_run_does():
     own = true - run.position.values[step, rod.index]
     lengths = [np.linalg.norm(x.reshape(-1, AROUND + 1, 3).mean(axis=1), axis=1) for x in (points, own)]
     np.testing.assert_allclose(*lengths, atol=1e-9)
-
-
-def surfaces_of(bundle) -> np.ndarray:
-    from flexclear.pipeline.post.shapes.body_shape import surface
-
-    return surface(bundle, np.zeros(bundle.sizes["mode"]))[0]
 
 
 @pytest.fixture(scope="module")
@@ -292,8 +286,6 @@ def test_a_vibrating_pendulum_turns_about_its_pin_and_is_not_drawn_too_far(swing
 
 @needs_gl
 def test_a_film_of_vibrations_goes_through_whole_periods(swinging: tuple[Mechanism, Vibrations]):
-    from flexclear.pipeline.post.render import vibrations
-
     pictures = np.array(list(vibrations.frames(*swinging, 8)))
     assert pictures.shape == (12, 540, 960, 3)  # 1.5 s of 8 pictures
     np.testing.assert_array_equal(pictures[:6], pictures[6:])
@@ -303,8 +295,6 @@ def test_a_film_of_vibrations_goes_through_whole_periods(swinging: tuple[Mechani
 
 @pytest.mark.parametrize("what, kind", [("joint", "gltf"), ("vibrations", "pvd")])
 def test_what_cannot_be_shown_so_is_not_offered(what: str, kind: str):
-    from flexclear.pipeline.post.render.pictures import MAKERS
-
     assert kind not in MAKERS[what]
     assert {name: tuple(kinds) for name, kinds in MAKERS.items()} == rendering.FORMATS
 

@@ -206,7 +206,7 @@ def test_a_film_moves():
     for body in (replace(drawn, parts=()), replace(drawn, flexible=())):
         moving = film.Actors(actors.parts if body.parts else (), actors.flexible if body.flexible else ())
         for step in (0, last):
-            film._place(body, moving, step, glow=False)
+            film._place(body, moving, step, impact=False)
             seen.append(film.image(scene).astype(int))
     scene.close()
     assert np.abs(seen[1] - seen[0]).max() > 20  # the rod

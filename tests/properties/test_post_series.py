@@ -23,6 +23,12 @@ angles = st.floats(-1.5, 1.5)
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
 
 
+@pytest.fixture(scope="module")
+def run() -> xr.Dataset:
+    """Of the mechanism with a loose joint."""
+    return synthetic.run("sps4/csj", clearance=True)
+
+
 @given(angles)
 def test_angle_about_y_is_the_angle_of_a_rotation_about_y(angle):
     q = rotation_vector_to_quaternion(np.array([0.0, angle, 0.0]))
@@ -144,8 +150,7 @@ def test_runs_without_common_times_are_refused():
         max_deviation(run, run.assign_coords(time=run.time + 3e-5), "platform")
 
 
-def test_horizon_is_where_members_part():
-    run = synthetic.run("sps4/csj", clearance=True)
+def test_horizon_is_where_members_part(run: xr.Dataset):
     found = synthetic.ensemble(run, growth=60.0)
     time, velocity = found.time.values, found.velocity.values
     end = horizon(time, velocity)
@@ -155,24 +160,19 @@ def test_horizon_is_where_members_part():
     assert (spread(velocity)[:at] <= 1e-3 * peak).all()
 
 
-def test_horizon_of_members_that_stay_together_is_the_end():
-    run = synthetic.run("sps4/csj", clearance=True)
-    assert (
-        horizon(*(synthetic.ensemble(run, growth=0.0)[name].values for name in ("time", "velocity")))
-        == run.time.values[-1]
-    )
+def test_horizon_of_members_that_stay_together_is_the_end(run: xr.Dataset):
+    members = synthetic.ensemble(run, growth=0.0)
+    assert horizon(members.time.values, members.velocity.values) == run.time.values[-1]
 
 
-def test_faster_growth_shortens_the_horizon():
-    run = synthetic.run("sps4/csj", clearance=True)
+def test_faster_growth_shortens_the_horizon(run: xr.Dataset):
     ends = [float(derive(run, synthetic.ensemble(run, growth=g)).ensemble_horizon) for g in (0.0, 40.0, 60.0, 90.0)]
     assert ends == sorted(ends, reverse=True)
     assert len(set(ends)) == 4
 
 
-def test_an_ensemble_is_summarised_by_mean_spread_and_quantiles():
+def test_an_ensemble_is_summarised_by_mean_spread_and_quantiles(run: xr.Dataset):
     """Evenly spaced members: the quantile q of them lies at the share q of their range."""
-    run = synthetic.run("sps4/csj", clearance=True)
     members = synthetic.ensemble(run, members=5, growth=60.0)
     post, q = derive(run, members), np.array([0.05, 0.25, 0.5, 0.75, 0.95])
     np.testing.assert_array_equal(post["quantile"].values, q)
@@ -200,14 +200,10 @@ def test_scene_without_contact_gets_no_contact_series():
     assert float(post.horizon) == synthetic.END
 
 
-def test_contact_force_is_the_reaction_of_a_joint_with_clearance():
-    run = synthetic.run("sps4/csj", clearance=True)
+def test_contact_force_is_the_reaction_of_a_joint_with_clearance(run: xr.Dataset):
     post = derive(run)
-    force = np.linalg.norm(run.contact_force.sel(contact="A1").values, axis=-1)
-    np.testing.assert_array_equal(post.reaction.sel(joint="A1").values, force)
-    np.testing.assert_array_equal(
-        post.reaction.sel(joint="A2").values, np.linalg.norm(run.joint_force.sel(joint="A2").values, axis=-1)
-    )
+    for joint, force in (("A1", run.contact_force.sel(contact="A1")), ("A2", run.joint_force.sel(joint="A2"))):
+        np.testing.assert_array_equal(post.reaction.sel(joint=joint).values, np.linalg.norm(force.values, axis=-1))
 
 
 def test_impacts_are_closings_paired_with_their_openings():
@@ -218,32 +214,29 @@ def test_impacts_are_closings_paired_with_their_openings():
     assert float(post.clearance[0]) == pytest.approx(0.5e-3, rel=1e-12)
 
 
-def test_slow_closings_are_no_impacts():
-    run = synthetic.run("sps4/csj", clearance=True)
+def test_slow_closings_are_no_impacts(run: xr.Dataset):
     speed = run.event_approach_speed.values.copy()
     speed[0] = 0.9e-4  # just below the threshold of 1e-4 m/s
     post = derive(run.assign(event_approach_speed=("event", speed)))
     assert post.sizes["impact"] == synthetic.BURSTS.size - 1
 
 
-def test_an_impact_that_has_not_ended_is_counted_and_listed_without_its_end():
-    run = synthetic.run("sps4/csj", clearance=True).isel(event=slice(0, -1))
+def test_an_impact_that_has_not_ended_is_counted_and_listed_without_its_end(run: xr.Dataset):
+    run = run.isel(event=slice(0, -1))
     post = derive(run)
     assert int(post.impact_count[0]) == synthetic.BURSTS.size == post.sizes["impact"]
     for name in ("impact_duration", "impact_separation_speed"):
         assert np.isnan(post[name].values).tolist() == [False] * (synthetic.BURSTS.size - 1) + [True]
 
 
-def test_run_and_post_mean_the_same_by_horizon():
-    run = synthetic.run("sps4/csj", clearance=True)
+def test_run_and_post_mean_the_same_by_horizon(run: xr.Dataset):
     post = derive(run.assign(horizon=0.123), synthetic.ensemble(run))
     assert float(post.horizon) == 0.123
     assert float(post.ensemble_horizon) < 0.123  # the made-up members part earlier
 
 
-def test_time_in_contact_is_that_of_the_located_events():
+def test_time_in_contact_is_that_of_the_located_events(run: xr.Dataset):
     """Whatever rows a run has: those inside contacts are denser than elsewhere."""
-    run = synthetic.run("sps4/csj", clearance=True)
     expected = synthetic.BURSTS.size * synthetic.BURST_LENGTH / synthetic.END
     for rows in (run, run.isel(time=slice(None, None, 7))):
         ends = rows.time.values[-1] - rows.time.values[0]
@@ -251,9 +244,8 @@ def test_time_in_contact_is_that_of_the_located_events():
 
 
 @pytest.mark.parametrize("nudge", [-1.0, 1.0])
-def test_rounding_does_not_choose_between_two_equal_peaks(nudge: float):
+def test_rounding_does_not_choose_between_two_equal_peaks(run: xr.Dataset, nudge: float):
     """A stroke that ends as it began has its largest acceleration twice."""
-    run = synthetic.run("sps4/csj", clearance=True)
     acceleration = np.zeros_like(run.acceleration.values)
     acceleration[3] = -70.0
     acceleration[-4] = 70.0 * (1.0 + nudge * np.finfo(float).eps)

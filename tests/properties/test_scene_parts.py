@@ -1,4 +1,4 @@
-"""Drives, laws, joints and loads that cannot be are refused before anything is compiled, in words."""
+"""Tables of drives in files next to scenes, and edits of scenes."""
 
 import copy
 from pathlib import Path
@@ -6,130 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.stages import simulation
 
 TREE = Path(__file__).resolve().parents[2]
-
-SCENE = """
-title = "wrong"
-[time]
-end = "1 s"
-[body.base]
-type = "ground"
-frames.O = {}
-[body.a]
-type = "rigid"
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-frames.O = {}
-frames.far = { position = [0.5, 0.0, 0.0] }
-[body.b]
-type = "rigid"
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-frames.O = {}
-[body.c]
-type = "rigid"
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-frames.O = {}
-[joint.hinge]
-type = "revolute"
-between = ["base.O", "a.O"]
-[joint.sleeve]
-type = "cylindrical"
-between = ["a.far", "b.O"]
-[joint.weld]
-type = "fixed"
-between = ["b.O", "c.O"]
-"""
-
-CONSTANT = 'law = { type = "constant" }'
-
-
-def spline(more: str) -> str:
-    return f'[drive.d]\njoint = "hinge"\nlaw = {{ type = "spline", {more} }}'
-
-
-#: what is added to the scene -> place, and words that the message must hold
-WRONG = {
-    f'[drive.d]\njoint = "weld"\n{CONSTANT}': ("drive.d.joint", "fixed joint 'weld' has no coordinate"),
-    f'[drive.d]\njoint = "sleeve"\n{CONSTANT}': ("drive.d.coordinate", "2 coordinates", "rotation, translation"),
-    f'[drive.d]\njoint = "sleeve"\ncoordinate = "y"\n{CONSTANT}': ("drive.d.coordinate", "no 'y'"),
-    '[drive.d]\njoint = "hinge"\nlaw = { type = "constant", value = "3 mm" }': (
-        "drive.d.law",
-        "'0.003 m'",
-        "an angle",
-        "deg",
-    ),
-    '[drive.d]\njoint = "hinge"\nlaw = { type = "harmonic", amplitude = [1.0], frequency = [] }': ("one entry per",),
-    '[drive.d]\njoint = "hinge"\nlaw = { type = "polynomial", coefficients = [] }': ("coefficients",),
-    spline("time = [0.0], value = [0.0]"): ("at least 2 points, not 1",),
-    spline("time = [0.0, 0.6, 0.5, 1.0], value = [0.0, 0.1, 0.2, 0.3]"): ("point 3 at 0.5 s follows one at 0.6 s",),
-    spline("time = [0.0, 1.0], value = [0.0]"): ("2 times, but 1 values",),
-    spline("time = [0.0, 0.5], value = [0.0, 0.1]"): ("drive.d.law", "from 0 s to 0.5 s", "add points"),
-    spline('time = [0.0, 0.4, 1.0], value = [0.0, 0.1, 0.2], ends = "periodic"'): ("drive.d.law", "periodic"),
-    '[drive.d]\njoint = "hinge"\nlaw = { type = "table", file = "no.csv", time = { column = "t", unit = "s" }, '
-    'value = { column = "x", unit = "deg" } }': ("no.csv cannot be read", "No such file"),
-    '[drive.d]\njoint = "hinge"\nlaw.type = "piecewise"\nlaw.sections = [{ start = 0.0, law = { type = "constant" } }, '
-    '{ start = 0.5, law = { type = "constant", value = 0.1 } }]': ("drive.d.law", "value", "jumps at 0.5 s"),
-    '[drive.d]\nframe = "a.far"\nposition.x = { type = "constant" }\nactuators = ["hinges"]': (
-        "drive.d.actuators",
-        "no joint 'hinges'",
-    ),
-    '[drive.d]\nframe = "base.O"\nposition.x = { type = "constant" }': ("drive.d.frame", "ground"),
-    '[drive.d]\nframe = "a.nowhere"\nposition.x = { type = "constant" }': ("drive.d.frame", "no frame 'a.nowhere'"),
-    '[drive.d]\nframe = "a.far"': ("at least one component",),
-    '[drive.d]\nframe = "a.far"\nangles = "rotation-vector"\nrotation.x = { type = "constant" }': ("three components",),
-    '[load.l]\ntype = "point-force"\nframe = "a.fat"\nforce = [1.0, 0.0, 0.0]': ("load.l", "no frame", "a.far"),
-    '[load.l]\ntype = "point-force"\nframe = "a.far"\nforce = ["1 N m", 0.0, 0.0]': ("load.l.force", "torque", "force"),
-    '[load.l]\ntype = "spring-damper"\nbetween = ["b.O", "c.O"]\nstiffness = 1.0\nfree_length = 0.1': (
-        "load.l",
-        "move as one",
-    ),
-    '[load.l]\ntype = "spring-damper"\nbetween = ["base.O", "a.far"]': ("load.l", "a damping, or both"),
-    '[load.l]\ntype = "joint-spring"\njoint = "hinge"\nstiffness = "3 N/m"': ("load.l", "torsional stiffness"),
-    '[load.l]\ntype = "joint-spring"\njoint = "hinge"\nstiffness = -1.0': ("load.l", "must not be negative"),
-    '[load.l]\ntype = "joint-friction"\njoint = "hinge"\ncoulomb = { static = 0.1, dynamic = 0.2, v_static = 0.1, '
-    "v_dynamic = 0.2 }": ("load.l", "nor exceed static", "dynamic = 0.2, static = 0.1"),
-    '[load.l]\ntype = "joint-friction"\njoint = "sleeve"\nviscous = 1.0': ("load.l.coordinate", "2 coordinates"),
-    '[load.l]\ntype = "joint-force"\njoint = "hinge"\nforce = "1 N"': ("load.l.force", "force", "torque"),
-    '[load.l]\ntype = "joint-force"\njoint = "weld"\nforce = 1.0': ("load.l.joint", "no coordinate"),
-}
-
-
-@pytest.mark.parametrize("addition", WRONG, ids=lambda text: text.replace("\n", " ")[:70])
-def test_it_is_refused_with_place_value_rule_and_remedy(
-    addition: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def compile_nothing(*_: object) -> None:
-        raise AssertionError("compiled before the input was checked")
-
-    monkeypatch.setattr(functions, "entry", compile_nothing)
-    path = tmp_path / "wrong.toml"
-    path.write_text(SCENE + addition)
-    with pytest.raises(InputError) as error:
-        dynamics.simulate(load_scene(path), {}, lambda fraction, text: None)
-    for word in WRONG[addition]:
-        assert word in str(error.value)
-
-
-def test_the_scene_itself_is_right(tmp_path: Path) -> None:
-    path = tmp_path / "right.toml"
-    path.write_text(SCENE)
-    tabulate(build(load_scene(path), {}))
-
-
-# Tables in files ----------------------------------------------------------------------------------------------------
 
 TABLE = """
 [drive.d]
@@ -146,7 +32,8 @@ def write(folder: Path, text: str, law: str = TABLE) -> Path:
     (folder / "moves").mkdir(exist_ok=True)
     (folder / "moves" / "angle.csv").write_text(text)
     path = folder / "scene.toml"
-    path.write_text(SCENE + law)
+    pendulum = (TREE / "scenes" / "checks" / "pendulum.toml").read_text()
+    path.write_text(pendulum.replace('end = "10 s"', 'end = "1 s"') + law)
     return path
 
 

@@ -1,4 +1,4 @@
-"""What is said of a wrong scene is true, names the key, and is said once."""
+"""How texts, units, inertias and directions of scenes are read, whoever wrote them."""
 
 from __future__ import annotations
 
@@ -10,96 +10,15 @@ import xarray as xr
 from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core.artifacts import deficits
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_between
-from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_between, rotation_vector_to_matrix
+from flexclear.pipeline.core.scene import units
+from flexclear.pipeline.core.scene.fields import Inertia, Pose, Position
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.units import any_quantity, quantity, unit
+from flexclear.pipeline.core.scene.units import UNITS, any_quantity, quantity, unit
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.structure.fe.beam_recipe import NodeFrame
 from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame
-
-HEAD = """title = "words"
-[time]
-end = 1.0
-[body.g]
-type = "ground"
-frames.O = {}
-[body.a]
-type = "rigid"
-mass = 1.0
-inertia = [1.0, 1.0, 1.0]
-frames.O = {}
-"""
-SOCKET = """[joint.c]
-type = "clearance-spherical"
-between = ["g.O", "a.O"]
-clearance = "1 mm"
-ball_radius = "10 mm"
-normal = { law = "hertz", stiffness = 1e8 }
-friction = { WORDS }
-"""
-BEAM = """[body.f]
-type = "flexible"
-mesh = "rod.toml"
-modes = { reference = "craig-bampton", WORDS }
-"""
-
-
-def mistakes(tmp_path: Path, text: str) -> list[str]:
-    """What is said of a scene with this text, one entry per mistake."""
-    path = tmp_path / "scene.toml"
-    path.write_text(HEAD + text)
-    with pytest.raises(InputError) as refusal:
-        load_scene(path)
-    return [str(e) for e in getattr(refusal.value, "errors", [refusal.value])]
-
-
-COULOMB = 'law = "modified-coulomb", static = 0.2, dynamic = 0.1, v_static = 1e-4, v_dynamic = 1e-3'
-SAID = {
-    SOCKET.replace("WORDS", "static = 0.2"): ("[joint.c.friction.law]", "is missing", "modified-coulomb, ambrosio"),
-    SOCKET.replace("WORDS", COULOMB.replace("1e-4", "0")): (
-        "[joint.c.friction.v_static]",
-        "must be greater than 0 (got 0)",
-    ),
-    SOCKET.replace("WORDS", 'law = "ambrosio", dynamic = 0.1, v0 = 1.0, v1 = 0.5'): (
-        "v0 must be below v1",
-        "v0 = 1 m/s, v1 = 0.5 m/s",
-    ),
-    BEAM.replace("WORDS", 'count = "al"'): ("[body.f.modes.count]", "expected a whole number or 'all' (got 'al')"),
-    BEAM.replace("WORDS", "count = 1") + "damping = -1": ("[body.f.damping]", "must be greater than 0 (got -1)"),
-}
-
-
-@pytest.mark.parametrize("text", SAID)
-def test_one_error_is_reported_once_with_key_and_rule(tmp_path: Path, text: str) -> None:
-    (said,) = mistakes(tmp_path, text)
-    for words in SAID[text]:
-        assert words in said
-
-
-@pytest.mark.parametrize(
-    "written, mended",
-    [
-        ("mass = 0.5 kg", 'mass = "0.5 kg"'),
-        ("mass = 0.5kg # light", 'mass = "0.5 kg" # light'),
-        ("inertia = [1e-3 kg m^2, 1.0, 2 g cm^2]", 'inertia = ["1e-3 kg m^2", 1.0, "2 g cm^2"]'),
-        ('f = { x = "1 mm", y = 3 µm }', 'f = { x = "1 mm", y = "3 µm" }'),
-        ("phase = 30 deg", 'phase = "30 deg"'),
-    ],
-)
-def test_a_quantity_without_quotation_marks_is_reported_with_its_line_corrected(
-    tmp_path: Path, written: str, mended: str
-) -> None:
-    (said,) = mistakes(tmp_path, f'[body.b]\ntype = "rigid"\n{written}\n')
-    line = HEAD.count("\n") + 3
-    assert f"scene.toml, line {line}: is not TOML: a quantity with a unit needs quotation marks" in said
-    assert f"write {mended}" in said
-
-
-def test_a_line_that_holds_no_quantity_is_left_to_the_reader_of_toml(tmp_path: Path) -> None:
-    (said,) = mistakes(tmp_path, "[body.b\n")
-    assert "with a unit" not in said
-    assert "is not TOML" in said
 
 
 @pytest.mark.parametrize(
@@ -156,6 +75,60 @@ def test_a_unit_in_the_wrong_place_is_known(text: str, named: str) -> None:
 
 def test_nanometres_are_no_newton_metres() -> None:
     assert (unit("nm"), unit("Nm")) == ((1e-9, "length"), (1.0, "torque"))
+
+
+BASE = """
+title = "sound"
+time.end = "1 s"
+[body.ground]
+type = "ground"
+frames.O = {}
+[body.crank]
+type = "rigid"
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+frames.A = {}
+frames.P = { position = [0.3, 0.0, 0.0] }
+[joint.A]
+type = "revolute"
+between = ["ground.O", "crank.A"]
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "scene.toml"
+
+
+@pytest.mark.parametrize("content", [bytes(range(256)), BASE.encode("utf-16")], ids=["bytes", "UTF-16"])
+def test_files_that_are_no_text_are_refused(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="is not text in UTF-8"):
+        load_scene(path)
+
+
+def test_a_byte_order_mark_is_no_mistake(path: Path) -> None:
+    path.write_bytes(b"\xef\xbb\xbf" + BASE.replace("\n", "\r\n").encode())
+    assert load_scene(path).title == "sound"
+
+
+def test_fixed_joints_that_do_not_fit_together_are_refused(path: Path) -> None:
+    body = '[body.x]\ntype = "rigid"\nmass = 1.0\ninertia = [1, 1, 1]\nframes.b.position = [0.1, 0, 0]\nframes.a = {}'
+    welds = '[joint.w{}]\ntype = "fixed"\nbetween = ["crank.{}", "x.{}"]\n'
+    path.write_text(f"{BASE}{body}\n{welds.format(1, 'P', 'a')}{welds.format(2, 'A', 'b')}")
+    with pytest.raises(InputError, match=r"\[joint.w2.between\].*0.4 m and 0 deg apart"):
+        build(load_scene(path), {})
+
+
+def test_one_step_and_one_value_need_no_list(path: Path) -> None:
+    ten = '{ type = "constant", value = "10 deg" }'
+    step = '{ type = "step", start = 0, end = "1 s", change = "30 deg" }'
+    listed = '{ type = "step", start = [0], end = ["1 s"], change = ["30 deg"] }'
+    drives = []
+    for laws in (f'"10 deg", {step}', f"{ten}, {listed}"):
+        path.write_text(BASE + f'[drive.d]\njoint = "A"\nlaw = {{ type = "sum", laws = [{laws}] }}\n')
+        drives.append(load_scene(path).drive)
+    assert drives[0] == drives[1]
 
 
 DIRECTIONS = [
@@ -230,3 +203,45 @@ def test_a_quantity_whose_dimension_is_known_later_is_read_twice_alike(text: str
     once = any_quantity(text)
     assert isinstance(once, str)
     assert any_quantity(once) == once
+
+
+@pytest.mark.parametrize("moments", [(0.0, 1e-5, 1e-5), (1e-5, 1e-5, 2e-5), (1e-5, 2e-5, 2.5e-5)])
+def test_an_inertia_that_was_turned_elsewhere_is_read(moments: tuple[float, ...]) -> None:
+    """Turning leaves roundings: entries of 1e-53, zero moments below zero, sides that differ in the last digits."""
+    read = TypeAdapter(Inertia).validate_python
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        turn = rotation_vector_to_matrix(random.normal(size=3))
+        quarter = rotation_vector_to_matrix(0.5 * np.pi * random.integers(-1, 2, size=3))
+        for R in (turn, quarter, quarter @ quarter):
+            given = (R @ (np.diag(moments) @ R.T)) * (1.0 + 1e-16 * random.normal(size=(3, 3)))
+            found = np.array(read(given.tolist()))
+            assert np.array_equal(found, found.T)
+            # what is read is the symmetric part: half of the rounding of two products of matrices, and of the noise
+            assert np.abs(found - given).max() <= 1e-14 * max(moments)
+    with pytest.raises(ValidationError, match="symmetric"):
+        read((given + 1e-9 * max(moments) * np.eye(3, k=1)).tolist())
+    with pytest.raises(ValidationError, match="belong to no body"):
+        read([-1e-9 * max(moments), *moments[1:]])
+
+
+def test_a_vectors_size_counts_and_not_its_components() -> None:
+    """What turning leaves of a zero is no mistake; a vector that is too small as a whole is one."""
+    assert TypeAdapter(Position).validate_python(["0.3 m", 1.8e-17 * 1.8e-17 * 1.8e-17, 0.0]) == (0.3, 5.832e-51, 0.0)
+    for vector in ([1e-60, 0.0, 1e-70], [0.0, 1e60, 1.0]):
+        with pytest.raises(ValidationError, match="beyond what can be computed with"):
+            TypeAdapter(Position).validate_python(vector)
+
+
+def test_listed_units_are_the_products_that_they_look_like(monkeypatch: pytest.MonkeyPatch) -> None:
+    for text in [text for text in UNITS if not text.isalpha() and text != "%"]:
+        listed = UNITS[text]
+        with monkeypatch.context() as without:
+            without.setattr(
+                units, "UNITS", {name: one for name, one in UNITS.items() if name != text}
+            )  # order is shown
+            unit.cache_clear()
+            found = unit(text)
+        assert found is not None, text
+        assert found == (pytest.approx(listed[0], rel=1e-14), listed[1]), text
+    unit.cache_clear()

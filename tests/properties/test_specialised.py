@@ -13,7 +13,6 @@ from llvmlite import ir
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import repeat
@@ -225,30 +224,6 @@ def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
     assert one.h[m.RATES] == one.h[m.EVALUATE]
     one.keep(kept)
     assert one.h[m.RATES] == straight
-
-
-def source(scene: Scene) -> str:
-    model = tabulate(build(scene, {}))
-    return sources.straight(model.parts, wiring(model.arrays, model.arrays.h))
-
-
-@pytest.mark.parametrize(
-    "place, value",
-    [("joint.A1.clearance", 2e-4), ("body.platform.mass", 3.0), ("load.gravity.acceleration", [0, 1, 2])],
-)
-def test_no_number_is_in_the_code(place: str, value: Any) -> None:
-    scene = load_scene(TREE / "scenes/sps4/csj.toml")
-    known = place.split(".")[1] in getattr(scene, place.split(".")[0])
-    assert not known or source(edited(scene, {place: value})) == source(scene)
-
-
-def test_laws_of_time_and_integrators_are_not_in_the_code() -> None:
-    scene = load_scene(TREE / "scenes/sps4/csj.toml")
-    law = {"type": "spline", "time": [0.0, 0.05, 0.1, 0.18], "value": [0.0, 0.01, 0.02, 0.0]}
-    drive = next(iter(scene.drive))
-    other = edited(scene, {f"drive.{drive}.law": law, "solver.integrator": "radau", "time.end": 0.1})
-    assert source(other) == source(scene)
-    assert source(load_scene(TREE / "scenes/sps4/ideal.toml")) != source(scene)
 
 
 @pytest.mark.parametrize("lanes", [1, 4])

@@ -13,11 +13,9 @@ import json
 
 import numpy as np
 
-from tests.reference import clearance_run, sps4
-from tests.reference.clearance_contact import Touch, press
-from tests.reference.clearance_platform import Setting, platform_motion, setting, socket_acceleration
-from tests.reference.ideal_motion import Motion, cross
-from tests.reference.inverse_dynamics import leg_inertia
+from tests.reference import clearance, sps4
+from tests.reference.clearance import Setting, Touch, platform_motion, press, setting, socket_acceleration
+from tests.reference.ideal_motion import Motion, cross, leg_inertia
 
 Array = np.ndarray
 #: moment of inertia of a leg about its axis [kg m^2]
@@ -36,7 +34,7 @@ def start() -> Array:
     return np.concatenate([[sps4.FIRST.length, 0.0], d / np.sqrt(d @ d), np.zeros(4)])
 
 
-def mechanism(s: Setting) -> clearance_run.Mechanism:
+def mechanism(s: Setting) -> clearance.Mechanism:
     """The mechanism as functions of time and state."""
 
     def platform(t: float, side: int, y: Array) -> Motion:
@@ -51,7 +49,7 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
     def touch(t: float, side: int, y: Array, latched: float | None) -> Touch:
         return pressed(t, side, y, platform(t, side, y), latched)
 
-    def rhs(side: int, latched: float | None) -> clearance_run.RightHandSide:
+    def rhs(side: int, latched: float | None) -> clearance.RightHandSide:
         def derivative(t: float, y: Array) -> Array:
             m = platform(t, side, y)
             now = pressed(t, side, y, m, latched)
@@ -71,16 +69,16 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
 
         return derivative
 
-    return clearance_run.Mechanism(start(), rhs, touch, platform, s.contact.floor)
+    return clearance.Mechanism(start(), rhs, touch, platform, s.contact.floor)
 
 
-def simulate(until: float = 0.18, rtol: float = 1e-11) -> clearance_run.Result:
+def simulate(until: float = 0.18, rtol: float = 1e-11) -> clearance.Result:
     """The paper's scene: weightless, baseline platform."""
-    return clearance_run.simulate(mechanism(setting()), until, clearance_run.Tolerance(rtol=rtol))
+    return clearance.simulate(mechanism(setting()), until, clearance.Tolerance(rtol=rtol))
 
 
 if __name__ == "__main__":
     # python -m tests.reference.clearance_simulation > tests/reference/csj.json (two to three minutes)
     result = simulate(rtol=1e-12)
     spin = {"spin": result.state[::10, 8].tolist()}
-    print(json.dumps(clearance_run.table(result) | spin, indent=1))
+    print(json.dumps(clearance.table(result) | spin, indent=1))

@@ -1,4 +1,4 @@
-r"""What a free impact, a bounce and a ball in its socket must do, in closed form or in one dimension.
+r"""What a free impact and a bounce must do, in closed form or in one dimension.
 
 Free impact of a mass m: :math:`m\ddot\delta = -K\delta^n(1 + a\dot\delta/\dot\delta_0)`.  With
 :math:`w=\dot\delta/\dot\delta_0` the depth separates from the speed, so that the rebound
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from scipy.special import beta, ellipk
+from scipy.special import beta
 
 
 def modified_coulomb(speed: float, static: float, dynamic: float, v_static: float, v_dynamic: float) -> float:
@@ -95,19 +95,3 @@ def bounces(
         found.append(Bounce(t, t + float(run.t[-1]), approach, speed, float(run.y_events[1][0][0])))
         t += float(run.t[-1]) + 2.0 * speed / gravity
     return found
-
-
-def resting_depth(mass: float, stiffness: float, gravity: float, exponent: float = 1.5) -> float:
-    """Penetration [m] of a ball resting under its weight."""
-    return float((mass * gravity / stiffness) ** (1.0 / exponent))
-
-
-def vertical_frequency(mass: float, stiffness: float, gravity: float, exponent: float = 1.5) -> float:
-    """Frequency [Hz] of small vertical vibrations about rest: contact stiffness n K d^(n-1)."""
-    depth = resting_depth(mass, stiffness, gravity, exponent)
-    return math.sqrt(exponent * stiffness * depth ** (exponent - 1.0) / mass) / (2.0 * math.pi)
-
-
-def swing_period(clearance: float, depth: float, gravity: float, amplitude: float) -> float:
-    """Period [s] of a swing of any amplitude [rad] on a smooth floor so stiff that `depth` hardly changes."""
-    return float(4.0 * math.sqrt((clearance + depth) / gravity) * ellipk(math.sin(amplitude / 2.0) ** 2))

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from tests.reference import sps4
-from tests.reference.clearance_platform import GRID, Setting, demand, platform_motion, setting
+from tests.reference.clearance import GRID, Setting, demand, platform_motion, setting
 from tests.reference.flexible_simulation import STEM, Leg, ball_turn, carried, equations, leg, read, start, state_rate
 from tests.reference.ideal_motion import Motion, cross, motion_at, skew
 

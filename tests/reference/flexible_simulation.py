@@ -8,7 +8,7 @@ Frame of leg 1: origin B1, z along the cylinder.  A point of the rod is at
 
 Summed with the masses against the speeds of the points (Kane), with the lower bodies turning with
 the frame and the upper ball on the rod's end, this gives the 3 + n equations of the leg; the
-platform is `clearance_platform`.
+platform is `clearance`.
 """
 
 import json
@@ -16,9 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.reference import clearance_run, sps4
-from tests.reference.clearance_contact import Touch, press
-from tests.reference.clearance_platform import Setting, platform_motion, setting, socket_acceleration
+from tests.reference import clearance, sps4
+from tests.reference.clearance import Setting, Touch, platform_motion, press, setting, socket_acceleration
 from tests.reference.ideal_motion import Motion, cross, exponential, skew
 from tests.reference.rod_basis import LENGTH, Rod, rod
 
@@ -178,7 +177,7 @@ def start(n: int) -> Array:
     return np.concatenate([[sps4.FIRST.length, 0.0, w], v, np.zeros(3 + 2 * n)])
 
 
-def mechanism(s: Setting) -> clearance_run.Mechanism:
+def mechanism(s: Setting) -> clearance.Mechanism:
     """The mechanism as functions of time and state."""
     one = leg()
     n = one.shapes.shape[1]
@@ -195,7 +194,7 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
         turn = ball_turn(one, x)
         return pressed(x, turn, carried(one, x, turn, STEM), platform(t, side, y), latched)
 
-    def rhs(side: int, latched: float | None) -> clearance_run.RightHandSide:
+    def rhs(side: int, latched: float | None) -> clearance.RightHandSide:
         def derivative(t: float, y: Array) -> Array:
             x, m = read(n, t, side, y), platform(t, side, y)
             turn = ball_turn(one, x)
@@ -209,15 +208,15 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
 
         return derivative
 
-    return clearance_run.Mechanism(start(n), rhs, touch, platform, s.contact.floor)
+    return clearance.Mechanism(start(n), rhs, touch, platform, s.contact.floor)
 
 
-def simulate(until: float, rtol: float = 1e-11) -> clearance_run.Result:
+def simulate(until: float, rtol: float = 1e-11) -> clearance.Result:
     """The paper's scene with the flexible rod, up to `until` [s]; chaotic beyond some tens of milliseconds."""
-    tolerance = clearance_run.Tolerance(rtol=rtol, atol=1e-15, flight=5e-5, contact=5e-6)
-    return clearance_run.simulate(mechanism(setting()), until, tolerance)
+    tolerance = clearance.Tolerance(rtol=rtol, atol=1e-15, flight=5e-5, contact=5e-6)
+    return clearance.simulate(mechanism(setting()), until, tolerance)
 
 
 if __name__ == "__main__":
     # python -m tests.reference.flexible_simulation > tests/reference/far_csj_cb.json (some minutes)
-    print(json.dumps(clearance_run.table(simulate(0.02), every=5), indent=1))
+    print(json.dumps(clearance.table(simulate(0.02), every=5), indent=1))

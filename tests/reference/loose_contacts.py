@@ -10,8 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.reference.contact_solutions import modified_coulomb
-from tests.reference.loose_bodies import SIZE, LooseBodies, cross
-from tests.reference.scene_text import Array, Frame, read, si
+from tests.reference.loose_bodies import SIZE, Array, Frame, LooseBodies, cross, read, si
 
 #: factor a of F = K d^n (1 + a d'/d'0) for a coefficient of restitution c
 FACTORS: dict[str, Callable[[float], float]] = {
@@ -157,7 +156,7 @@ def simulate(path: Path, end: float, count: int, rtol: float = 1e-11) -> list[Im
 
     while sum(not math.isnan(i.end) for i in found) < count:
         # steps short enough for no contact to begin and end in one
-        longest = end / (4000.0 if closed else 400.0)
+        longest = end / (2000.0 if closed else 200.0)
         tight = {"rtol": rtol, "atol": 1e-14, "max_step": longest}
         run = solve_ivp(rhs, (t, end), y, "DOP853", events=[gap_of(c) for c in contacts], **tight)
         t, y = float(run.t[-1]), run.y[:, -1]

@@ -5,14 +5,13 @@ found by repeating the linear solution with the reactions of the one before unti
 coefficients are small enough for that. Integrations end where friction bends, so that the motion is known to 1e-12.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from tests.reference.contact_solutions import modified_coulomb
+from tests.reference.kinks import from_kink_to_kink
 
 G = 9.81
 LAWS = {"static": 0.2, "dynamic": 0.15, "v_static": 5e-3, "v_dynamic": 1.5e-2}
@@ -83,7 +82,8 @@ class Crank:
             a, _, _, power = _solve(state[:9], state[9:18])
             return np.concatenate([state[9:18], a, [power]])
 
-        state = _from_kink_to_kink(rates, np.array([*y, *v, 0.0]), times)
+        looser = {"rtol": 3e-13, "atol": 1e-15, "max_step": 1e-3}
+        state = from_kink_to_kink(rates, _bends, np.array([*y, *v, 0.0]), times, **looser)
         loads = np.array([_solve(s[:9], s[9:18])[2] for s in state.T]).T
         return Known(state[2], state[15], loads, float(state[18, -1]))
 
@@ -96,26 +96,6 @@ def _bends(state: np.ndarray) -> np.ndarray:
     ends = [0.5 * force[6] + side * force[7] / SIZES.guide for side in (-1.0, 1.0)]
     levels = [s * LAWS[name] for name in ("v_static", "v_dynamic") for s in (-1.0, 1.0)]
     return np.array([*(slip - level for slip in slips for level in levels), *ends])
-
-
-def _from_kink_to_kink(rates: Callable, y: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """States at these times, shape (state, time), from integrations that begin and end on kinks of friction."""
-    events = [lambda t, y, k=k: _bends(y)[k] for k in range(len(_bends(y)))]
-    found, t, here = np.empty((len(y), len(times))), times[0], -1
-    while t < times[-1]:
-        for k, event in enumerate(events):
-            event.terminal = k != here  # type: ignore[attr-defined]  # none comes twice in a row
-        part = solve_ivp(
-            rates, (t, times[-1]), y, "DOP853", events=events, dense_output=True, rtol=3e-13, atol=1e-15, max_step=1e-3
-        )
-        for k in np.flatnonzero((times >= t) & (times <= part.t[-1])):
-            found[:, k] = part.sol(times[k])
-        t, y, here = (
-            part.t[-1],
-            part.y[:, -1],
-            next((k for k, e in enumerate(part.t_events) if len(e) and k != here), -1),
-        )
-    return found
 
 
 @cache

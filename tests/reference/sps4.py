@@ -8,7 +8,7 @@ it, with which the second derivations of clearance and flexibility were run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -129,10 +129,6 @@ class Contact:
     def hysteresis(self) -> float:
         """Factor of d'/d'0 in eq. (25)."""
         return 0.75 * (1.0 - self.restitution**2)
-
-    def changed(self, **values: float) -> Contact:
-        """A copy with other values."""
-        return replace(self, **values)
 
 
 STROKE = 0.06

@@ -164,10 +164,14 @@ class Project:
         path.touch()
         return path
 
+    def began(self) -> bool:
+        """Whether an engine was called since."""
+        return (self.folder / "calls").exists()
+
     def calls(self) -> list[str]:
         """What the engines did since this was asked last."""
         path = self.folder / "calls"
-        lines = path.read_text().splitlines() if path.exists() else []
+        lines = path.read_text().splitlines() if self.began() else []
         path.unlink(missing_ok=True)
         return lines
 

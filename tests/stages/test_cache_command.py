@@ -1,12 +1,14 @@
 """``flexclear cache``: tells what is kept and whether it is whole, and removes nothing that is shown or needed."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 import flexclear as fc
 from flexclear.commands import cache, why
+from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.artifacts.disk import checked
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.system import machine
@@ -116,11 +118,11 @@ def test_results_of_another_processor_are_reported_and_are_fresh():
         Record("simulate", "a" * 32, {"nc": "b"}, {}, {}, facts)
         for facts in (here, {**here, "NUMBA_CPU_NAME": "generic"})
     )
-    assert why.elsewhere("simulate", of_here) == []
-    (note,) = why.elsewhere("simulate", of_others)
+    assert why.notes("simulate", of_here) == []
+    (note,) = why.notes("simulate", of_others)
     assert note.endswith("numbers differ by rounding: NUMBA_CPU_NAME generic, here (none)")
     # records of before have none
-    assert why.elsewhere("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
+    assert why.notes("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
 
 
 # Files that are shown below results/runs ----------------------------------------------------------------------------
@@ -128,9 +130,20 @@ def test_results_of_another_processor_are_reported_and_are_fresh():
 SCENE = "checks/pendulum"
 
 
+@pytest.fixture(scope="module")
+def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a run."""
+    made = tmp_path_factory.mktemp("made") / "results"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FLEXCLEAR_RESULTS", str(made))
+        assert main(["run", SCENE, "-q", "--jobs", "1"]) == 0
+    return made
+
+
 @pytest.fixture
-def shown(fresh: Path, command: Command) -> Path:
-    command("run", SCENE, "-q", "--jobs", "1")
+def shown(pendulum: Path, fresh: Path) -> Path:
+    """The run, in a copy of its results."""
+    shutil.copytree(pendulum, fresh)
     return fresh / "runs" / SCENE / "run.nc"
 
 

@@ -9,28 +9,16 @@ from flexclear.commands.__main__ import parser
 from flexclear.stages.graph import STAGES
 from tests.stages.conftest import JOINT, SCENE, Command
 
-WRONG = {
-    "unknown key": (SCENE + JOINT + "\n[body.ball.colour]\nred = 1\n", ["body.ball", "colour", "unknown key"]),
-    "replaces nothing": (
-        'extends = "ideal.toml"\ntitle = "a"\n[replace.joint.K]\ntype = "fixed"\n',
-        ["replace.joint.K", "no joint called 'K'"],
-    ),
-}
-
 
 @pytest.mark.parametrize("verb", ["run", "why"])
-@pytest.mark.parametrize("text, reported", WRONG.values(), ids=WRONG.keys())
-def test_wrong_scenes_are_refused_before_anything_runs(
-    command: Command, tmp_path: Path, verb: str, text: str, reported: list[str]
-):
-    (tmp_path / "ideal.toml").write_text(SCENE + JOINT)
+def test_wrong_scenes_are_refused_before_anything_runs(command: Command, tmp_path: Path, verb: str):
     path = tmp_path / "scene.toml"
-    path.write_text(text)
+    path.write_text(SCENE + JOINT + "\n[body.ball.colour]\nred = 1\n")
     said = command(verb, path, code=2)
     assert said.out == ""
     assert said.err.startswith("flexclear: ")
     assert "Traceback" not in said.err
-    for part in reported:
+    for part in ("body.ball", "colour", "unknown key"):
         assert part in said.err
 
 

@@ -21,7 +21,7 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.dynamics.compile import compiler_process, folder, functions
-from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, loaded, take
+from flexclear.pipeline.dynamics.compile.files import compiled, file_lock, load_file, load_files, loaded
 from tests.stages.conftest import PATIENCE
 
 SOURCE = """from numba import cfunc
@@ -36,8 +36,8 @@ def add(x):
 #: holds the lock of a file, says so, and stays
 HOLDER = """import sys, time
 from pathlib import Path
-from flexclear.pipeline.dynamics.compile.files import claimed
-with claimed(Path(sys.argv[1]), wait=True):
+from flexclear.pipeline.dynamics.compile.files import file_lock
+with file_lock(Path(sys.argv[1]), wait=True):
     print("held", flush=True)
     time.sleep(600.0)
 """
@@ -70,9 +70,9 @@ def results(files: list[Path]) -> list[int]:
 
 def test_what_a_thread_has_loaded_stays_where_it_is_when_another_loads_it_too(files: list[Path]) -> None:
     """It may be running; a run and its twin that are both handed over fetch the same."""
-    bring(files[:1], lambda _: None)
+    load_files(files[:1], lambda _: None)
     first = loaded[files[0].stem]
-    assert take(files[0], nothing)
+    assert load_file(files[0], nothing)
     assert loaded[files[0].stem] is first
 
 
@@ -81,14 +81,14 @@ def test_a_second_process_leaves_the_code_on_disk(files: list[Path]) -> None:
         assert process is not None
         assert process.wait(timeout=PATIENCE) == 0
         assert all(compiled(path) for path in files)
-        bring(files, nothing)
+        load_files(files, nothing)
     assert results(files) == [10, 11, 12]
 
 
 def test_what_a_second_process_is_compiling_is_left_to_it(files: list[Path], root: Path) -> None:
     """And when it dies over it, or is killed, compiled here after all, last."""
     with held(files[0], root) as holder:
-        assert not take(files[0], nothing)
+        assert not load_file(files[0], nothing)
         reported: list[Path] = []
 
         def tell(path: Path) -> None:
@@ -96,7 +96,7 @@ def test_what_a_second_process_is_compiling_is_left_to_it(files: list[Path], roo
             if path == files[0]:
                 threading.Timer(0.2, holder.kill).start()
 
-        bring(files, tell)
+        load_files(files, tell)
     assert reported == [files[1], files[2], files[0]]
     assert results(files) == [10, 11, 12]
 
@@ -122,15 +122,22 @@ def test_a_second_process_that_fails_is_not_missed(
     with compiler_process.second_process(files) as process:
         assert process is not None
         assert process.wait(timeout=PATIENCE) != 0
-        bring(files, reported.append)
+        load_files(files, reported.append)
     assert reported == files
     assert results(files) == [10, 11, 12]
 
 
-def test_a_machine_that_starts_no_process_does_without(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "executable", str(files[0].parent / "not there"))
-    with compiler_process.second_process(files) as process:
+def test_one_file_one_core_or_no_process_to_be_had_need_no_second_process(
+    files: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with compiler_process.second_process(files[:1]) as process:
         assert process is None
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "executable", str(files[0].parent / "not there"))
+        with compiler_process.second_process(files) as process:
+            assert process is None
+    monkeypatch.setattr(cores, "cores", lambda: 1)
+    assert not compiler_process.requested()
 
 
 def test_an_interrupt_ends_the_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,13 +168,6 @@ def test_there_is_one_second_process_for_a_folder(files: list[Path], monkeypatch
         assert second is None
     with compiler_process.second_process(files) as third:
         assert third is not None
-
-
-def test_one_file_and_one_core_need_no_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    with compiler_process.second_process(files[:1]) as process:
-        assert process is None
-    monkeypatch.setattr(cores, "cores", lambda: 1)
-    assert not compiler_process.requested()
 
 
 def test_workers_have_no_second_process() -> None:
@@ -202,7 +202,7 @@ def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path: Path, mon
     reported: list[str] = []
     path = functions._file(folder.writable(kernel_root(), reported.append), "test", SOURCE.format(k=3))
     assert "cannot be kept" in reported[0]
-    with claimed(path, wait=True):
-        assert not take(path, nothing)
-    assert take(path, lambda _: None)
+    with file_lock(path, wait=True):
+        assert not load_file(path, nothing)
+    assert load_file(path, lambda _: None)
     assert results([path]) == [13]

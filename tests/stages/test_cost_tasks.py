@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,16 +13,21 @@ import xarray as xr
 
 from flexclear.commands import cost, cost_design, scenes
 from flexclear.commands.cost_design import Setting
+from flexclear.commands.new import KINDS, write
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.post.cost.answer import sentences
-from flexclear.stages.workplace import Workplace
+from flexclear.stages import simulation
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Workplace, open_workplace
 from tests.stages.conftest import Command
 
 OWN = Setting("dop853", 1e-6)
@@ -186,3 +193,59 @@ def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path
 
 def test_a_budget_that_is_no_time_is_refused(command: Command):
     assert "--budget soon" in command("cost", "checks/pendulum", "--budget", "soon", code=2).err
+
+
+# What accuracy costs, for each template: how soon there is an answer, and whether its errors are right ----------------
+
+
+#: of two processors in 30 s and in two minutes [s]; compiling is included
+FIRST, ALL = 60.0, 240.0
+#: a tolerance tighter by so much makes the reference of the other method converged next to the scene's own run
+TIGHTER, TIGHTEST = 1e-3, 1e-13
+#: what the study's errors may be wrong by: they are maxima over a few hundred outputs, which both runs share
+FACTOR = 2.0
+#: smaller errors are rounding, which the closures of the mechanisms magnify
+ROUNDING = 1e-11
+
+
+def _spent() -> float:
+    """Processor time of this process and of those that it started and that have ended [s]."""
+    return sum(os.times()[:4])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_the_first_answer_comes_soon_and_its_errors_are_those_of_a_converged_run_of_another_method(
+    kind: str, tmp_path: Path, fresh: Path
+):
+    scene, workplace = load_scene(write(kind, tmp_path)[0]), open_workplace()
+    workplace = Workplace(workplace.store, workplace.sources, jobs=1)
+    begun, first = _spent(), list[float]()
+    study = cost.bring(scene, workplace, answered=lambda made: first.append(_spent() - begun)).dataset()
+    print(f"{kind}: first answer after {first[0]:.1f} s of processor time, done after {_spent() - begun:.1f} s")
+    assert first[0] <= FIRST
+    assert _spent() - begun <= ALL
+
+    own, rtol = str(study.attrs["own_integrator"]), float(study.attrs["own_rtol"])
+    other = {"integrator": "dop853" if own != "dop853" else "dopri5", "rtol": max(TIGHTER * rtol, TIGHTEST)}
+    mine, reference = (_run(scene, workplace, solver) for solver in ({"integrator": own, "rtol": rtol}, other))
+    until = study.attrs["horizon"] if study.attrs["horizon"] != "none" else np.inf
+    chosen = scene.requested() if scene.accuracy is not None else scene.watched()
+    for q in chosen:
+        if not q.over_time:
+            continue
+        reported = float(study["own_error"].sel(quantity=q.name))
+        true = quantities.error(mine, reference, q, until) / (quantities.scale(reference, q) or 1.0)
+        print(f"{kind} {q.name}: error {reported:.2e}, by {other['integrator']} {true:.2e}")
+        assert reported <= FACTOR * true + ROUNDING
+        assert true <= FACTOR * reported + ROUNDING
+
+
+def _run(scene: Scene, workplace: Workplace, solver: dict[str, Any]) -> xr.Dataset:
+    """The scene's run by a method, without a horizon of its own."""
+    variant = edited(scene, {"solver": solver, "accuracy": None, "ensemble": None})
+    bodies = Graph(variant, shown=False).bodies()
+    outcome = workplace.bring(list(bodies.values()))
+    inputs = {name: workplace.store.load(outcome.records[task]) for name, task in bodies.items()}
+    filled = simulation.rebuild(simulation.params(variant), inputs)
+    return dynamics.simulate(filled, simulation.bundles(inputs), silent)

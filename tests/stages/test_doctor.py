@@ -69,17 +69,14 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> 
     assert code() == before
 
 
-def test_a_wrong_scene_is_refused_before_anything_is_compiled(tmp_path: Path, command: Command) -> None:
-    assert "none.toml" in command("doctor", "--compile", tmp_path / "none.toml", code=2).err
-
-
 @pytest.mark.parametrize(
     "options, words",
     [
         (("--bundle", "four_bar", "--out", "x.csv"), "'.csv' is no known format"),
         (("--bundle", "four_bar", "--out", "none/x.zip"), "its folder does not exist"),
         (("--out", "x.zip"), "--bundle writes, which is not given"),
+        (("--compile", "nowhere/none.toml"), "none.toml"),
     ],
 )
-def test_out_is_a_bundle_or_refused(options: tuple[str, ...], words: str, command: Command) -> None:
+def test_what_the_doctor_cannot_do_is_refused_at_once(options: tuple[str, ...], words: str, command: Command) -> None:
     assert words in command("doctor", *options, code=2).err

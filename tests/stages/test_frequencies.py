@@ -14,12 +14,8 @@ from flexclear.stages.graph import Graph
 from tests.stages.conftest import Command
 
 
-def path_of(root: Path, name: str) -> Path:
-    return root / "scenes" / "checks" / f"{name}.toml"
-
-
-def test_the_command_prints_pose_residual_and_mobility_then_the_table(root: Path, command: Command) -> None:
-    lines = command("frequencies", str(path_of(root, "pendulum")), "--at", "500 ms").out.splitlines()
+def test_the_command_prints_pose_residual_and_mobility_then_the_table(command: Command) -> None:
+    lines = command("frequencies", "checks/pendulum", "--at", "500 ms").out.splitlines()
     assert lines[0] == "checks/pendulum at t = 0.5 s, drives held"
     assert lines[1].startswith("equilibrium: largest unbalanced force")
     assert lines[2] == "free motions besides the drives: 1"
@@ -47,30 +43,30 @@ def test_redundant_closures_are_reported_where_reactions_depend_on_them() -> Non
 @pytest.mark.parametrize(
     "at, said", [("3 kg", "'3 kg' is a mass"), ("soon", "not a number with a unit"), ("11", "0 to 10 s")]
 )
-def test_a_wrong_time_is_refused(root: Path, command: Command, at: str, said: str) -> None:
-    assert said in command("frequencies", str(path_of(root, "pendulum")), "--at", at, code=2).err
+def test_a_wrong_time_is_refused(command: Command, at: str, said: str) -> None:
+    assert said in command("frequencies", "checks/pendulum", "--at", at, code=2).err
 
 
-def test_an_unknown_drive_is_refused(root: Path) -> None:
+def test_an_unknown_drive_is_refused() -> None:
     with pytest.raises(FlexclearError, match="there is no such drive") as caught:
-        fc.equilibrium(path_of(root, "pendulum"), drives={"motor": 0.1})
+        fc.equilibrium("checks/pendulum", drives={"motor": 0.1})
     assert caught.value.exit_code == InputError.exit_code
 
 
-def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean(root: Path) -> None:
-    first, again = (fc.equilibrium(path_of(root, "pendulum")) for _ in range(2))
+def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean() -> None:
+    first, again = (fc.equilibrium("checks/pendulum") for _ in range(2))
     assert first.identical(again)
     assert "frequency" not in first
     assert first.attrs["Conventions"].startswith("CF-")
     assert first.position.attrs["units"] == "m"
-    both = fc.frequencies(path_of(root, "pendulum"))
+    both = fc.frequencies("checks/pendulum")
     assert both.frequency.attrs["units"] == "Hz"
     assert both.position.values == pytest.approx(first.position.values, abs=1e-14)
 
 
-def test_only_what_matters_is_in_the_key(root: Path) -> None:
+def test_only_what_matters_is_in_the_key() -> None:
     """How often a run is recorded does not move an equilibrium; where it is looked at does."""
-    graphs = [Graph(load_scene(path_of(root, "pendulum"), o)) for o in ({}, {"output.interval": 0.1})]
+    graphs = [Graph(load_scene(Path("scenes/checks/pendulum.toml"), o)) for o in ({}, {"output.interval": 0.1})]
     usual, coarser = (g.linear(0.5).params for g in graphs)
     assert usual == coarser
     assert usual != graphs[0].linear(0.6).params

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import pkgutil
 from collections.abc import Callable
-from functools import partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.post.overview import comparison
 from flexclear.pipeline.post.single_run.series import derive
 from tests.analytic.integrator_scenes import double_pendulum, engine_with
+from tests.analytic.mechanism_runs import TREE
 
 #: evaluations between two looks, so few that a short run has many
 SLICE = 30
@@ -78,18 +79,29 @@ def interrupted(
             return found, kills
 
 
-def require_same_bits(
-    work: Callable[[], xr.Dataset], folder: Path, monkeypatch: pytest.MonkeyPatch, looks_each: int = 4, kills: int = 1
-) -> None:
-    """Work that is killed after some looks, so many times or more, gives what it gives otherwise."""
-    whole = work()
-    result, killed = interrupted(work, folder, monkeypatch, looks_each)
-    assert killed >= kills
-    assert result.identical(whole)
+def check(name: str, **changes: Any) -> Scene:
+    return edited(load_scene(TREE / "scenes" / "checks" / f"{name}.toml"), changes)
 
 
-def check(root: Path, name: str, **changes: Any) -> Scene:
-    return edited(load_scene(root / "scenes" / "checks" / f"{name}.toml"), changes)
+#: scenes whose ensemble or sections are interrupted
+ENSEMBLE = check("bounce", ensemble={"members": 4})
+SECTIONS = check(
+    "driven_pendulum", sections={"transient": 2, "periods": 20, "exponent_periods": 20}, **{"solver.rtol": 1e-10}
+)
+
+
+@cache
+def whole(of: str) -> xr.Dataset:
+    """Of work that nobody interrupts, with one thread."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cores, "cores", lambda: 1)
+        return WORK[of]()
+
+
+WORK: dict[str, Callable[[], xr.Dataset]] = {
+    "ensemble": lambda: analyses.ensemble(ENSEMBLE, {}, silent),
+    "sections": lambda: analyses.sections(SECTIONS, {}, silent),
+}
 
 
 def smooth(solver: dict[str, Any]) -> Scene:
@@ -102,17 +114,17 @@ CHANGING = {"time.end": 1.4, "solver.rtol": 1e-8}
 
 
 @pytest.mark.usefixtures("often")
-def test_what_an_engine_has_met_before_changes_no_bit(root: Path) -> None:
+def test_what_an_engine_has_met_before_changes_no_bit() -> None:
     """Sections and sweeps run again and again on one engine, and an earlier attempt may have done the first of them."""
-    engine = engine_with(check(root, "bricard", **CHANGING))
+    engine = engine_with(check("bricard", **CHANGING))
     start = consistent_start(engine)
     once, again = (trajectory.integrate(engine, start, silent) for _ in range(2))
     assert len(engine.straight.rows) == 2 or config.DISABLE_JIT
     assert np.array_equal(once.rows, again.rows)
 
 
-def test_an_engine_that_remembers_another_evaluates_for_the_same_closure_rows(root: Path) -> None:
-    first, other = (engine_with(check(root, "bricard", **CHANGING)) for _ in range(2))
+def test_an_engine_that_remembers_another_evaluates_for_the_same_closure_rows() -> None:
+    first, other = (engine_with(check("bricard", **CHANGING)) for _ in range(2))
     state = trajectory.integrate(first, consistent_start(first), silent).state[-1]
     assert not np.array_equal(first.selected, other.selected)
     pieces.remember(other, pieces.memory(first))
@@ -121,51 +133,36 @@ def test_an_engine_that_remembers_another_evaluates_for_the_same_closure_rows(ro
     assert np.array_equal(first.slope, other.slope)
 
 
+# some 140 looks at each member: three are finished before the work is killed
 @pytest.mark.usefixtures("often")
-@pytest.mark.parametrize("threads", [1, 3])
-def test_a_killed_ensemble_goes_on_to_the_same_bits(
-    threads: int, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("of, threads, looks", [("ensemble", 1, 450), ("ensemble", 3, 450), ("sections", 1, 300)])
+def test_killed_work_goes_on_to_the_same_bits(
+    of: str, threads: int, looks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Killed with so many threads at work; what nobody kills has one."""
-    scene = check(root, "bounce", ensemble={"members": 4})
-    monkeypatch.setattr(cores, "cores", lambda: 1)
-    whole = analyses.ensemble(scene, {}, silent)
+    expected = whole(of)
     monkeypatch.setattr(cores, "cores", lambda: threads)
     monkeypatch.setattr(cores, "_others_idle", True)
-    # some 140 looks at each member: three are finished before the work is killed
-    found, kills = interrupted(lambda: analyses.ensemble(scene, {}, silent), tmp_path, monkeypatch, 450)
+    found, kills = interrupted(WORK[of], tmp_path, monkeypatch, looks)
     assert kills >= 1
-    assert found.identical(whole)
-
-
-@pytest.mark.usefixtures("often")
-def test_killed_sections_go_on_to_the_same_bits(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    sections = {"transient": 2, "periods": 20, "exponent_periods": 20}
-    scene = check(root, "driven_pendulum", sections=sections, **{"solver.rtol": 1e-10})
-    require_same_bits(lambda: analyses.sections(scene, {}, silent), tmp_path, monkeypatch, 300)
+    assert found.identical(expected)
 
 
 @pytest.mark.parametrize(
     "of, part, calls",
     [
-        ("sections", "sections._Tape._motion", 9),
-        ("sections", "sections.conform", 1),
-        ("ensemble", "ensemble.conform", 1),
+        ("sections", "_Tape._motion", 9),
+        ("sections", "conform", 1),
+        ("ensemble", "conform", 1),
     ],
 )
 def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of: str, part: str, calls: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of: str, part: str, calls: int
 ) -> None:
     """Where a period is being added to the tape, and where all is there and the dataset is made."""
-    if of == "sections":
-        requested = {"transient": 2, "periods": 20, "exponent_periods": 20}
-        scene = check(root, "driven_pendulum", sections=requested, **{"solver.rtol": 1e-10})
-    else:
-        scene = check(root, "bounce", ensemble={"members": 4})
-    make, left = partial(getattr(analyses, of), scene, {}, silent), [calls]
-    whole = make()
-    owner, _, name = f"flexclear.pipeline.dynamics.record.{part}".rpartition(".")
-    proper = pkgutil.resolve_name(f"{owner}.{name}")
+    expected, left = whole(of), [calls]
+    place = f"flexclear.pipeline.dynamics.record.{of}.{part}"
+    proper = pkgutil.resolve_name(place)
 
     def failing(*arguments: Any, **more: Any) -> Any:
         left[0] -= 1
@@ -173,23 +170,21 @@ def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
             raise KeyboardInterrupt
         return proper(*arguments, **more)
 
-    monkeypatch.setattr(f"{owner}.{name}", failing)
+    monkeypatch.setattr(place, failing)
     with pytest.raises(KeyboardInterrupt), journal.storage(tmp_path, "key"):
-        make()
+        WORK[of]()
     assert list(tmp_path.glob("*.part"))
     with journal.storage(tmp_path, "key"):
-        assert make().identical(whole)
+        assert WORK[of]().identical(expected)
 
 
 @pytest.mark.usefixtures("often")
 def test_what_is_left_of_a_member_is_not_used_when_a_bit_of_it_has_changed(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = check(root, "bounce", ensemble={"members": 4})
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    whole = analyses.ensemble(scene, {}, silent)
     with journal.storage(tmp_path, "key"):
-        analyses.ensemble(scene, {}, silent)
+        WORK["ensemble"]()
     parts = sorted(tmp_path.glob("*.part"))
     assert len(parts) == 4
     for path in parts:
@@ -198,7 +193,7 @@ def test_what_is_left_of_a_member_is_not_used_when_a_bit_of_it_has_changed(
         path.write_bytes(content)
     with journal.storage(tmp_path, "key") as kept:
         assert all(kept.find(path.name.split(".")[1]) is None for path in parts)
-        assert analyses.ensemble(scene, {}, silent).identical(whole)
+        assert WORK["ensemble"]().identical(whole("ensemble"))
 
 
 @pytest.mark.usefixtures("often")

@@ -58,17 +58,10 @@ def _sorted(tree: object) -> str:
     return repr(tree)
 
 
-def test_order_of_keys_does_not_matter():
+def test_parameters_as_text_keep_every_digit_and_no_order():
+    """The next float up is another parameter. A nan or a date in a recipe is for its check to refuse, in words."""
     assert sorted(flatten({"a": 1, "b": {"c": 2.5}})) == sorted(flatten({"b": {"c": 2.5}, "a": 1}))
-
-
-def test_floats_keep_every_digit():
-    """The next float up is another parameter."""
     assert flatten(0.1) != flatten(0.1 + 2**-56)
-
-
-def test_what_json_cannot_express_is_text():
-    """A nan or a date in a recipe is for the recipe's check to refuse, in words."""
     assert flatten({"a": float("nan"), "b": datetime.date(2019, 3, 10)}) == [("a", "NaN"), ("b", '"2019-03-10"')]
 
 
@@ -184,6 +177,11 @@ def copy(tmp_path: Path) -> Path:
     return copied(tmp_path, "scenes", "meshes")
 
 
+def read_again(copy: Path) -> Sources:
+    """Sources of a copy; only those that were edited are parsed."""
+    return Sources(copy, copy / "results" / "cache" / "imports.json")
+
+
 RERUN = {
     "joint.A1.clearance": ("0.2 mm", {"simulate", "ensemble", "post"}),
     "body.rod1.modes.count": (8, {"modes rod1", "bundle rod1", "simulate", "ensemble", "post"}),
@@ -220,59 +218,59 @@ def test_another_sentence_about_a_value_runs_nothing_again(root: Path, sources: 
     assert json.loads(reported["assumptions"])["joint.A1.clearance"] == "assumed: measured"
 
 
+#: what follows in the recipe of the rod
+SOURCE_OF_MATERIAL = 'poisson = 0.33\nsource = "Table 2"'
+
+
 def test_another_sentence_in_a_recipe_makes_no_mesh_again(root: Path, copy: Path, sources: Sources):
     """It is reported where a scene's own sentences are."""
     recipe = copy / "meshes" / "actuated_rod.toml"
-    recipe.write_text(
-        recipe.read_text()
-        .replace("[material]\n", "[material]\n# weighed\n")
-        .replace('poisson = 0.33\nsource = "Table 2"', 'poisson = 0.33\nsource = "assumed: aluminium"')
-    )
+    text = recipe.read_text().replace("[material]\n", "[material]\n# weighed\n")
+    recipe.write_text(text.replace(SOURCE_OF_MATERIAL, 'poisson = 0.33\nsource = "assumed: aluminium"'))
     before, after = graph(root, "sps4/far_cb"), graph(copy, "sps4/far_cb")
     assert changed(keys(before, sources), keys(after, sources)) == {"post"}
     reported = derived_series.origins(after.scene)
     assert json.loads(reported["sources"])["body.rod1.recipe.shape"] == "Table 2"
     assert json.loads(reported["assumptions"])["body.rod1.recipe.material"] == "assumed: aluminium"
+    recipe.write_text(text.replace("elements = 12", "elements = 24"))
+    assert "mesh rod1" in changed(keys(before, sources), keys(graph(copy, "sps4/far_cb"), sources))
 
 
-@pytest.mark.parametrize("source", ["5", "{ density = 3 }", "[1]"])
-def test_a_source_of_a_recipe_that_is_no_text_is_refused(copy: Path, source: str):
+def test_a_source_of_a_recipe_that_is_no_text_is_refused(copy: Path, sources: Sources):
     """What builds the mesh does not see it."""
     recipe = copy / "meshes" / "actuated_rod.toml"
-    recipe.write_text(
-        recipe.read_text().replace('poisson = 0.33\nsource = "Table 2"', f"poisson = 0.33\nsource = {source}")
-    )
-    with pytest.raises(InputError, match=r"actuated_rod\.toml \[material\.source\]: expected text"):
-        keys(graph(copy, "sps4/far_cb"), Sources(copy))
+    text = recipe.read_text()
+    for source in ("5", "{ density = 3 }", "[1]"):
+        recipe.write_text(text.replace(SOURCE_OF_MATERIAL, f"poisson = 0.33\nsource = {source}"))
+        with pytest.raises(InputError, match=r"actuated_rod\.toml \[material\.source\]: expected text"):
+            keys(graph(copy, "sps4/far_cb"), sources)
 
 
-def test_content_of_the_recipe_counts(root: Path, copy: Path, sources: Sources):
-    recipe = copy / "meshes" / "actuated_rod.toml"
-    recipe.write_text(recipe.read_text().replace("elements = 12", "elements = 24"))
-    before, after = keys(graph(root, "sps4/far_cb"), sources), keys(graph(copy, "sps4/far_cb"), sources)
-    assert "mesh rod1" in changed(before, after)
+@pytest.fixture(scope="module")
+def known(root: Path, sources: Sources) -> dict[str, dict[str, str]]:
+    """Keys of some scenes."""
+    return {f"sps4/{name}": keys(graph(root, f"sps4/{name}"), sources) for name in ("ideal", "csj", "far_cb")}
 
 
-@pytest.mark.parametrize(
-    "module, scenes",
-    [
-        ("pipeline/dynamics/contact/friction/modified_coulomb.py", {"sps4/csj"}),
-        ("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", {"sps4/csj"}),
-        ("pipeline/dynamics/joints/turn_and_slide.py", {"sps4/ideal", "sps4/csj", "sps4/far_cb"}),
-        ("pipeline/structure/modes/reference/held.py", {"sps4/far_cb"}),
-        ("pipeline/dynamics/loads/gravity.py", set()),
-        ("papers/wang_wang_2019/figures/panels.py", set()),
-    ],
-)
-def test_editing_a_module_reruns_only_scenes_that_reach_it(
-    root: Path, sources: Sources, copy: Path, module: str, scenes: set[str]
-):
-    before = {name: keys(graph(root, name), sources) for name in ("sps4/ideal", "sps4/csj", "sps4/far_cb")}
-    path = copy / module
-    path.write_text(path.read_text() + "\nEDITED = 1\n")
-    edited = Sources(copy)
-    after = {name: keys(graph(root, name), edited) for name in before}
-    assert {name for name in before if changed(before[name], after[name])} == scenes
+#: modules, and the scenes that reach them
+REACHED = {
+    "pipeline/dynamics/contact/friction/modified_coulomb.py": {"sps4/csj"},
+    "pipeline/dynamics/contact/normal/lankarani_nikravesh.py": {"sps4/csj"},
+    "pipeline/dynamics/joints/turn_and_slide.py": {"sps4/ideal", "sps4/csj", "sps4/far_cb"},
+    "pipeline/structure/modes/reference/held.py": {"sps4/far_cb"},
+    "pipeline/dynamics/loads/gravity.py": set(),
+    "papers/wang_wang_2019/figures/panels.py": set(),
+}
+
+
+def test_editing_a_module_reruns_only_scenes_that_reach_it(root: Path, copy: Path, known: dict[str, dict[str, str]]):
+    for module, scenes in REACHED.items():
+        path = copy / module
+        text = path.read_text()
+        path.write_text(text + "\nEDITED = 1\n")
+        edited = read_again(copy)
+        assert {n for n, before in known.items() if changed(before, keys(graph(root, n), edited))} == scenes, module
+        path.write_text(text)
 
 
 REWORDED = {
@@ -310,21 +308,23 @@ def test_words_do_not_count_and_code_does(edit: str):
     assert (one == other) is (edit in REWORDED)
 
 
-@pytest.mark.parametrize(
-    "module, edit",
-    [
-        ("pipeline/core/system/platforms.py", ('"""', '"""More words. ')),
-        ("pipeline/core/scene/registry.py", ('"""', '"""More words. ')),
-        ("pipeline/core/scene/clearance.py", ("Young's modulus", "modulus of elasticity")),
-        ("pipeline/core/scene/validation_errors.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
-        ("pipeline/core/scene/citations.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
-    ],
-)
-def test_another_word_runs_nothing_again(root: Path, sources: Sources, copy: Path, module: str, edit: tuple[str, str]):
-    before = keys(graph(root, "sps4/far_csj_cb"), sources)
-    path = copy / module
-    path.write_text(path.read_text().replace(*edit, 1))
-    assert changed(before, keys(graph(root, "sps4/far_csj_cb"), Sources(copy))) == set()
+#: words of code that runs, and code that only finds words
+WORDS = {
+    "pipeline/core/system/platforms.py": ('"""', '"""More words. '),
+    "pipeline/core/scene/registry.py": ('"""', '"""More words. '),
+    "pipeline/core/scene/clearance.py": ("Young's modulus", "modulus of elasticity"),
+    "pipeline/core/scene/validation_errors.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
+    "pipeline/core/scene/citations.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
+}
+
+
+def test_another_word_runs_nothing_again(root: Path, copy: Path, known: dict[str, dict[str, str]]):
+    for module, edit in WORDS.items():
+        path = copy / module
+        assert edit[0] in path.read_text()
+        path.write_text(path.read_text().replace(*edit, 1))
+    edited = read_again(copy)
+    assert not any(changed(before, keys(graph(root, name), edited)) for name, before in known.items())
 
 
 def test_the_memo_of_imports_notices_edits(copy: Path):
@@ -356,16 +356,10 @@ def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytes
     }
 
 
-def test_library_versions_count(root: Path):
-    task = Task(
-        "s", "scene", "flexclear.stages.reduction:run", {}, "", modules=("flexclear.pipeline.structure.kinds.beam",)
-    )
-    found = facts(task, {}, Sources(root))
-    assert {"library numpy", "library scikit-fem", "library skfem", "library xarray"} & found.keys() >= {
-        "library numpy",
-        "library skfem",
-        "library xarray",
-    }
+def test_library_versions_count(sources: Sources):
+    beam = ("flexclear.pipeline.structure.kinds.beam",)
+    found = facts(Task("s", "scene", "flexclear.stages.reduction:run", {}, "", modules=beam), {}, sources)
+    assert {"library numpy", "library skfem", "library xarray"} <= found.keys()
     assert re.match(r"\d+\.\d+", found["library skfem"])
     assert key(found) != key({**found, "library skfem": "0.0"})
 
@@ -415,7 +409,7 @@ def test_code_for_what_a_run_has_not_met_does_not_count(
     assert find(task, {}, store, sources) == record
     path = copy / "pipeline" / "post" / "sections" / "chaos.py"
     path.write_text(path.read_text() + "\nEDITED = 1\n")
-    edited = Sources(copy)
+    edited = read_again(copy)
     assert find(task, {}, store, edited) == (None if meets else record)
     (state,) = states([task], store, edited)
     assert state.why == ((f"module {name} changed",) if meets else ())

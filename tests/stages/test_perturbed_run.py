@@ -6,7 +6,6 @@ import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from flexclear.pipeline.dynamics.run.horizon import horizon
 from flexclear.pipeline.dynamics.run.horizon.horizon import Pair, PerturbedRun
 from flexclear.pipeline.dynamics.run.run import engine_of, follow
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
+from tests.analytic.mechanism_runs import TREE
 
 #: nobody waits longer for a thread that does what it should [s]
 PATIENCE = 60.0
@@ -52,8 +52,8 @@ def processors(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
     monkeypatch.setattr(cores, "_others_idle", True)
 
 
-def check(root: Path, name: str, **changes: Any) -> Scene:
-    return edited(load_scene(root / "scenes" / "checks" / f"{name}.toml"), changes)
+def check(name: str, **changes: Any) -> Scene:
+    return edited(load_scene(TREE / "scenes" / "checks" / f"{name}.toml"), changes)
 
 
 def alone(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> xr.Dataset:
@@ -64,15 +64,13 @@ def alone(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> xr.Dataset:
     return found
 
 
-@pytest.mark.parametrize("ahead", ["nobody", "run", "twin"])
 @pytest.mark.usefixtures("parting")
-def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
-    ahead: str, root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    scene = check(root, "clearance_slider_crank")
+def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody, the run, and the twin."""
+    scene = check("clearance_slider_crank")
     expected = alone(scene, monkeypatch)
     assert float(expected.horizon) < 0.5 * scene.time.end
-    hear, enough = Pair._hear, Pair._enough
+    hear, enough = Pair._store_rows, Pair._enough
 
     def late_run(self: Pair, rows: np.ndarray) -> bool:
         time.sleep(3e-3)  # the twin takes a tenth of that between two looks
@@ -82,15 +80,15 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
         assert self._ended.wait(PATIENCE)
         return enough(self, twin, alive)
 
-    if ahead == "twin":
-        monkeypatch.setattr(Pair, "_hear", late_run)
-    if ahead == "run":
-        monkeypatch.setattr(Pair, "_enough", late_twin)
-    assert dynamics.simulate(scene, {}, silent).identical(expected)
+    for late in ({}, {"_enough": late_twin}, {"_store_rows": late_run}):
+        with monkeypatch.context() as patch:
+            for name, slow in late.items():
+                patch.setattr(Pair, name, slow)
+            assert dynamics.simulate(scene, {}, silent).identical(expected)
 
 
 @pytest.mark.usefixtures("parting", "two")
-def test_a_perturbed_run_that_has_separated_is_stopped(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_perturbed_run_that_has_separated_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not even where it is ahead of the run, whose largest velocity tells what is visible: then it waits."""
     rows: list[float] = []
     enough = Pair._enough
@@ -100,7 +98,7 @@ def test_a_perturbed_run_that_has_separated_is_stopped(root: Path, monkeypatch: 
         return enough(self, twin, alive)
 
     monkeypatch.setattr(Pair, "_enough", noted)
-    scene = check(root, "clearance_slider_crank")
+    scene = check("clearance_slider_crank")
     run = dynamics.simulate(scene, {}, silent)
     end, shown = float(run.horizon), run.separation_time.values
     assert 0.0 < end < rows[-1] < 0.8 * scene.time.end
@@ -112,13 +110,13 @@ def test_a_perturbed_run_that_has_separated_is_stopped(root: Path, monkeypatch: 
 
 @pytest.mark.usefixtures("two")
 def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
-    root: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact.  Only one thread tells of it."""
     monkeypatch.setattr(progress_rate, "TRIAL", 1000)
     monkeypatch.setattr(progress_rate, "HOPELESS", 1100)
     monkeypatch.setattr(trajectory, "SLICE", 100)
-    scene, reported = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
+    scene, reported = check("socket_rolling", **{"time.end": 3e-3}), set[int]()
     expected = alone(scene, monkeypatch)
     assert expected.attrs["method"] == "radau"
     found = dynamics.simulate(scene, {}, lambda fraction, text: reported.add(threading.get_ident()))
@@ -126,26 +124,24 @@ def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
     assert reported == {threading.get_ident()}
 
 
-@pytest.mark.parametrize("processors_there", [1, 2])
-def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(
-    processors_there: int, root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*arguments: Any) -> np.ndarray:
         raise SolverError("no neighbour")
 
-    scene = check(root, "bounce")
+    scene = check("bounce")
     expected = alone(scene, monkeypatch)
     monkeypatch.setattr(horizon, "perturbed", refused)
-    processors(monkeypatch, processors_there)
-    found = dynamics.simulate(scene, {}, silent)
-    assert (float(found.horizon), found.sizes["separation_time"]) == (scene.time.start, 1)
-    assert found.position.identical(expected.position)
+    for count in (1, 2):
+        processors(monkeypatch, count)
+        found = dynamics.simulate(scene, {}, silent)
+        assert (float(found.horizon), found.sizes["separation_time"]) == (scene.time.start, 1)
+        assert found.position.identical(expected.position)
 
 
 @pytest.mark.usefixtures("parting")
-def test_a_perturbed_run_that_fails_after_its_separation_gives_the_same_horizon(root: Path) -> None:
+def test_a_perturbed_run_that_fails_after_its_separation_gives_the_same_horizon() -> None:
     """However far it was followed: next to a slower run it may come to where it fails, after the run it does not."""
-    engine = engine_of(check(root, "clearance_slider_crank"), {}, silent)
+    engine = engine_of(check("clearance_slider_crank"), {}, silent)
     start = consistent_start(engine)
 
     def twin(until: float) -> PerturbedRun:
@@ -170,7 +166,7 @@ def test_a_perturbed_run_that_fails_after_its_separation_gives_the_same_horizon(
 
 
 @pytest.mark.usefixtures("two")
-def test_a_run_that_fails_does_not_wait_for_its_twin(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_fails_does_not_wait_for_its_twin(monkeypatch: pytest.MonkeyPatch) -> None:
     """Both would take minutes."""
     monkeypatch.setattr(trajectory, "SLICE", 100)
     calls, threads, began = 0, threading.active_count(), time.monotonic()
@@ -182,15 +178,15 @@ def test_a_run_that_fails_does_not_wait_for_its_twin(root: Path, monkeypatch: py
             raise SolverError("the run gives up")
 
     with pytest.raises(SolverError, match="the run gives up"):
-        dynamics.simulate(check(root, "socket_swing", **{"time.end": 100.0}), {}, progress)
+        dynamics.simulate(check("socket_swing", **{"time.end": 100.0}), {}, progress)
     assert threading.active_count() == threads
     assert time.monotonic() - began < PATIENCE
 
 
 @pytest.mark.usefixtures("two")
-def test_a_twin_does_not_wait_for_a_run_that_never_began(root: Path) -> None:
+def test_a_twin_does_not_wait_for_a_run_that_never_began() -> None:
     """Ctrl-C may come at any moment, also when the thread is there and the run is not."""
-    engine = engine_of(check(root, "bounce"), {}, silent)
+    engine = engine_of(check("bounce"), {}, silent)
     pair, start, began = Pair(engine), consistent_start(engine), time.monotonic()
     came = threading.Event()
 
@@ -221,11 +217,11 @@ def test_where_no_thread_is_to_be_had_the_work_is_done_when_its_result_is_asked_
 
 
 @pytest.mark.parametrize("stopped", ["run", "twin"])
-def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_are_stopped_in_good_order(stopped: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Asked to stop while the run goes on, or its twin alone: what there is of the run is returned."""
     monkeypatch.setattr(trajectory, "SLICE", 100)
     monkeypatch.setattr(stopping, "_why", "")
-    scene = check(root, "bounce", **{"output.interval": 0.05})
+    scene = check("bounce", **{"output.interval": 0.05})
     whole = alone(scene, monkeypatch)
 
     def progress(fraction: float | None, text: str) -> None:
@@ -249,9 +245,9 @@ def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: p
     assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")
 
 
-def test_rows_for_comparisons_alone_are_not_in_the_dataset(root: Path) -> None:
+def test_rows_for_comparisons_alone_are_not_in_the_dataset() -> None:
     """Ten outputs in the whole run, and comparisons between them."""
-    scene = check(root, "bounce", **{"output.interval": 0.1})
+    scene = check("bounce", **{"output.interval": 0.1})
     engine = engine_of(scene, {}, silent)
     run, pair = dynamics.simulate(scene, {}, silent), Pair(engine)
     assert run.sizes["separation_time"] >= len(pair.added) >= 0.9 * horizon.SAMPLES

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -24,14 +24,14 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import uncoupled
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, bounds, lever_of
+from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, bounds, opening_map
 from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
-from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer
+from flexclear.pipeline.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
@@ -44,32 +44,42 @@ LENGTH, RADIUS, MODULUS, DENSITY, PLATFORM = 0.24, 0.01, 71.7e9, 2740.0, 3.0
 GRAVITY = 9.81
 
 
-@pytest.fixture(autouse=True)
-def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
-    return tmp_path / "results"
+@pytest.fixture(autouse=True, scope="module")
+def _results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Results that tests share, so that each body is made once; who looks into them has its own, `fresh`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FLEXCLEAR_RESULTS", str(tmp_path_factory.mktemp("results")))
+        yield
 
 
-def _bounds(scene: Scene, chosen: list[Quantity]) -> Mapping[str, Mapping[str, float]]:
-    """Of a scene, from the run of its ideal twin."""
-    return bounds(scene, _ideal(scene)[0], chosen)
+class Pilot(NamedTuple):
+    """A scene with the run of its ideal twin, and what is known of its bodies."""
+
+    scene: Scene
+    ideal: Run
+    inputs: dict[str, xr.Dataset]
+
+    def bounds(self, *chosen: Quantity) -> Mapping[str, Mapping[str, float]]:
+        return bounds(self.scene, self.ideal, chosen)
+
+    def response(self, *chosen: Quantity) -> Response:
+        """Of the flexible bodies."""
+        return response(self.ideal, simulation.bundles(self.inputs), chosen)
 
 
-def _response(scene: Scene, chosen: list[Quantity]) -> Response:
-    """Of a scene's flexible bodies, from the run of its ideal twin."""
-    ideal, inputs = _ideal(scene)
-    return response(ideal, simulation.bundles(inputs), chosen)
-
-
-def _ideal(scene: Scene) -> tuple[Run, dict[str, xr.Dataset]]:
-    """The run of a scene's ideal twin, and what is known of its bodies."""
+def pilot(scene: Scene) -> Pilot:
     place, task = open_workplace(), effect_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
-    gone = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
-    bare = watched_quantities.plain(variants.without(scene, gone))
+    dropped = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
+    bare = watched_quantities.plain(variants.without(scene, dropped))
     rigid = {name: inputs[name] for name in Graph(bare, shown=False).bodies()}
-    return integrate(simulation.rebuild(simulation.params(bare), rigid), {}, silent), inputs
+    return Pilot(scene, integrate(simulation.rebuild(simulation.params(bare), rigid), {}, silent), inputs)
+
+
+@pytest.fixture(scope="module")
+def standing(tmp_path_factory: pytest.TempPathFactory) -> Pilot:
+    return pilot(_standing_leg(tmp_path_factory.mktemp("leg")))
 
 
 def _standing_leg(tmp_path: Path) -> Scene:
@@ -79,10 +89,10 @@ def _standing_leg(tmp_path: Path) -> Scene:
     return edited(scene, {"drive.stroke": {"joint": "slide", "law": law}, "time.end": 1e-3, "output.interval": 1e-4})
 
 
-def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(tmp_path: Path):
+def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(standing: Pilot):
     """A bar of weight w under a load F shortens by (F + w/2) L/(E A); let go, the platform swings to twice that, and
     the force that its ball carries to twice its weight."""
-    found = _response(_standing_leg(tmp_path), [Quantity("platform", "position"), Quantity("ball", "force")])
+    found = standing.response(Quantity("platform", "position"), Quantity("ball", "force"))
     area = np.pi * RADIUS**2
     weight = DENSITY * area * LENGTH * GRAVITY
     expected = (PLATFORM * GRAVITY + 0.5 * weight) * LENGTH / (MODULUS * area)
@@ -93,12 +103,12 @@ def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(tmp_pa
     assert found.influence["ball.force"] == pytest.approx(PLATFORM * GRAVITY, rel=0.05)
 
 
-def test_the_reported_vibration_is_one_that_the_loads_excite(tmp_path: Path):
+def test_the_reported_vibration_is_one_that_the_loads_excite(standing: Pilot):
     """Loads along an upright leg leave its bending at rounding, which the sudden weight seemed to magnify 12 times.
 
     The bar with a mass at its end has b tan b = (its mass)/(that mass), b = 2 pi f L sqrt(rho/E).
     """
-    found = _response(_standing_leg(tmp_path), [])
+    found = standing.response()
     beta = brentq(lambda b: b * np.tan(b) - DENSITY * np.pi * RADIUS**2 * LENGTH / PLATFORM, 0.1, 1.0)
     # the static modes have the end's compliance, and the rod's mass is a fifteenth
     assert found.excited == pytest.approx(beta * np.sqrt(MODULUS / DENSITY) / (2.0 * np.pi * LENGTH), rel=5e-3)
@@ -177,19 +187,17 @@ def test_a_quantity_that_no_bound_holds_for_is_not_bounded_by_those_of_others():
 
 def test_the_bound_of_a_loose_crank_pin_is_that_of_the_slider_crank(tmp_path: Path):
     """A slider follows an opening d of the crank pin by at most d/cos(b), b the rod's angle, at most asin(r/l)."""
-    scene = load_scene(write("slider-crank", tmp_path)[0])
-    found = _bounds(scene, [Quantity("slider", "position")])
+    reach = pilot(load_scene(write("slider-crank", tmp_path)[0])).bounds(Quantity("slider", "position"))
     ratio = 1.0 / np.sqrt(1.0 - 0.25**2)
-    reach = found["pin"]["slider.position"]
     # the depth to which the pin is pressed comes on top, some percent; the steepest angle lies between the poses seen
-    assert 0.995 * ratio * 1e-4 < reach < 1.1 * ratio * 1e-4
+    assert 0.995 * ratio * 1e-4 < reach["pin"]["slider.position"] < 1.1 * ratio * 1e-4
 
 
 def test_where_joints_leave_a_freedom_there_is_no_bound(tmp_path: Path):
-    scene = edited(_standing_leg(tmp_path), {"drive": {}, "load": {}})
-    chosen = [Quantity("platform", "position")]
-    assert _bounds(scene, chosen)["ball"]["platform.position"] == np.inf
-    assert _response(scene, chosen).influence["platform.position"] == np.inf
+    loose = pilot(edited(_standing_leg(tmp_path), {"drive": {}, "load": {}}))
+    chosen = Quantity("platform", "position")
+    assert loose.bounds(chosen)["ball"]["platform.position"] == np.inf
+    assert loose.response(chosen).influence["platform.position"] == np.inf
 
 
 def _tight(scene: Scene) -> Scene:
@@ -205,10 +213,10 @@ class Priced:
         self.scene = SimpleNamespace(solver=solver, by_need=lambda: False)
         self.own, self.error = evaluations, error
 
-    def variant(self, gone: object) -> object:
+    def variant(self, dropped: object) -> object:
         return SimpleNamespace(contacts=dict, stop={})
 
-    def point(self, gone: object, *, integrator: str, evaluations: int = 10**9, **_: object) -> object:
+    def point(self, dropped: object, *, integrator: str, evaluations: int = 10**9, **_: object) -> object:
         taken = 1000 if integrator == "dop853" else self.own
         return SimpleNamespace(refused="takes long" if taken > evaluations else "", evaluations=taken)
 
@@ -223,30 +231,30 @@ class Priced:
 def test_a_plan_takes_the_scenes_own_integrator_where_that_does_as_well(
     evaluations: int, error: float, integrator: str
 ):
-    pilots: Any = Priced(evaluations, error)
+    runs: Any = Priced(evaluations, error)
     known = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
-    found = no_dearer(Search(pilots, {"bob.position": 1e-2}), known)
+    found = cheaper_method(Search(runs, {"bob.position": 1e-2}), known)
     assert found.integrator == integrator
 
 
 @pytest.mark.parametrize("evaluations, same", [(1100, True), (900, True), (1300, False)])
 def test_a_plan_that_is_not_cheaper_by_a_fifth_is_the_scene_as_it_is(evaluations: int, same: bool):
     """The planned run takes 1000 evaluations; that of the scene by its own method as many as given."""
-    pilots: Any = Priced(evaluations, 0.0)
-    pilots.variant = lambda gone: SimpleNamespace(contacts=lambda: {"pin": None}, stop={})
-    pilots.part, pilots.extent = lambda gone: 0.5, SimpleNamespace(most=10**6)
+    runs: Any = Priced(evaluations, 0.0)
+    runs.variant = lambda dropped: SimpleNamespace(contacts=lambda: {"pin": None}, stop={})
+    runs.part, runs.extent = lambda dropped: 0.5, SimpleNamespace(most=10**6)
     chosen = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
-    assert as_it_is(Search(pilots, {"bob.position": 1e-2}), chosen) is same
+    assert scene_is_cheaper(Search(runs, {"bob.position": 1e-2}), chosen) is same
 
 
 def test_where_nothing_is_known_of_methods_a_plan_keeps_that_of_the_scene():
     unknown = Chosen("dop853", 1e-8, {"bob.position": np.nan})
     for own, expected in (("radau", "radau"), ("dop853", "dop853")):
-        pilots: Any = Priced(400, 1.0, own=own)
-        assert no_dearer(Search(pilots, {"bob.position": 1e-2}), unknown).integrator == expected
+        runs: Any = Priced(400, 1.0, own=own)
+        assert cheaper_method(Search(runs, {"bob.position": 1e-2}), unknown).integrator == expected
     left_open: Any = Priced(1, 0.0)
     left_open.scene.by_need = lambda: True
-    assert no_dearer(Search(left_open, {"bob.position": 1e-2}), unknown) is unknown
+    assert cheaper_method(Search(left_open, {"bob.position": 1e-2}), unknown) is unknown
 
 
 def test_a_plan_retains_a_rod_that_bends_by_more_than_the_accuracy_and_drops_one_that_does_not(tmp_path: Path):
@@ -279,13 +287,13 @@ def test_the_planned_scene_is_a_file_that_runs_and_verifies(tmp_path: Path, comm
     assert "met" in reported
 
 
-def test_bad_plans_are_refused_in_words(tmp_path: Path, command: Command, results: Path):
+def test_bad_plans_are_refused_in_words(tmp_path: Path, command: Command, fresh: Path):
     path = write("pendulum", tmp_path)[0]
     assert "asks for no accuracy" in command("plan", path, "-q", "--jobs", "1", "--verify", code=2).err
     path.write_text(path.read_text() + '\n[accuracy]\nnobody.position = "10 um"\n')
     assert "nobody" in command("plan", path, "-q", "--jobs", "1", code=2).err
     assert "--planned" in command("run", path, "-q", "--verify", code=2).err
-    assert not (results / "plan").exists()
+    assert not (fresh / "plan").exists()
 
 
 def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, command: Command):
@@ -295,14 +303,14 @@ def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, c
     assert said.count("gravity") >= 3  # without it nothing swings
 
 
-def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Path, results: Path):
+def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Path, fresh: Path):
     scene = edited(
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
     with pytest.raises((InputError, FailedTasksError), match="leave out everything") as refused:
         plan.bring(scene, open_workplace())
     assert refused.value.exit_code == 2
-    assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
+    assert not [*(fresh / "plan").rglob("*.toml"), *(fresh / "plan").rglob("*.nc")]
 
 
 def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path, command: Command):
@@ -314,10 +322,10 @@ def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path, command: Command)
     alone = found["dropped"].isel(effect=0, other=0)
     assert np.all(alone.values[np.isfinite(alone.values)] >= 0.0)
     name = next(str(q) for q in found["quantity"].values if str(q).endswith("position"))
-    body = name.partition(".")[0]
-    position = fc.run(scene)["position"].sel(body=body).values
+    run = fc.run(scene).sel(body=name.partition(".")[0])
+    position = run["position"].values
     way = np.linalg.norm(position - position[0], axis=1).max()
-    if np.linalg.norm(fc.run(scene)["velocity"].sel(body=body).values[0]) < 1e-12:
+    if np.linalg.norm(run["velocity"].values[0]) < 1e-12:
         # runs of one tolerance, the same integration but for the size of the load: 1e-8 of the way
         assert float(alone.sel(quantity=name)) == pytest.approx(way, rel=1e-6)
     assert "load.gravity" in command("effects", path, "--set", "time.end=0.1", "--json", "-q").out
@@ -352,12 +360,11 @@ def test_what_nothing_couples_to_what_is_asked_for_is_not_integrated(tmp_path: P
     assert np.abs(full - less).max() < 1e-6
 
 
-def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(tmp_path: Path):
+def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(standing: Pilot):
     """Beside the pseudoinverse of the joints' rates, which has no closed form but another computation."""
-    scene = _standing_leg(tmp_path)
-    found, _ = _ideal(scene)
+    found = standing.ideal
     poses = [Placement(frame["origin"], frame["axes"]) for frame in found.observed.links[0]]
-    lever = lever_of(found.model, constraints(found.model.mechanism), poses)
+    lever = opening_map(found.model, constraints(found.model.mechanism), poses)
     G = lever.gradient.toarray()
     shown = np.random.default_rng(0).standard_normal((3, G.shape[0])) @ G
     expected = -shown @ np.linalg.pinv(G)
@@ -369,7 +376,7 @@ def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(tmp_pat
     assert free < 1e-6 * np.abs(shown).max()
 
 
-def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, results: Path):
+def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, fresh: Path):
     """Thrown about by its drive at 1e9 rad/s^2 the rod turns faster than it vibrates; rigid, it could."""
     scene = load_scene(write("slider-crank", tmp_path)[0])
     law = {"type": "polynomial", "coefficients": [0.0, 0.0, 1e9]}
@@ -377,13 +384,14 @@ def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, results
         scene,
         {
             "drive.motor": {"joint": "main", "law": law},
+            "time.end": 1e-3,
             "accuracy": {"quantities": {"slider.position": {"absolute": 1e-3}}},
         },
     )
     with pytest.raises(FailedTasksError, match="cannot be run as it is") as refused:
         plan.bring(wild, open_workplace())
     assert refused.value.exit_code == 3
-    assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
+    assert not [*(fresh / "plan").rglob("*.toml"), *(fresh / "plan").rglob("*.nc")]
 
 
 def test_from_python_a_scene_without_a_requested_accuracy_is_planned_for_a_fraction_of_each_size(tmp_path: Path):

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+import flexclear as fc
+from flexclear.commands.report import publish_page
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.post.overview.comparison import colors
 from flexclear.stages.graph import Graph
@@ -72,3 +74,19 @@ def test_a_model_has_the_same_colour_in_every_figure():
     )
     assert both == [models.IDEAL.color, models.CSJ.color, models.FAR_CB.color, models.FAR_CSJ_FREE.color]
     assert len(set(colors({name: run(1, "craig-bampton") for name in "abcd"}))) == 4
+
+
+# Pages of scenes: in a folder with their files, and for budgets that reach few effects --------------------------------
+
+
+def test_a_page_in_a_folder_has_its_files_next_to_it(tmp_path: Path) -> None:
+    page = b'<html><body><img alt="run" src="data:image/png;base64,AAAA"></body></html>'
+    index = publish_page(tmp_path / "runs" / "ball", "report", page, folder=True)
+    assert index == tmp_path / "runs" / "ball" / "report" / "index.html"
+    assert index.is_file()
+
+
+def test_a_budget_that_reaches_one_effect_names_the_others() -> None:
+    answer = fc.effects("checks/bounce", budget=1e-6)
+    assert answer.attrs["undone"]
+    assert any(answer["words"].values), "the effect that is all of the ideal mechanism's difference costs nothing more"

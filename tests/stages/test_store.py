@@ -5,17 +5,21 @@ import os
 import resource
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import disk
+from flexclear.pipeline.core.artifacts import disk, netcdf
 from flexclear.pipeline.core.artifacts.disk import publish
+from flexclear.pipeline.core.artifacts.labelled import of
 from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
 from flexclear.pipeline.core.system.errors import ResourceError
-from tests.processes import printed, python
+from tests.processes import printed
 
 KEY = "k" * 32
 
@@ -118,63 +122,41 @@ def test_a_failed_read_back_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     assert os.listdir(tmp_path) == ["a.bin"]
 
 
-FULL = """
-import resource, sys
-from pathlib import Path
-sys.path.insert(0, sys.argv[1])
-from test_store import KEY, Store, dataset, ResourceError
-store = Store(Path(sys.argv[2]))
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), resource.RLIM_INFINITY))
-content = dataset(20_000) if sys.argv[4] == "nc" else bytes(1_000_000)
-try:
-    store.put("simulate", KEY, {sys.argv[4]: content}, {})
-except ResourceError as error:
-    print(error)
-    sys.exit(error.exit_code)
-"""
+@contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """A limit on the size of files answers a write as a full disk does: with an error from the system."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("kind, limit", [("nc", 0), ("nc", 300_000), ("png", 5_000)])
 def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path: Path, kind: str, limit: int):
-    """A limit on the size of files answers a write as a full disk does: with an error from the system."""
-    results = tmp_path / "results"
-    done = python("-c", FULL, Path(__file__).parent, results, str(limit), kind, succeeds=False)
-    assert done.returncode == ResourceError.exit_code, done.stderr
-    assert "disk is full" in done.stdout
-    assert [path for path in results.rglob("*") if path.is_file()] == []
-    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
-
-
-TOO_SMALL = """
-import random, resource, sys
-from pathlib import Path
-sys.path.insert(0, sys.argv[1])
-from test_store import dataset
-from flexclear.pipeline.core.artifacts import netcdf
-from flexclear.pipeline.core.artifacts.labelled import of
-netcdf.COMPRESSED = int(sys.argv[3])
-folder, data = Path(sys.argv[2]), of(dataset(3_000))
-netcdf.write(folder / "whole.nc", data)
-size = (folder / "whole.nc").stat().st_size
-drawn = random.Random(1)
-limits = {0, 1, 100, size - 1, size - 2, size - 100, size - 4096, *(drawn.randrange(size) for _ in range(40))}
-for limit in sorted(limits):
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
-    try:
-        netcdf.write(folder / f"{limit}.nc", data)
-    except (OSError, RuntimeError):
-        continue
-    sys.exit(f"nothing was reported of a limit of {limit} of {size} bytes")
-resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
-netcdf.write(folder / "again.nc", data)
-assert (folder / "again.nc").read_bytes() == (folder / "whole.nc").read_bytes()
-"""
+    content = dataset(20_000) if kind == "nc" else bytes(1_000_000)
+    with pytest.raises(ResourceError, match="disk is full") as caught, largest_file(limit):
+        Store(tmp_path / "results").put("simulate", KEY, {kind: content}, {})
+    assert caught.value.exit_code == 4
+    assert [path for path in (tmp_path / "results").rglob("*") if path.is_file()] == []
 
 
 @pytest.mark.parametrize("compressed", [1 << 26, 0])
-def test_the_library_reports_every_byte_that_it_cannot_write(tmp_path: Path, compressed: int):
+def test_the_library_reports_every_byte_that_it_cannot_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compressed: int
+):
     """What it writes is not read back: wherever a disk ends, it raises an error."""
-    printed(TOO_SMALL, Path(__file__).parent, tmp_path, str(compressed))
+    monkeypatch.setattr(netcdf, "COMPRESSED", compressed)
+    data, drawn = of(dataset(3_000)), Random(1)
+    netcdf.write(tmp_path / "whole.nc", data)
+    size = (tmp_path / "whole.nc").stat().st_size
+    for limit in {0, 1, 100, size - 1, size - 2, size - 100, size - 4096, *(drawn.randrange(size) for _ in range(40))}:
+        with pytest.raises((OSError, RuntimeError)), largest_file(limit):
+            netcdf.write(tmp_path / f"{limit}.nc", data)
+    with largest_file(size):
+        netcdf.write(tmp_path / "again.nc", data)
+    assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
 
 def test_a_disk_that_takes_no_more_when_it_is_forced_leaves_the_old_file(

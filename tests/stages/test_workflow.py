@@ -26,15 +26,8 @@ def test_what_is_fresh_is_not_run_again(here: Project):
 
 
 def test_why_says_what_changed_and_run_does_just_that(project: Project):
-    assert project.run("why", "tiny/contact").stdout.split() == [
-        "tiny/contact",
-        "simulate",
-        "never",
-        "run",
-        "post",
-        "never",
-        "run",
-    ]
+    never = project.run("why", "tiny/contact").stdout
+    assert never.split() == ["tiny/contact", "simulate", "never", "run", "post", "never", "run"]
     project.run("run", "tiny/contact")
     project.edit("scenes/tiny/contact.toml", "0.5 mm", "0.2 mm")
     with (project.folder / "pipeline/dynamics/contact/normal/lankarani_nikravesh.py").open("a") as file:
@@ -83,7 +76,7 @@ def test_a_corrupt_artifact_is_reported_in_one_line_and_rebuilt(here: Project):
 def test_two_commands_at_once_do_the_work_once(project: Project):
     hold = project.hold
     first = project.start("run", "tiny/ideal", HELD_BY=str(hold))
-    _wait_for(lambda: (project.folder / "calls").exists())
+    _wait_for(project.began)
     second = project.start("run", "tiny/ideal")
     assert second.stderr is not None
     assert any("waiting for another process" in line for line in second.stderr)
@@ -94,20 +87,10 @@ def test_two_commands_at_once_do_the_work_once(project: Project):
     assert project.run("why", "tiny/ideal").stdout.count("fresh") == 2
 
 
-def test_a_killed_run_is_simply_run_again(project: Project):
-    process = project.start("run", "tiny/ideal", HELD_BY=str(project.hold))
-    _wait_for(lambda: (project.folder / "calls").exists())
-    process.kill()
-    process.communicate(timeout=PATIENCE)
-    project.calls()
-    done = project.run("run", "tiny/ideal")
-    assert (done.returncode, project.calls()) == (0, ["simulate tiny/ideal", "post tiny/ideal"])
-
-
 @pytest.mark.parametrize("scenes", [["tiny/ideal"], ["tiny/ideal", "tiny/contact"]], ids=["alone", "workers"])
 def test_an_interrupt_ends_everything_with_130(project: Project, scenes: list[str]):
     process = project.start("run", *scenes, HELD_BY=str(project.hold))
-    _wait_for(lambda: (project.folder / "calls").exists())
+    _wait_for(project.began)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
@@ -245,11 +228,13 @@ def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_cur
     project.edit(engine, 'if "ideal" in scene.name', 'if "other" in scene.name')
     process = project.start("run", "tiny/ideal", HELD_BY=str(project.hold))
     project.calls()
-    _wait_for(lambda: (project.folder / "calls").exists())
+    _wait_for(project.began)
     process.kill()
     process.communicate(timeout=PATIENCE)
     assert "making it again was begun and not finished" in (folder / "OUTDATED.txt").read_text()
+    project.calls()
     assert project.run("run", "tiny/ideal").returncode == 0
+    assert project.calls() == ["simulate tiny/ideal", "post tiny/ideal"]
     assert not (folder / "OUTDATED.txt").exists()
     assert project.run("why", "tiny/ideal").stdout.count("fresh") == 2
 
@@ -257,7 +242,7 @@ def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_cur
 def test_workers_and_what_they_left_are_gone_after_their_parent_was_killed(project: Project):
     """Whatever it was killed by; temporary files and locks go with the next command."""
     process = project.start("run", "tiny/ideal", "tiny/contact", HELD_BY=str(project.hold))
-    _wait_for(lambda: len((project.folder / "calls").read_text().splitlines() if _started(project) else []) == 2)
+    _wait_for(lambda: project.began() and len((project.folder / "calls").read_text().splitlines()) == 2)
     family = _descendants(process.pid)
     assert len(family) >= 2  # two workers, and what tracks their locks
     locks = list(project.results.rglob("*.lock"))
@@ -272,10 +257,6 @@ def test_workers_and_what_they_left_are_gone_after_their_parent_was_killed(proje
     assert project.run("run", "tiny/ideal").returncode == 0
     assert not list(project.results.rglob("*.lock"))
     assert not list(project.results.rglob("*.tmp"))
-
-
-def _started(project: Project) -> bool:
-    return (project.folder / "calls").exists()
 
 
 def _descendants(pid: int) -> list[int]:

@@ -1,6 +1,6 @@
 """Mistakes that people make in a scene of their own, each as an edit of the slider-crank to start from.
 
-(file, its text, what is written instead).  The message of each is in `typical_mistakes.txt`.
+(file, its text, what is written instead).  The text "" stands for a whole file, None for its end.  The message of each is in `typical_mistakes.txt`.
 """
 
 # ruff: noqa: E501 - an edit is easier to read on one line
@@ -12,7 +12,16 @@ CONTROLLER = '\n[load.hold]\ntype = "pid"\njoint = "guide"\nproportional = {}\nr
 GEAR = '\n[gear.pair]\nfirst = "main"\nsecond = "wrist"\nratio = {}\n'
 STOP = '\n[stop.end]\njoint = "guide"\nlower = 0\nupper = {}\nnormal = {{ {} }}\n'
 SPRING = '\n[load.spring]\ntype = "spring-damper"\nbetween = ["ground.main", "slider.pin"]\n{}\n'
-#: name -> file, text in it, text in its place; the text None appends
+OTHER = "other.toml"
+WRIST, GUIDE = '[joint.wrist]\ntype = "revolute"', '[joint.guide]\ntype = "prismatic"'
+LAW = 'law = { type = "step", start = "0 s", end = "0.12 s", change = "360 deg" }'
+FRICTION = 'friction = { law = "modified-coulomb", static = 0.1, dynamic = 0.08, v_static = "20 mm/s", v_dynamic = "100 mm/s" }'
+SLEEVE = '{}[joint.guide]\ntype = "cylindrical"'
+DRIVE = '\n[drive.d]\njoint = "{}"\n{}\n'
+SPLINE = 'law = {{ type = "spline", time = {}, value = {} }}'
+PATH = '\n[drive.d]\nframe = "{}"\n{}\n'
+LOAD = '\n[load.l]\ntype = "{}"\njoint = "{}"\n{}\n'
+#: name -> file, text in it, text in its place
 MISTAKES: dict[str, tuple[str, str | None, str]] = {
     # quantities
     "unit without quotation marks": (SCENE, 'mass = "0.8 kg"', "mass = 0.8 kg"),
@@ -158,6 +167,7 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "negative gain with a unit": (SCENE, None, CONTROLLER.format('"-5 N/mm"', "0.2")),
     # meshes and modes
     "more modes than the mesh has": (SCENE, "count = 13 }", "count = 500 }"),
+    "a number of modes that no mesh has": (SCENE, "count = 13 }", "count = 1000000000000 }"),
     "fewer modes than the interfaces need": (SCENE, "count = 13 }", "count = 3 }"),
     "recipe without interfaces": (ROD, 'interfaces = ["big_end", "small_end"] ', ""),
     "held direction that is none": (SCENE, 'reference = "craig-bampton", count = 13', 'reference = "constrained", held = ["big_end.u"], count = 7'),
@@ -172,7 +182,7 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "pose in mm without a unit": (SCENE, 'pose = { position = ["250 mm", 0, 0] }', "pose = { position = [250, 0, 0] }"),
     "axis of a joint turned": (SCENE, 'frames.guide = { axes = { z = [1, 0, 0], x = [0, 1, 0] } }\n\n#', "frames.guide = {}\n\n#"),
     "drive twice": (SCENE, None, '\n[drive.again]\njoint = "main"\nlaw = 0\n'),
-    "drive far from the pose": (SCENE, 'law = { type = "step", start = "0 s", end = "0.12 s", change = "360 deg" }', 'law = { type = "polynomial", coefficients = ["90 deg", "60 rpm"] }'),
+    "drive far from the pose": (SCENE, LAW, 'law = { type = "polynomial", coefficients = ["90 deg", "60 rpm"] }'),
     "start of a joint in another unit": (SCENE, None, '\n[start.joint.guide]\nposition = "90 deg"\n'),
     "start of an unknown joint": (SCENE, None, '\n[start.joint.pim]\nposition = 0\n'),
     "joint of a body with itself": (SCENE, 'between = ["ground.main", "crank.main"]', 'between = ["crank.pin", "crank.main"]'),
@@ -187,8 +197,8 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "spring without free length": (SCENE, None, SPRING.format('stiffness = "2 N/mm"')),
     "spring of negative stiffness": (SCENE, None, SPRING.format('stiffness = -2\nfree_length = "50 mm"')),
     "force of two components": (SCENE, None, '\n[load.push]\ntype = "point-force"\nframe = "slider.pin"\nforce = [1, 0]\n'),
-    "table of a law that is not there": (SCENE, 'law = { type = "step", start = "0 s", end = "0.12 s", change = "360 deg" }', 'law = { type = "table", file = "angle.csv", time = { column = 1, unit = "s" }, value = { column = 2, unit = "deg" } }'),
-    "rate in another unit": (SCENE, 'law = { type = "step", start = "0 s", end = "0.12 s", change = "360 deg" }', 'law = { type = "polynomial", coefficients = [0, "60 N"] }'),
+    "table of a law that is not there": (SCENE, LAW, 'law = { type = "table", file = "angle.csv", time = { column = 1, unit = "s" }, value = { column = 2, unit = "deg" } }'),
+    "rate in another unit": (SCENE, LAW, 'law = { type = "polynomial", coefficients = [0, "60 N"] }'),
     "accuracy in another unit": (SCENE, None, '\n[accuracy]\nslider.position = "1 deg"\n'),
     "accuracy of an unknown quantity": (SCENE, None, '\n[accuracy]\nslider.positon = "1 um"\n'),
     "watched expression with an unknown quantity": (SCENE, '"slider.position"', '"slider.position.x - crank.height"'),
@@ -197,6 +207,72 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "period below zero": (SCENE, None, '\n[sections]\nperiod = "-1 s"\n'),
     "memory without a unit of bytes": (SCENE, None, '\n[limits]\nmemory = "4 gigs"\n'),
     "removed without extends": (SCENE, "title = ", 'remove = ["joint.pin"]\ntitle = '),
+    # files that are no scenes
+    "empty file": (SCENE, "", ""),
+    "bodies in a list": (SCENE, "", "body = [1, 2]"),
+    "bodies are a number": (SCENE, "", "body = 3"),
+    "lists without end": (SCENE, "", "x = " + "[" * 3000 + "]" * 3000),
+    "name that is no ASCII": (SCENE, "", "[body.kürbel]"),
+    "extends two files": (OTHER, "", 'extends = ["slider_crank.toml"]'),
+    "extends a folder": (OTHER, "", 'extends = "."'),
+    "replaces a list": (OTHER, "", 'extends = "slider_crank.toml"\nreplace = [1]'),
+    "sets a body to a number": (OTHER, "", 'extends = "slider_crank.toml"\n[set.body]\ncrank = 5'),
+    "removes a number": (OTHER, "", 'extends = "slider_crank.toml"\nremove = 5'),
+    "extends with a body that is a number": (OTHER, "", 'extends = "slider_crank.toml"\nbody = 5'),
+    "sets a misspelt key": (OTHER, "", 'extends = "slider_crank.toml"\n[set.body.crank]\nmas = 1'),
+    "replaces nothing": (OTHER, "", 'extends = "slider_crank.toml"\n[replace.joint.K]\ntype = "fixed"'),
+    # what cannot be computed with
+    "mass beyond all measure": (SCENE, 'mass = "0.8 kg"', "mass = 1e300"),
+    "inertia of ragged rows": (SCENE, '["600 kg mm^2", "600 kg mm^2", "1000 kg mm^2"]', "[[0.1], [0.1, 1], 0.1]"),
+    "body name with a path": (SCENE, None, '\n[body."../up"]\ntype = "ground"\n'),
+    "quantities without marks in a list": (SCENE, '["600 kg mm^2", "600 kg mm^2", "1000 kg mm^2"]', "[1e-3 kg m^2, 1.0, 2 g cm^2]"),
+    "quantity without marks in a table": (SCENE, 'law = { type = "step"', 'law = { origin = "1 mm", phase = 3 µm, type = "step"'),
+    # the solver
+    "fixed steps of no length": (SCENE, None, '\n[solver]\nintegrator = "rk4"\n'),
+    "step below zero": (SCENE, None, '\n[solver]\nintegrator = "rk4"\nstep = "-1 us"\n'),
+    "step as a length": (SCENE, None, '\n[solver]\nstep = "1 mm"\n'),
+    "events at ends of chosen steps": (SCENE, None, '\n[solver]\nevents = "at step ends"\n'),
+    "reflection above one": (SCENE, None, '\n[solver]\nintegrator = "generalized-alpha"\nrho_inf = 1.5\n'),
+    "reflection of another integrator": (SCENE, None, "\n[solver]\nrho_inf = 0.5\n"),
+    "tolerance below zero": (SCENE, None, "\n[solver]\nrtol = -1e-9\n"),
+    "evaluations beyond all measure": (SCENE, None, "\n[solver]\nevaluations = 99999999999999999999999\n"),
+    # contact laws and modes
+    "friction without its law": (SCENE, 'friction = { law = "modified-coulomb",', "friction = {"),
+    "friction speed of zero": (SCENE, 'v_static = "20 mm/s"', "v_static = 0"),
+    "ramp of friction that falls": (SCENE, FRICTION, 'friction = { law = "ambrosio", dynamic = 0.1, v0 = 1.0, v1 = 0.5 }'),
+    "number of modes as a word": (SCENE, "count = 13 }", 'count = "al" }'),
+    "damping below zero": (SCENE, "damping = 0.02", "damping = -1"),
+    # drives
+    "drive of a fixed joint": (SCENE, WRIST, DRIVE.format("wrist", "law = 0") + '[joint.wrist]\ntype = "fixed"'),
+    "drive of a joint with two coordinates": (SCENE, GUIDE, SLEEVE.format(DRIVE.format("guide", "law = 0"))),
+    "drive of a coordinate of another joint": (SCENE, GUIDE, SLEEVE.format(DRIVE.format("guide", 'coordinate = "y"\nlaw = 0'))),
+    "angle of a drive as a length": (SCENE, None, DRIVE.format("wrist", 'law = { type = "constant", value = "3 mm" }')),
+    "wave without a frequency": (SCENE, None, DRIVE.format("wrist", 'law = { type = "harmonic", amplitude = [1.0], frequency = [] }')),
+    "polynomial without coefficients": (SCENE, None, DRIVE.format("wrist", 'law = { type = "polynomial", coefficients = [] }')),
+    "spline of one point": (SCENE, None, DRIVE.format("wrist", SPLINE.format("[0.0]", "[0.0]"))),
+    "spline that goes back in time": (SCENE, None, DRIVE.format("wrist", SPLINE.format("[0.0, 0.6, 0.5, 1.0]", "[0.0, 0.1, 0.2, 0.3]"))),
+    "spline of fewer values than times": (SCENE, None, DRIVE.format("wrist", SPLINE.format("[0.0, 1.0]", "[0.0]"))),
+    "spline that ends before the run": (SCENE, None, DRIVE.format("wrist", SPLINE.format("[0.0, 0.1]", "[0.0, 0.1]"))),
+    "spline that does not come back": (SCENE, None, DRIVE.format("wrist", SPLINE.format("[0.0, 0.4, 1.0]", '[0.0, 0.1, 0.2], ends = "periodic"'))),
+    "sections that jump": (SCENE, None, DRIVE.format("wrist", 'law.type = "piecewise"\nlaw.sections = [{ start = 0.0, law = 0 }, { start = 0.05, law = 0.1 }]')),
+    "coefficient of another power": (SCENE, LAW, 'law = { type = "polynomial", coefficients = ["0 deg", "10 deg"] }'),
+    "path with an unknown actuator": (SCENE, None, PATH.format("slider.pin", 'position.x = 0.25\nactuators = ["guides"]')),
+    "path of the ground": (SCENE, None, PATH.format("ground.main", "position.x = 0")),
+    "path of an unknown frame": (SCENE, None, PATH.format("slider.nowhere", "position.x = 0")),
+    "path without a component": (SCENE, None, PATH.format("slider.pin", "")),
+    "path of one component of a rotation vector": (SCENE, None, PATH.format("slider.pin", 'angles = "rotation-vector"\nrotation.x = 0')),
+    # loads
+    "load on an unknown frame": (SCENE, None, '\n[load.push]\ntype = "point-force"\nframe = "slider.pim"\nforce = [1, 0, 0]\n'),
+    "force as a torque": (SCENE, None, '\n[load.push]\ntype = "point-force"\nframe = "slider.pin"\nforce = ["1 N m", 0, 0]\n'),
+    "force as a number": (SCENE, None, '\n[load.push]\ntype = "point-force"\nframe = "slider.pin"\nforce = 5\n'),
+    "spring in one body": (SCENE, None, SPRING.format("stiffness = 1\nfree_length = 0.1").replace("ground.main", "slider.guide")),
+    "spring without stiffness": (SCENE, None, SPRING.format("")),
+    "spring of a hinge as one of a slide": (SCENE, None, LOAD.format("joint-spring", "wrist", 'stiffness = "3 N/m"')),
+    "spring of a hinge of negative stiffness": (SCENE, None, LOAD.format("joint-spring", "wrist", "stiffness = -1")),
+    "friction of a joint that grows": (SCENE, None, LOAD.format("joint-friction", "wrist", "coulomb = { static = 0.1, dynamic = 0.2, v_static = 0.1, v_dynamic = 0.2 }")),
+    "friction of a joint with two coordinates": (SCENE, GUIDE, SLEEVE.format(LOAD.format("joint-friction", "guide", "viscous = 1"))),
+    "force on an angle": (SCENE, None, LOAD.format("joint-force", "wrist", 'force = "1 N"')),
+    "force on a fixed joint": (SCENE, WRIST, LOAD.format("joint-force", "wrist", "force = 1") + '[joint.wrist]\ntype = "fixed"'),
 }  # fmt: skip
 #: implausible, but not refused
 WARNED = (

@@ -45,7 +45,7 @@ NAMES = {
     "table10": "table10:costs",
     "table_verdicts": "table_verdicts:verdicts",
 }
-#: in tables, what is not there
+#: cell of a table without a value
 ABSENT = "–"
 #: artifacts by reference, such as ``sps4/csj:run``
 Data = dict[str, "xr.Dataset"]
@@ -55,9 +55,9 @@ Data = dict[str, "xr.Dataset"]
 class Figure:
     """One figure or table.
 
-    title: what it shows.  needs: references of the artifacts that it cannot be made without,
-    ``<scene>:<artifact>[/<body>]``.  make: from these artifacts; a drawing is made in the style of all.
-    files: that `make` opens, below the folder of the sources.
+    title: subject.  needs: references of the artifacts that `make` requires, ``<scene>:<artifact>[/<body>]``.  make:
+    builds drawing or table from these artifacts; drawings share one style. files: that `make` opens, below the folder
+    of the sources.
     """
 
     title: str
@@ -69,17 +69,17 @@ class Figure:
 def drawn(
     title: str, *needs: str, files: tuple[str, ...] = ()
 ) -> Callable[[Callable[[Data], Drawing | Table]], Figure]:
-    """Makes a `Figure` of the function that draws it."""
+    """Return a decorator that turns a drawing function into a `Figure`."""
     return lambda make: Figure(title, needs, make, files)
 
 
 def figure(name: str) -> Figure:
-    """The figure or table of a name, its module imported now, and with it the plotting libraries."""
+    """Return the figure or table of a name; imports its module now, and with it the plotting libraries."""
     return lookup(__name__, name, where="figures")
 
 
 def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Stage: ``<name>.png`` and ``.svg`` of a figure, ``.csv`` and ``.md`` of a table; inputs by reference."""
+    """Stage: draw ``<name>.png`` and ``.svg`` of a figure, or ``.csv`` and ``.md`` of a table; inputs by reference."""
     from flexclear.pipeline.post.plotting import style, table
 
     name = params["figure"]
@@ -89,9 +89,9 @@ def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: 
 
 
 def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Stage: ``index.json``, for each name what it needs and the files that it opens.
+    """Stage: write ``index.json``, for each name the artifacts that it needs and the files that it opens.
 
-    An artifact of its own, because asking the modules themselves takes the import of matplotlib.
+    The index is an artifact, because the modules themselves import matplotlib, which takes time.
     """
     listed = {name: figure(name) for name in params["names"]}
     entries = {name: {"needs": one.needs, "files": one.files} for name, one in listed.items()}

@@ -1,4 +1,4 @@
-"""Tables 7-9: largest deviations from the ideal model, ours next to the paper's, and how much they differ."""
+"""Tables 7-9: largest deviations from the ideal model, ours and the paper's, with ratios and error estimates."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROWS: tuple[tuple[str, str, float, str | None], ...] = (
 NOTHING = 1e-4
 #: values below this are rounding of the runs and differ between machines (positions of 0.1 m to 16 digits, in mm)
 NOISE = 1e-10
-#: a velocity within this factor of the printed one agrees: restitution, which is not printed, moves it by a tenth
+#: a velocity within this factor of the printed one agrees: restitution, which is not printed, changes it by a tenth
 VELOCITY = 1.5
 
 
@@ -39,18 +39,18 @@ Column = tuple[str, ...]
 
 
 def paper_column(head: str, values: MaximumError) -> Column:
-    """The paper's column."""
+    """Return the paper's column."""
     return head, *(ABSENT if name is None else number(getattr(values, name)) for *_, name in ROWS)
 
 
 def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
-    """The column of one run, +- what it changes when the run is made at a tighter tolerance."""
+    """Return the column of one run, +- its change when the run is repeated at a tighter tolerance."""
     pairs = zip(_values(deviation), _values(tighter), strict=True)
     return head, *(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}" for value, other in pairs)
 
 
 def several(head: str, deviations: Sequence[Deviation]) -> Column:
-    """Mean +- standard deviation over an ensemble's members."""
+    """Return the column of an ensemble: mean +- standard deviation over its members."""
     by_row = np.array([_values(deviation) for deviation in deviations]).T
     return head, *(f"{number(values.mean())} ± {values.std(ddof=1):.1e}" for values in by_row)
 
@@ -67,7 +67,7 @@ def _table(title: str, columns: Sequence[Column], notes: Sequence[str]) -> Table
 def _both(
     data: Data, model: paper.Model, ideal: paper.Model = paper.IDEAL, until: float = np.inf
 ) -> tuple[Deviation, Deviation]:
-    """Largest deviations from an ideal mechanism, at the scene's tolerance and at a tighter one."""
+    """Return the largest deviations from an ideal mechanism, at the scene's tolerance and at a tighter one."""
     wide, tight = (
         max_deviation(data[f"{model.scene}:{run}"], data[f"{ideal.scene}:{run}"], paper.PLATFORM, until)
         for run in ("run", "tight")
@@ -76,7 +76,7 @@ def _both(
 
 
 def ratios(deviation: Deviation, printed: MaximumError) -> dict[str, float]:
-    """Ours over the paper's per quantity that the paper prints."""
+    """Return our deviations over the paper's, by quantity that the paper prints."""
     return {
         name: factor * getattr(deviation, ours) / getattr(printed, name)
         for _, ours, factor, name in ROWS
@@ -84,7 +84,7 @@ def ratios(deviation: Deviation, printed: MaximumError) -> dict[str, float]:
     }
 
 
-#: what the +- of `single` means, for the notes of a table
+#: note of tables: meaning of the +- of `single`
 MEANING = (
     "± of a single run: how much the value changes at a hundred times tighter tolerance, the error of its time "
     "integration; the model's own errors (assumed geometry, mode set) and what lies between two outputs are not in it."
@@ -92,7 +92,7 @@ MEANING = (
 
 
 def comparison(who: str, deviation: Deviation, printed: MaximumError) -> str:
-    """A sentence with the ratios; says zero where there is nothing to divide."""
+    """Return a sentence with the ratios of ours to the paper's, or with the word zero where ours are rounding."""
     percentages = ratios(deviation, printed)
     if max(percentages.values()) < NOTHING:
         return f"{who}: ours are zero, up to rounding."
@@ -101,7 +101,7 @@ def comparison(who: str, deviation: Deviation, printed: MaximumError) -> str:
 
 
 def number(value: float) -> str:
-    """Four significant digits, in the paper's style for small values; rounding noise is not printed."""
+    """Format with four significant digits, in the paper's style for small values; rounding noise is not printed."""
     if abs(value) < NOISE:
         return f"< {NOISE:.0e}"
     return f"{value:.3f}" if 0.1 <= abs(value) < 1e4 else f"{value:.3e}"
@@ -112,7 +112,7 @@ def number(value: float) -> str:
     *paper.references((paper.IDEAL, *paper.FAR), "run", "tight"),
 )
 def of_rods(data: Data) -> Table:
-    """Single runs, with what a tighter tolerance changes."""
+    """Tabulate the FAR model's deviations from single runs, with their change at a tighter tolerance."""
     (free, free_t), (fixed, fixed_t), (both, both_t) = (
         _both(data, model) for model in (paper.FAR_FREE, paper.FAR_FIXED, paper.FAR_CB)
     )
@@ -145,7 +145,7 @@ def of_rods(data: Data) -> Table:
 
 
 def _contradiction(ours: Deviation) -> str:
-    """The paper's two rows next to what a change of leg 1's length can do."""
+    """Compare the ratio of the paper's two rows with the ratio that geometry sets for a change of leg 1's length."""
     printed = TABLE7["free-free"]
     return (
         f"The paper's two rows contradict each other: {printed.angle:.3g} rad with {printed.displacement:.3g} mm is "
@@ -163,10 +163,10 @@ def _contradiction(ours: Deviation) -> str:
     *paper.references((paper.CSJ, paper.FIRST_CSJ), "post"),
 )
 def of_clearance(data: Data) -> Table:
-    """The layout of the scenes and the first one, up to the horizon."""
+    """Tabulate the CSJ model's deviations, in the scenes' layout and in the first one, up to the horizon."""
     post = data[f"{paper.CSJ.scene}:post"]
     (ours, tighter), (first, first_tighter) = (
-        _both(data, model, ideal, paper.believed_until(data[f"{model.scene}:post"]))
+        _both(data, model, ideal, paper.comparable_until(data[f"{model.scene}:post"]))
         for model, ideal in ((paper.CSJ, paper.IDEAL), (paper.FIRST_CSJ, paper.FIRST_IDEAL))
     )
     columns = (
@@ -194,7 +194,7 @@ def of_clearance(data: Data) -> Table:
 
 
 def _velocity(ours: Deviation, first: Deviation) -> str:
-    """The row that is a prediction, next to what the layout predicted that was assumed before."""
+    """Return the velocity ratio, which is a prediction, in the scenes' layout and in the one assumed before."""
     ratio, before = 1e3 * ours.velocity / TABLE8.velocity, 1e3 * first.velocity / TABLE8.velocity
     missed = 1e3 * first.displacement / TABLE8.displacement
     agrees = 1.0 / VELOCITY < ratio < VELOCITY
@@ -207,9 +207,9 @@ def _velocity(ours: Deviation, first: Deviation) -> str:
 
 
 def _between_outputs(data: Data) -> str:
-    """How far the velocity is off at the events between the outputs that the rows compare."""
+    """Return the largest error of the velocity at events, which lie between the outputs that the rows compare."""
     run, ideal = data[f"{paper.CSJ.scene}:run"], data[f"{paper.IDEAL.scene}:run"]
-    until = paper.believed_until(data[f"{paper.CSJ.scene}:post"])
+    until = paper.comparable_until(data[f"{paper.CSJ.scene}:post"])
     interval = 1e3 * float(np.median(np.diff(ideal.time.values)))
     speed, time = velocity_at_events(run, ideal, paper.PLATFORM, until)
     return (
@@ -220,7 +220,7 @@ def _between_outputs(data: Data) -> str:
 
 
 def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
-    """What is asked for, what the law gives a free impact, and what the impacts of the run show."""
+    """Return the requested restitution, that of the law for a free impact, and that of the run's impacts."""
     asked = parameters(run)["joint"][paper.JOINT]["normal"]["restitution"]
     delivered = float(run.contact_delivered_restitution.sel(contact=paper.JOINT))
     shown = (post.impact_separation_speed / post.impact_approach_speed).values
@@ -239,7 +239,7 @@ def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
     *paper.references(paper.FAR_CSJ, "ensemble"),
 )
 def of_all(data: Data) -> Table:
-    """Within the horizon one run, over the whole stroke the ensemble."""
+    """Tabulate the FAR-CSJ models' deviations: one run within the horizon, the ensemble over the whole stroke."""
     columns: list[Column] = []
     for model, name in ((paper.FAR_CSJ_FREE, "free-free"), (paper.FAR_CSJ_FIXED, "fixed-fixed")):
         columns += [paper_column(f"paper, {name}", TABLE9[name]), *_ours(name, model, data)]
@@ -262,7 +262,7 @@ def of_all(data: Data) -> Table:
 
 
 def _ours(name: str, model: paper.Model, data: Data) -> list[Column]:
-    horizon = paper.believed_until(data[f"{model.scene}:post"])
+    horizon = paper.comparable_until(data[f"{model.scene}:post"])
     inside, tighter = _both(data, model, paper.IDEAL, horizon)
     head = f"ours, {name}, to {1e3 * inside.until:.1f} ms"
     return [single(head, inside, tighter), several(f"ours, {name}, whole stroke", _members(model, data))]
@@ -273,7 +273,7 @@ def _members(model: paper.Model, data: Data) -> list[Deviation]:
 
 
 def _against_paper(data: Data) -> str:
-    """In how many standard deviations the paper's single values lie from the ensembles' means."""
+    """Return the ratios of the ensembles' mean velocity errors to the paper's single values."""
     texts = []
     for model, name in ((paper.FAR_CSJ_FREE, "free-free"), (paper.FAR_CSJ_FIXED, "fixed-fixed")):
         velocity = 1e3 * np.array([member.velocity for member in _members(model, data)])
@@ -287,7 +287,7 @@ def _against_paper(data: Data) -> str:
 
 
 def _largest(data: Data, what: str, which: dict[str, str], unit: str) -> str:
-    """The largest values of the rigid CSJ run and of the ensembles."""
+    """Return the largest values of the rigid CSJ run and of the ensembles."""
     rigid = float(data[f"{paper.CSJ.scene}:post"][what].sel(which))
     texts = [f"CSJ {rigid:.0f} {unit}"]
     for model in paper.FAR_CSJ:

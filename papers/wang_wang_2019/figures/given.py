@@ -1,4 +1,4 @@
-"""Tables 1 to 6: what the paper prints of parts, material, joint, frequencies and simulation, next to what is here."""
+"""Tables 1 to 6: parts, material, joint, frequencies and simulation as printed by the paper, and ours next to them."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ COLUMNS = (
     "exact Rayleigh beam (Hz)",
     "exact Timoshenko beam (Hz)",
 )
-LEAST = 1e-3  # the last digit printed [Hz]
+LEAST = 1e-3  # last digit printed [Hz]
 MEANING = "± of ours: how much the frequency changes on a mesh of four times as many elements."
 
 
 def _table(
     title: str, data: Sequence[xr.Dataset], ansys: Sequence[float], printed: Sequence[float], rigid: int
 ) -> Table:
-    """Rows of one frequency table; `rigid` zero rows come first, as the paper prints them.
+    """Return one table of frequencies; `rigid` rows of zeros come first, as the paper prints them.
 
-    data: modes with the square's inertia and with the circle's, elastic modes only, ascending; then both again on
-    a finer mesh.
+    data: modes with the square's inertia and with the circle's, elastic modes only, ascending; then both again on a
+    finer mesh.
     """
     square, circle, square_fine, circle_fine = data
     rows = [_rigid_row(i + 1, circle, i) for i in range(rigid)]
@@ -62,12 +62,12 @@ def _table(
 
 
 def _with_error(hertz: float, fine: xr.Dataset, i: int) -> str:
-    """A frequency, +- what it changes on the finer mesh."""
+    """Format a frequency, +- its change on the finer mesh."""
     return f"{hertz:.3f} ± {max(abs(hertz - float(fine.frequency[i])), LEAST):.3f}"
 
 
 def euler_bernoulli_ratio() -> float:
-    """Third over second frequency of a uniform Euler-Bernoulli beam with both ends alike (clamped or free)."""
+    """Return the third over the second frequency of a uniform Euler-Bernoulli beam, both ends clamped or both free."""
     _, second, third = closed_form.bending(closed_form.Span(1.0, 1.0, 1.0), "free-free", 3)
     return float(third / second)
 
@@ -121,7 +121,7 @@ def _about_shear(circle: xr.Dataset) -> str:
 
 
 def _figure(number: int, reference: str, ansys: Sequence[float], printed: Sequence[float], rigid: int) -> Figure:
-    """The table of a reference condition; the other arguments as of `_table`."""
+    """Build the table of a reference condition; the other arguments as of `_table`."""
     variants = [f"sps4/frequencies/{reference}_{inertia}" for inertia in ("square", "circle")]
     needs = tuple(f"{scene}:{modes}/rod" for modes in ("modes", "fine-modes") for scene in variants)
     ends = f"{reference}-{reference} reference conditions"
@@ -139,7 +139,7 @@ TABLE05 = _figure(5, "free", published.TABLE5_ANSYS, published.TABLE5_NORMAL_MOD
 
 HEADS = ("parameter", "paper", "ours")
 ROD = "sps4/far_cb:mesh/rod1"
-#: members of table 1 and the bodies that they are here; the others belong to the ground
+#: members of table 1 and their bodies in the scenes; the others belong to the ground
 BODIES = {
     "cylinder": "cylinder1",
     "actuated rod": "rod1",
@@ -152,7 +152,7 @@ BODIES = {
 
 @drawn("Table 1: physical parameters of the parts, the paper's and those of the scenes", f"{IDEAL.scene}:run")
 def parts(data: Data) -> Table:
-    """Mass, length and moments of inertia, ours as the run has them."""
+    """Tabulate mass, length and moments of inertia; ours are those of the run."""
     bodies = parameters(data[f"{IDEAL.scene}:run"])["body"]
     rows = tuple(_part(member, bodies) for member in TABLE1)
     heads = ("member", "body here", "mass, paper (kg)", "mass, ours (kg)", "length, paper (mm)",
@@ -174,19 +174,19 @@ def _part(member: str, bodies: dict[str, Any]) -> tuple[str, ...]:
     return (
         member,
         name or ABSENT,
-        _said(printed.mass, "{:.2f}"),
-        _said(ours and ours["mass"], "{:.2f}"),
-        _said(printed.length, "{:g}"),
-        _said(printed.inertia, MOMENTS),
-        _said(ours and 1e6 * np.diag(np.array(ours["inertia"])), MOMENTS),
+        _formatted(printed.mass, "{:.2f}"),
+        _formatted(ours and ours["mass"], "{:.2f}"),
+        _formatted(printed.length, "{:g}"),
+        _formatted(printed.inertia, MOMENTS),
+        _formatted(ours and 1e6 * np.diag(np.array(ours["inertia"])), MOMENTS),
     )
 
 
-#: three of them
+#: format of three moments of inertia
 MOMENTS = "{:.3f}, {:.3f}, {:.3f}"
 
 
-def _said(values: Any, form: str) -> str:
+def _formatted(values: Any, form: str) -> str:
     return ABSENT if values is None else form.format(*np.atleast_1d(values))
 
 
@@ -201,7 +201,7 @@ MATERIAL = {
 
 @drawn("Table 2: material of the flexible actuated rod, the paper's and that of its mesh", ROD)
 def material(data: Data) -> Table:
-    """Read off the mesh that the modes are made of."""
+    """Tabulate the material of the mesh from which the modes follow."""
     mesh = data[ROD]
     young, shear = (float(np.ravel(mesh[name].values)[0]) for name in ("youngs_modulus", "shear_modulus"))
     ours = {
@@ -223,7 +223,7 @@ def material(data: Data) -> Table:
 
 @drawn("Table 3: the spherical joint with clearance, the paper's and that of the scenes", f"{CSJ.scene}:run")
 def joint_with_clearance(data: Data) -> Table:
-    """Ours as the run has them, with the stiffness that follows."""
+    """Tabulate the joint; ours are the run's parameters, with the stiffness that follows from them."""
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
     ball, young = joint["ball_radius"], f"{1e-9 * TABLE3['youngs_modulus']:g}"
     rows = (
@@ -243,7 +243,7 @@ def _both(joint: dict, name: str, factor: float) -> str:
 
 
 def _stiffness(joint: dict) -> str:
-    """K of eq. (26), by its formula."""
+    """Compute K of eq. (26) from the run's parameters, as a note."""
     sigma = [
         (1.0 - m["poisson"] ** 2) / (np.pi * m["youngs_modulus"])
         for m in (joint["socket_material"], joint["ball_material"])
@@ -255,7 +255,7 @@ def _stiffness(joint: dict) -> str:
 
 @drawn("Table 6: parameters of the simulation, the paper's and those of the scenes", f"{CSJ.scene}:run")
 def simulation(data: Data) -> Table:
-    """Ours as the CSJ run has them."""
+    """Tabulate the parameters of the simulation; ours are those of the CSJ run."""
     run = data[f"{CSJ.scene}:run"]
     given = parameters(run)
     joint, solver = given["joint"][JOINT], given.get("solver", {})

@@ -1,4 +1,4 @@
-"""Figures 5, 6 and 17: the joint with clearance, its friction, and the way of the ball in it."""
+"""Figures 5, 6 and 17: the joint with clearance, its friction, and the path of the ball in it."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from matplotlib.figure import Figure as Drawing
 
 from flexclear.papers.wang_wang_2019.figures import Data, drawn
 from flexclear.papers.wang_wang_2019.figures.phase import at_times
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, believed_until, references
+from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, comparable_until, references
 from flexclear.pipeline.dynamics.contact.friction import modified_coulomb
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import parameters
 
-#: drawn radii of socket and ball, and the angle at which the ball lies off the centre
+#: drawn radii of socket and ball, and the direction of the ball's eccentricity
 SOCKET, DRAWN_BALL, ANGLE = 1.0, 0.74, np.radians(-38.0)
 TURN = np.linspace(0.0, 2.0 * np.pi, 361)
 CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
@@ -25,7 +25,7 @@ CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
     *references([CSJ], "run", "post"),
 )
 def kinematics(data: Data) -> Drawing:
-    """Before and during contact; the clearance is drawn larger than it is."""
+    """Draw the joint before and during contact, with the clearance larger than it is."""
     post = data[f"{CSJ.scene}:post"]
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
     clearance, ball = 1e3 * joint["clearance"], 1e3 * joint["ball_radius"]
@@ -48,7 +48,7 @@ def kinematics(data: Data) -> Drawing:
 
 
 def _joint(axes: Axes, eccentricity: float, *, touching: bool = False) -> None:
-    """Section through socket and ball along the line of centres."""
+    """Draw a section through socket and ball along the line of centres."""
     n = np.array([np.cos(ANGLE), np.sin(ANGLE)])
     t = np.array([-n[1], n[0]])
     ball, q = eccentricity * n, eccentricity * n + DRAWN_BALL * n
@@ -85,7 +85,7 @@ def _arrow(
 
 @drawn("Figure 6: modified Coulomb friction, coefficient over sliding velocity, and what a run did", "sps4/csj:run")
 def friction_law(data: Data) -> Drawing:
-    """Eqs. (28), (29) with the scene's parameters; dots from the run."""
+    """Draw eqs. (28), (29) with the scene's parameters, and dots from the run."""
     run = data[f"{CSJ.scene}:run"]
     friction = parameters(run)["joint"][JOINT]["friction"]
     limits = (friction["v_static"], friction["v_dynamic"], friction["static"], friction["dynamic"])
@@ -114,13 +114,13 @@ def friction_law(data: Data) -> Drawing:
 
 
 def coefficient(v: np.ndarray, v_static: float, v_dynamic: float, static: float, dynamic: float) -> np.ndarray:
-    """Signed friction coefficient at the tangential velocity v [m/s], as runs have it; the force is against it."""
+    """Return the signed friction coefficient of the runs' law at a tangential velocity v [m/s]; the force opposes v."""
     law = getattr(modified_coulomb.coefficient, "py_func", modified_coulomb.coefficient)
     return np.array([np.sign(one) * law(abs(one), (static, dynamic, v_static, v_dynamic)) for one in v])
 
 
 def observed(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Sliding speed [m/s] and |F_t| / F_n at the outputs in contact, from force and friction power."""
+    """Return sliding speed [m/s] and |F_t| / F_n at the outputs in contact, from force and friction power."""
     normal = run.contact_normal_force.values
     total = np.linalg.norm(run.contact_force.values, axis=-1)
     # below a millinewton the difference of two nearly equal squares has no correct digits
@@ -147,7 +147,7 @@ PLANES = (("x", "y"), ("x", "z"))
     *references((CSJ, *FAR_CSJ), "run", "post"),
 )
 def trajectory(data: Data) -> Drawing:
-    """Two projections per model, socket axes, with the clearance circle."""
+    """Draw two projections per model, socket axes, with the clearance circle."""
     models = (CSJ, *FAR_CSJ)
     figure, axes = style.grid(len(PLANES), len(models), (11.6, 6.5), sharex=True, sharey=True)
     for column, model in enumerate(models):
@@ -171,7 +171,7 @@ def _projection(axes: style.Axes, plane: tuple[str, str], model: Model, data: di
     run, post = data[f"{model.scene}:run"], data[f"{model.scene}:post"]
     offset = 1e3 * run.contact_offset.sel(contact=JOINT)
     x, y = (offset.sel(axis=name).values for name in plane)
-    time, horizon = run.time.values, believed_until(post)
+    time, horizon = run.time.values, comparable_until(post)
     circle = 1e3 * float(post.clearance.sel(contact=JOINT)) * CIRCLE
     axes.fill(*circle.T, color="#f3f3f3", zorder=0)
     axes.plot(*circle.T, color="#a8a8a8", lw=1.0, zorder=1)

@@ -16,12 +16,12 @@ from flexclear.papers.wang_wang_2019.models import Quantity
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
 
-#: alpha of a curve inside its horizon, of one that the paper does not have, and beyond the horizon
+#: alpha of a curve inside its horizon, of a curve that the paper lacks, and beyond the horizon
 FIRM, ADDED, PALE = 0.95, 0.4, 0.28
-#: what the paper does not have is drawn as the band that it fills, in so many stretches of time: a rod that rings would
+#: number of time intervals for the envelope of a curve that the paper lacks: drawn as a curve, a ringing rod would
 #: cover the paper's own curves
 STRETCHES = 120
-#: differences whose sizes are further apart than this are drawn on a logarithmic scale around zero
+#: largest ratio of the differences' sizes on a linear axis; above it the axis is logarithmic around zero
 SEPARATION = 20.0
 #: differences below this fraction of the largest are rounding
 ROUNDING = 1e-6
@@ -29,16 +29,16 @@ ROUNDING = 1e-6
 
 QUANTITIES = (paper.ANGLE, paper.DISPLACEMENT, paper.VELOCITY, paper.ACCELERATION, paper.REACTION)
 LETTERS = "abcdef"
-#: title and text below it, out of the ideal motion and the others
+#: function of the ideal motion and the others that returns title and subtitle
 Heading = Callable[[paper.Motion, Sequence[paper.Motion]], tuple[str, str]]
 
 
 def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], columns: int) -> Drawing:
-    """The paper's six panels, each with a slim one below.
+    """Draw the paper's six panels, each with a slim one below.
 
-    models: those compared with the ideal one, drawn in this order, with quantiles of their ensembles as bands.
-    Where they have impacts, the slim panels of acceleration and reaction zoom to the ideal model's range; all others
-    show the difference from the ideal model.  columns: of the legend.
+    models: those compared with the ideal one, drawn in this order, with quantiles of their ensembles as bands. Where
+    they have impacts, the slim panels of acceleration and reaction zoom to the ideal model's range; all others show the
+    difference from the ideal model.  columns: of the legend.
     """
     reference, others = paper.motion(paper.IDEAL, data), [paper.motion(model, data) for model in models]
     loose = "contact" in others[0].post.sizes
@@ -57,7 +57,7 @@ def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], col
             strip.set(xlabel="time (s)", ylabel=f"zoom\n{quantity.unit}")
         else:
             difference(strip, quantity, reference, others)
-    for other in others:  # the outputs in between may miss the largest force of an impact
+    for other in others:  # outputs may miss the largest force of an impact
         inside = other.impacts[:, 0] <= other.horizon
         axes[4, 0].plot(*other.impacts[inside].T, "o", ms=2.2, color=other.model.color)
     ball_deviation(axes[4, 1], reference, others, clearance)
@@ -72,7 +72,7 @@ def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], col
 
 
 def over_time(axes: Axes, quantity: Quantity, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
-    """One quantity of all models over time, pale beyond the horizon."""
+    """Draw one quantity of all models over time, pale beyond the horizon."""
     for motion in others:
         _curve(axes, motion, motion.time, quantity.values(motion), 0.8 if quantity.jumps else 1.6)
     look: dict[str, Any] = {"color": reference.model.color, "lw": 1.1, "ls": (0, (5, 2)), "zorder": 2.4}
@@ -81,7 +81,7 @@ def over_time(axes: Axes, quantity: Quantity, reference: paper.Motion, others: S
 
 
 def difference(axes: Axes, quantity: Quantity, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
-    """The slim panel with what differs from the ideal model."""
+    """Draw the slim panel with the differences from the ideal model."""
     axes.margins(y=0.12)
     for motion in others:
         _band(axes, quantity, motion, reference)
@@ -95,7 +95,7 @@ def difference(axes: Axes, quantity: Quantity, reference: paper.Motion, others: 
 
 
 def _scale(axes: Axes, sizes: Sequence[float]) -> None:
-    """A scale on which all differences are seen, of whatever size."""
+    """Choose a scale on which differences of all sizes are visible."""
     largest = max(sizes, default=0.0)
     smallest = min((size for size in sizes if size > ROUNDING * largest), default=largest)
     if largest <= SEPARATION * smallest:
@@ -111,9 +111,9 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
 
 
 def ball_deviation(axes: Axes, reference: paper.Motion, others: Sequence[paper.Motion], clearance: float = 0.0) -> None:
-    """Where the ball's centre is relative to its position in the ideal model, x-z plane of the world, equal scales.
+    """Draw the ball's centre relative to that in the ideal model, x-z plane of the world, equal scales.
 
-    The path itself is 60 mm long: nothing is seen on it.
+    The path itself is 60 mm long, so that no difference would be visible on it.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     paths = {motion.model.scene: paper.minus(motion, reference, _ball) for motion in others}
@@ -135,7 +135,7 @@ def ball_deviation(axes: Axes, reference: paper.Motion, others: Sequence[paper.M
 
 
 def ball_distance(axes: Axes, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
-    """Distance of the ball's centre from where the ideal model has it, over time."""
+    """Draw the distance of the ball's centre from that of the ideal model, over time."""
     paths = [paper.minus(motion, reference, _ball) for motion in others]
     factor, unit = _short(0.0, paths)
     for motion, (time, deviation_of_ball) in zip(others, paths, strict=True):
@@ -150,13 +150,13 @@ def _ball(motion: paper.Motion) -> np.ndarray:
 
 
 def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[float, str]:
-    """Factor and unit of lengths [mm] that are drawn: micrometres where all are below a tenth of a millimetre."""
+    """Return factor and unit for drawn lengths [mm]: micrometres where all are below a tenth of a millimetre."""
     largest = max([least, *(float(np.abs(deviation_of_ball).max()) for _, deviation_of_ball in paths)])
     return (1e3, "µm") if largest < 0.1 else (1.0, "mm")
 
 
 def _curve(axes: Axes, motion: paper.Motion, time: np.ndarray, values: np.ndarray, width: float) -> None:
-    """Firm inside the horizon, pale beyond it; what the paper does not have lies below what it has."""
+    """Draw a curve, firm inside the horizon, pale beyond it; curves that the paper lacks are drawn as a band below."""
     inside = time <= motion.horizon
     if motion.model.ours:
         _envelope(axes, motion, values, time)
@@ -168,7 +168,7 @@ def _curve(axes: Axes, motion: paper.Motion, time: np.ndarray, values: np.ndarra
 
 
 def _envelope(axes: Axes, motion: paper.Motion, values: np.ndarray, time: np.ndarray) -> None:
-    """The band that a curve fills, from stretch to stretch, paler beyond the horizon."""
+    """Draw the band that a curve fills, interval by interval, paler beyond the horizon."""
     edges = np.linspace(time[0], time[-1], STRETCHES + 1)
     first = np.searchsorted(time, edges[:-1])
     first = first[np.append(np.diff(first) > 0, first[-1] < len(time))]
@@ -182,9 +182,9 @@ def _envelope(axes: Axes, motion: paper.Motion, values: np.ndarray, time: np.nda
 
 
 def _band(axes: Axes, quantity: Quantity, motion: paper.Motion, reference: paper.Motion | None = None) -> None:
-    """Middle nine tenths of the ensemble and its median, beyond the horizon only; less the reference where given.
+    """Draw the ensemble's middle nine tenths and its median, beyond the horizon only; minus the reference where given.
 
-    Quantiles, as forces are not negative and most of their values are zero: a mean minus a deviation would be.
+    Quantiles, as most values of a force are zero and none is negative, while mean minus deviation would be.
     """
     post = motion.post
     if "ensemble_time" not in post.sizes:
@@ -218,7 +218,7 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 def _of_rods(ideal: paper.Motion, others: Sequence[paper.Motion]) -> tuple[str, str]:
     moved = {m.model.scene: 1e3 * np.abs(paper.minus(m, ideal, paper.DISPLACEMENT.values)[1]).max() for m in others}
     fixed = moved[paper.FAR_FIXED.scene]
-    little = f"{fixed:.1g} µm" if fixed > 1e-6 else "nothing"  # next to rounding
+    little = f"{fixed:.1g} µm" if fixed > 1e-6 else "nothing"  # near rounding
     return (
         f"Figure 11: a flexible rod moves the platform by {moved[paper.FAR_CB.scene]:.2g} µm at most; free-free modes "
         f"find {moved[paper.FAR_FREE.scene]:.1g} µm of it, fixed-fixed modes {little}",
@@ -257,10 +257,10 @@ def _of_both(ideal: paper.Motion, others: Sequence[paper.Motion]) -> tuple[str, 
     *paper.references([paper.IDEAL], "run", "post"),
 )
 def tilt(data: Data) -> Drawing:
-    """The angle over the stroke, its largest value marked."""
+    """Draw the angle over the stroke, with its largest value marked."""
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(1, 1, (6.4, 3.5))
-    _alone(axes[0, 0], paper.ANGLE, ideal, 1.8)
+    _single_curve(axes[0, 0], paper.ANGLE, ideal, 1.8)
     _mark_extreme(axes[0, 0], ideal.time, ideal.angle)
     tilt = float(np.degrees(np.abs(ideal.angle).max()))
     style.heading(
@@ -271,13 +271,13 @@ def tilt(data: Data) -> Drawing:
     return figure
 
 
-def _alone(axes: style.Axes, quantity: Quantity, motion: paper.Motion, width: float) -> None:
+def _single_curve(axes: style.Axes, quantity: Quantity, motion: paper.Motion, width: float) -> None:
     axes.plot(motion.time, quantity.values(motion), color=motion.model.color, lw=width)
     axes.set(xlabel="time (s)", ylabel=quantity.label, xlim=(motion.time[0], motion.time[-1]))
 
 
 def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None:
-    """A dot and the value at the largest tilt."""
+    """Mark the largest tilt by a dot and its value."""
     i = int(np.argmax(np.abs(angle)))
     axes.plot(time[i], angle[i], "o", color=paper.IDEAL.color, ms=5)
     text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s".replace("-", "−")
@@ -291,12 +291,12 @@ def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None
     *paper.references([paper.IDEAL], "run", "post"),
 )
 def response(data: Data) -> Drawing:
-    """Four panels over the stroke."""
+    """Draw four panels over the stroke."""
     ideal = paper.motion(paper.IDEAL, data)
     figure, axes = style.grid(2, 2, (9.4, 5.8))
     shown = QUANTITIES[1:]
     for letter, panel, quantity in zip("abcd", axes.flat, shown, strict=True):
-        _alone(panel, quantity, ideal, 1.6)
+        _single_curve(panel, quantity, ideal, 1.6)
         panel.set_title(f"({letter}) {quantity.title}")
     style.heading(
         figure,

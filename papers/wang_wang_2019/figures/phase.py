@@ -28,15 +28,15 @@ from flexclear.papers.wang_wang_2019.models import (
 from flexclear.pipeline.post.plotting import style
 
 MODELS = (IDEAL, CSJ, *FAR_CSJ)
-#: of an axis that is logarithmic on both sides
+#: ticks of an axis that is logarithmic on both sides of zero
 SPIKE_TICKS = [sign * size for size in (20.0, 50.0, 100.0, 200.0, 500.0) for sign in (-1.0, 1.0)] + [0.0]
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """The two quantities of a phase plane. What jumps is linear inside the ideal model's range, logarithmic outside.
+    """The two quantities of a phase plane. One that jumps is linear in the ideal model's range, logarithmic outside.
 
-    heading: what the figure shows; {x} and {y} in it are how far impacts take either off the ideal model's.
+    heading: title; {x} and {y} in it are the distances from the ideal model's values that impacts cause.
     """
 
     x: Quantity
@@ -45,7 +45,7 @@ class Plane:
 
 
 def _maps(plane: Plane, data: Data) -> Drawing:
-    """First row: phase plots, one per model; second row: the same states at the impacts only."""
+    """Draw the phase plots, one per model, and in a second row the same states at the impacts only."""
     motions = [motion(model, data) for model in MODELS]
     figure, axes = style.grid(2, len(MODELS), (13.2, 5.9), sharex=True, sharey="row")
     for column, (model, run) in enumerate(zip(MODELS, motions, strict=True)):
@@ -54,7 +54,7 @@ def _maps(plane: Plane, data: Data) -> Drawing:
         axes[0, column].set_title(short, fontsize=8.4)
         at_impacts(axes[1, column], plane, run, motions[0])
         axes[1, column].set_xlabel(plane.x.label)
-    _say(axes[1, 0], "no impacts")
+    _note(axes[1, 0], "no impacts")
     if plane.y.jumps:
         reach = 1.3 * float(np.abs(plane.y.values(motions[0])).max())
         for panel in axes.flat:
@@ -76,13 +76,13 @@ def _maps(plane: Plane, data: Data) -> Drawing:
 
 
 def off_ideal(quantity: Quantity, motions: Sequence[Motion]) -> float:
-    """Largest difference of the model with clearance alone from the ideal one, over that one's largest value."""
+    """Return the largest difference of the model with clearance alone from the ideal one, over the latter's maximum."""
     ideal, clear, *_ = motions
     return float(np.abs(minus(clear, ideal, quantity.values)[1]).max() / np.abs(quantity.values(ideal)).max())
 
 
 def trajectory(axes: Axes, plane: Plane, run: Motion) -> None:
-    """The whole trajectory, pale beyond its horizon."""
+    """Draw the whole trajectory, pale beyond its horizon."""
     inside = run.time <= run.horizon
     x, y = plane.x.values(run), plane.y.values(run)
     axes.plot(x, y, color=run.model.color, lw=0.6, alpha=0.3)
@@ -90,7 +90,7 @@ def trajectory(axes: Axes, plane: Plane, run: Motion) -> None:
 
 
 def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion) -> None:
-    """States at the instants at which an impact begins, over the ideal trajectory."""
+    """Draw the states at which an impact begins, over the ideal trajectory."""
     axes.plot(plane.x.values(ideal), plane.y.values(ideal), color="#c9c9c9", lw=0.8, zorder=1)
     if run.post.sizes.get("impact", 0) == 0:
         return
@@ -99,15 +99,15 @@ def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion) -> None:
     inside = when <= run.horizon
     axes.scatter(x[inside], y[inside], s=11, color=run.model.color, zorder=3, lw=0)
     axes.scatter(x[~inside], y[~inside], s=11, facecolors="none", edgecolors=run.model.color, lw=0.7, zorder=3)
-    _say(axes, f"at {when.size} impacts")
+    _note(axes, f"at {when.size} impacts")
 
 
-def _say(axes: Axes, text: str) -> None:
+def _note(axes: Axes, text: str) -> None:
     axes.set_title(text, fontsize=8.0, fontweight="normal", color=style.SOFT)
 
 
 def at_times(time: np.ndarray, requested: np.ndarray, *values: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Each of `values` (first dimension time) at the output times that equal the requested ones.
+    """Return each of `values` (first dimension time) at the output times that equal the requested ones.
 
     Requested times that are no output times (to 1 ns) are left out: nothing is interpolated.
     """

@@ -1,4 +1,4 @@
-"""Table 10."""
+"""Table 10: cost of the models relative to the ideal model, at equal error, and by the paper's step and tolerance."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from flexclear.pipeline.post.overview.curves import rounded
 from flexclear.pipeline.post.plotting.table import Table
 
 REFERENCE = "sps4/ideal"
-#: ways as the timing calls them, and in heads
-WAYS = {"equal": "equal error", "step": "paper's step", "tolerance": "paper's tolerance"}
-#: a ratio within this factor of the paper's is the same in magnitude
+#: settings as the timing calls them, and their names in column heads
+SETTINGS = {"equal": "equal error", "step": "paper's step", "tolerance": "paper's tolerance"}
+#: factor within which a ratio has the same magnitude as the paper's
 NEAR = 1.5
 
 
@@ -22,7 +22,7 @@ NEAR = 1.5
     "sps4:timing",
 )
 def costs(data: Data) -> Table:
-    """Times are medians of warm repeats, +- half their range."""
+    """Tabulate the costs; times are medians of warm repeats, +- half their range."""
     timing = data["sps4:timing"]
     rows = tuple(_row(timing, str(name)) for name in timing.scene.values)
     return Table("Table 10: cost relative to the ideal model", _heads(), rows, _notes(timing))
@@ -30,9 +30,9 @@ def costs(data: Data) -> Table:
 
 def _heads() -> tuple[str, ...]:
     heads = ["model", "CPU time, paper (ideal = 1)"]
-    for way, words in WAYS.items():
+    for setting, words in SETTINGS.items():
         heads += [f"{words}: integration (ideal = 1)", f"{words}: integration (ms)", f"{words}: evaluations"]
-        if way == "tolerance":
+        if setting == "tolerance":
             heads += [f"{words}: steps", f"{words}: steps (ideal = 1)"]
     return (*heads, "equal error: rtol", "recording (ms)")
 
@@ -40,16 +40,16 @@ def _heads() -> tuple[str, ...]:
 def _row(timing: xr.Dataset, name: str) -> tuple[str, ...]:
     one = timing.sel(scene=name)
     cells = [name, f"{TABLE10[name]:.2f}" if name in TABLE10 else ABSENT]
-    for way in WAYS:
-        cells += [_ratio(timing, way, name), _milliseconds(one[f"{way}_integration_seconds"])]
-        cells.append(_count(one[f"{way}_evaluations"]))
-        if way == "tolerance":
+    for setting in SETTINGS:
+        cells += [_ratio(timing, setting, name), _milliseconds(one[f"{setting}_integration_seconds"])]
+        cells.append(_count(one[f"{setting}_evaluations"]))
+        if setting == "tolerance":
             cells += [_count(one.tolerance_steps), _number(_steps(timing, name))]
     return (*cells, f"{float(one.equal_rtol):.0e}", _milliseconds(one.equal_recording_seconds))
 
 
 def _steps(timing: xr.Dataset, name: str, reading: str = "tolerance") -> float:
-    """Steps at the paper's tolerance over the ideal model's. reading: a fraction of the stroke, or of the `size`."""
+    """Return steps at the paper's tolerance over the ideal model's. reading: tolerance relative to stroke or `size`."""
     steps = timing[f"{reading}_steps"]
     return float(steps.sel(scene=name) / steps.sel(scene=REFERENCE))
 
@@ -70,29 +70,29 @@ def _milliseconds(repeats: xr.DataArray) -> str:
 
 
 def made(repeats: xr.DataArray) -> np.ndarray:
-    """The repeats that were made; short runs are repeated more often than long ones."""
+    """Return the repeats that exist; short runs are repeated more often than long ones."""
     values: np.ndarray = repeats.values
     return values[np.isfinite(values)]
 
 
-def _ratio(timing: xr.Dataset, way: str, name: str) -> str:
-    """Ratio of the medians, +- half the range that the repeats of both leave it."""
-    own, base = _repeats(timing, way, name), _repeats(timing, way, REFERENCE)
+def _ratio(timing: xr.Dataset, setting: str, name: str) -> str:
+    """Format the ratio of the medians, +- half the range that follows from the repeats of both."""
+    own, base = _repeats(timing, setting, name), _repeats(timing, setting, REFERENCE)
     if not own.size or not base.size:
         return ABSENT
     half = 0.0 if name == REFERENCE else 0.5 * (own.max() / base.min() - own.min() / base.max())
     return f"{np.median(own) / np.median(base):.3g} ± {rounded(half, 1)}"
 
 
-def _repeats(timing: xr.Dataset, way: str, name: str) -> np.ndarray:
-    """Times of the integration [s]; none of a scene that was not timed."""
-    return made(timing[f"{way}_integration_seconds"].sel(scene=timing.scene == name))
+def _repeats(timing: xr.Dataset, setting: str, name: str) -> np.ndarray:
+    """Return times of the integration [s]; none for a scene that was not timed."""
+    return made(timing[f"{setting}_integration_seconds"].sel(scene=timing.scene == name))
 
 
-def ratios(timing: xr.Dataset, way: str) -> dict[str, float]:
-    """CPU time of the integration over the ideal model's, of the models that the paper's table has."""
-    base = _repeats(timing, way, REFERENCE)
-    times = {scene: _repeats(timing, way, scene) for scene in TABLE10 if scene != REFERENCE and base.size}
+def ratios(timing: xr.Dataset, setting: str) -> dict[str, float]:
+    """Return CPU times of the integration over the ideal model's, for the models in the paper's table."""
+    base = _repeats(timing, setting, REFERENCE)
+    times = {scene: _repeats(timing, setting, scene) for scene in TABLE10 if scene != REFERENCE and base.size}
     return {scene: float(np.median(own) / np.median(base)) for scene, own in times.items() if own.size}
 
 
@@ -112,8 +112,8 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
         f"of {1e3 * facts['tolerance']:g} mm as a fraction of the drives' stroke (rtol "
         f"{float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
         f"{float(timing.tolerance_energy_error.max()):.1g} J).",
-        *(_verdict(timing, way) for way in WAYS),
-        _which(timing),
+        *(_verdict(timing, setting) for setting in SETTINGS),
+        _step_ratios(timing),
         "The paper prints a step of the integration and a tolerance, and no error of any run; which of the two its "
         "times were taken with, and by which program, it does not say. At equal error a smooth ideal stroke needs few "
         "steps, the fastest mode of a flexible rod limits the step of an explicit method even where nothing happens, "
@@ -125,7 +125,7 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
 
 
 def _unstable(step: float) -> str:
-    """Why a predictor-corrector at the paper's step is no way to integrate a rod that rings undamped."""
+    """Return a note on the growth of a vibration per step, which makes the predictor-corrector fail at that step."""
     highest, steps = max(TABLE4_NORMAL_MODE), TABLE6["time_span"] / step
     more = growth(2.0 * np.pi * highest * step) - 1.0
     return (
@@ -136,11 +136,11 @@ def _unstable(step: float) -> str:
 
 
 def growth(angle: float) -> float:
-    """Factor by which a step of Adams, Bashforth and Moulton's method multiplies an undamped vibration.
+    """Return the factor by which a step of Adams, Bashforth and Moulton's method multiplies an undamped vibration.
 
     angle: circular frequency times step.  Order 4: predicted, evaluated, corrected, evaluated, so that y' = zy gives
-    y[n+1] = y[n] + z (9 p + 19 y[n] - 5 y[n-1] + y[n-2]) / 24, p = y[n] + z (55 y[n] - 59 y[n-1] + 37 y[n-2] -
-    9 y[n-3]) / 24 (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, sec. III.1).
+    y[n+1] = y[n] + z (9 p + 19 y[n] - 5 y[n-1] + y[n-2]) / 24, p = y[n] + z (55 y[n] - 59 y[n-1] + 37 y[n-2] - 9
+    y[n-3]) / 24 (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, sec. III.1).
     """
     z = 1j * angle
     predicted = np.array([1.0, 0.0, 0.0, 0.0]) + z / 24.0 * np.array([55.0, -59.0, 37.0, -9.0])
@@ -148,20 +148,20 @@ def growth(angle: float) -> float:
     return float(np.abs(np.roots([1.0, *-corrected])).max())
 
 
-def _verdict(timing: xr.Dataset, way: str) -> str:
-    """Our ratios by one way against the paper's, as one range."""
-    deviations = {scene: ratio / TABLE10[scene] for scene, ratio in ratios(timing, way).items()}
+def _verdict(timing: xr.Dataset, setting: str) -> str:
+    """Compare our ratios at one setting with the paper's, as one range."""
+    deviations = {scene: ratio / TABLE10[scene] for scene, ratio in ratios(timing, setting).items()}
     if not deviations:
-        return f"{WAYS[way].capitalize()}: no model of the paper's table besides the ideal one could be timed."
+        return f"{SETTINGS[setting].capitalize()}: no model of the paper's table besides the ideal one could be timed."
     least, most = min(deviations, key=deviations.__getitem__), max(deviations, key=deviations.__getitem__)
     return (
-        f"{WAYS[way].capitalize()}: our ratios are {rounded(deviations[least], 2)} ({least}) to "
+        f"{SETTINGS[setting].capitalize()}: our ratios are {rounded(deviations[least], 2)} ({least}) to "
         f"{rounded(deviations[most], 2)} ({most}) times the paper's."
     )
 
 
-def _which(timing: xr.Dataset) -> str:
-    """Which of the paper's ratios come out of counting the steps of a damped method at its tolerance."""
+def _step_ratios(timing: xr.Dataset) -> str:
+    """Compare ratios of step counts of a damped method at the paper's tolerance with the paper's ratios."""
     steps = {s: _steps(timing, s) for s in TABLE10 if s in timing.scene.values and s != REFERENCE}
     text = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in steps.items())
     similar = [s for s, ratio in steps.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]

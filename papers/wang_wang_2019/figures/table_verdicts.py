@@ -1,4 +1,4 @@
-"""What the paper states in section 6, and whether it holds here."""
+"""Verdicts on the statements of the paper's section 6."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.core.scene.output import rows
 from flexclear.pipeline.post.plotting.table import Table
 
-#: verdicts on the repeated stroke, which take two hours and stand in the repository (`make chaos`)
+#: verdicts on the repeated stroke, which take two hours and are stored in the repository (`make chaos`)
 SECTIONS = "docs/chaos/verdicts.csv"
-#: an effect that has no influence is below this fraction; one that is slight, and answers that agree, below SLIGHT
+#: largest fraction of "no influence"; SLIGHT is the largest one of a slight effect, and of answers that agree
 SMALL = 0.05
-#: a cost agrees with the paper's within this factor
+#: factor within which a cost agrees with the paper's
 NEAR = 1.5
 #: fractions below this are rounding of the runs
 ROUNDING = 1e-9
 HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
-Outcome = tuple[str, str]  #: verdict, and the numbers that say so
+Outcome = tuple[str, str]  #: verdict, and the numbers behind it
 
 
 @drawn(
@@ -40,8 +40,8 @@ Outcome = tuple[str, str]  #: verdict, and the numbers that say so
     files=(SECTIONS,),
 )
 def verdicts(data: Data) -> Table:
-    """Each statement with the verdict of its test."""
-    said = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
+    """Tabulate each statement with the verdict of its test."""
+    judged = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
@@ -53,7 +53,7 @@ def verdicts(data: Data) -> Table:
         "and 5 have verdicts of their own below them.",
     )
     heads = ("place", "statement", "verdict", "numbers")
-    return Table("Verdicts on the paper's statements (added)", heads, said, notes)
+    return Table("Verdicts on the paper's statements (added)", heads, judged, notes)
 
 
 def _verdict(*tests: bool) -> str:
@@ -79,7 +79,7 @@ def _listed(fractions: Mapping[str, float]) -> str:
 
 
 def _same_path(data: Data, models: Sequence[paper.Model]) -> Outcome:
-    """Whether the ball's centre stays next to the ideal model's; as a fraction of how far that moves."""
+    """Judge whether the ball's centre stays close to the ideal model's, as a fraction of that one's path."""
     ideal = deviations.ball_centre(data[f"{paper.IDEAL.scene}:run"])
     stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
     off = {m: float(np.linalg.norm(difference(data, m, deviations.ball_centre), axis=1).max()) for m in models}
@@ -90,7 +90,7 @@ def _same_path(data: Data, models: Sequence[paper.Model]) -> Outcome:
 
 
 def _other_path(data: Data) -> Outcome:
-    """The contrary statement on the same numbers."""
+    """Judge the contrary statement by the same numbers."""
     verdict, numbers = _same_path(data, [paper.CSJ])
     return {HOLDS: NOT, NOT: HOLDS}[verdict], f"{numbers}: by the measure of the platform's displacement no influence"
 
@@ -121,7 +121,7 @@ def _free_suitable(data: Data) -> Outcome:
 
 
 def _in_both_layouts(data: Data, outcome: Callable[[Data, paper.Model, paper.Model], Outcome]) -> Outcome:
-    """The outcome in the scenes' layout, with the first one's numbers behind it."""
+    """Return the outcome in the scenes' layout, with the first layout's numbers after it."""
     verdict, numbers = outcome(data, paper.CSJ, paper.IDEAL)
     return verdict, f"{numbers} ({outcome(data, paper.FIRST_CSJ, paper.FIRST_IDEAL)[1]})"
 
@@ -153,7 +153,7 @@ def _lowered(data: Data) -> Outcome:
 
 
 def _motion_kept(data: Data) -> Outcome:
-    """Angle and displacement are those of the ideal model, and none depends on the mode set."""
+    """Judge whether angle and displacement are those of the ideal model and independent of the mode set."""
     moved, own = {model: deviations.moved(data, model) for model in paper.FAR_CSJ}, deviations.sizes(data)
     largest = np.max([one.over(own) for one in moved.values()], axis=0)
     sets = [abs(ratio - 1.0) for ratio in moved[paper.FAR_CSJ_FREE].over(moved[paper.FAR_CSJ_FIXED])]
@@ -164,7 +164,7 @@ def _motion_kept(data: Data) -> Outcome:
 
 
 def _paths_differ(data: Data) -> Outcome:
-    """The ball's path in the socket, by what can be said of it beyond the horizon: statistics of the members."""
+    """Judge the ball's path in the socket by statistics of the members, which are valid beyond the horizon."""
     free, fixed = (
         data[f"{model.scene}:ensemble"].sel(contact=paper.JOINT) for model in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)
     )
@@ -179,7 +179,7 @@ def _paths_differ(data: Data) -> Outcome:
 
 
 def _dashpot(data: Data) -> Outcome:
-    """Vibration as the root mean square of the platform's acceleration minus the ideal one, at the outputs."""
+    """Judge the vibration: root mean square of the platform's acceleration minus the ideal one, at the outputs."""
     ideal = deviations.vertical(data[f"{paper.IDEAL.scene}:run"])
     rigid = float(np.sqrt(np.mean(difference(data, paper.CSJ, deviations.vertical) ** 2)))
     rows = {}
@@ -227,19 +227,19 @@ def _enlarged(data: Data) -> Outcome:
 
 
 def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
-    """Whether costs over the ideal model's are the paper's, by each way in which Table 10 gives them."""
+    """Judge whether costs over the ideal model's are the paper's, at each setting of Table 10."""
     tests, words = [], []
-    for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
-        costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
+    for setting, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
+        costs = {m: ratios(data["sps4:timing"], setting).get(m.scene, np.nan) for m in models}
         tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
-        said = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
-        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in said.items()))
+        texts_by_model = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
+        words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in texts_by_model.items()))
     printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
     return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
 
 
 def _becomes_chaotic(data: Data) -> Outcome:
-    """Periodic without clearance is a matter of course; quasi-periodic with it, chaotic with the rod's modes too."""
+    """Judge whether clearance makes the periodic motion quasi-periodic, and the rod's modes make it chaotic."""
     if not (TREE / SECTIONS).is_file():
         return _one_stroke(data)
     with (TREE / SECTIONS).open(newline="", encoding="utf-8") as file:
@@ -252,7 +252,7 @@ def _becomes_chaotic(data: Data) -> Outcome:
 
 
 def _motion(row: Mapping[str, str]) -> str:
-    """A verdict, with the largest Lyapunov exponent where it says something."""
+    """Return a verdict, for chaotic motion with the largest Lyapunov exponent."""
     if row["verdict"] != "chaotic":
         return row["verdict"]
     return f"chaotic ({row['exponent']} 1/s, 95 %: {row['exponent_low']} to {row['exponent_high']})"
@@ -268,7 +268,7 @@ def _one_stroke(data: Data) -> Outcome:
     )
 
 
-#: statements of the paper: name of the test of each, where they are, and what they say
+#: statements of the paper: name of the test, where the paper states it, and its words
 STATEMENTS = rows("""
 same motion | 6.2.1, Fig. 11(a)-(c) | With ideal joints the rod's flexibility has no effect on angle, displacement and
     velocity

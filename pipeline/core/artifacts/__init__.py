@@ -1,1 +1,1 @@
-"""The files in which the towers meet: what they hold (schema) and how they are stored (store)."""
+"""The files through which the towers exchange data: their contents (schema) and their storage (store)."""

@@ -1,12 +1,12 @@
 r"""Static compliance of a reduced body at its frames, from the reduced matrices alone.
 
-A frame i under a force while frame j is held: rigid motion follows j, so with the motion :math:`S_i` of the frames per
-modal coordinate and the rigid transport :math:`R_i R_j^{-1}`,
+With frame j held and a force at frame i, rigid motion follows j. With the motion :math:`S_i` of the frames per modal
+coordinate and the rigid transport :math:`R_i R_j^{-1}`,
 
 .. math:: \Delta_{ij} = S_i - R_i R_j^{-1} S_j, \qquad C_{ij} = \Delta_{ij} K^{-1} \Delta_{ij}^T .
 
 With nothing held (i = j) the inertia forces of the free body balance the load: :math:`\Delta_{ii} = S_i - R_i
-(R^T M R)^{-1} R^T M \Phi`. By the principle of minimum energy no reduced compliance exceeds that of the full model.
+(R^T M R)^{-1} R^T M \Phi`. By the principle of minimum energy no reduced compliance exceeds the full model's.
 Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 17 (inertia relief).
 """
 
@@ -22,33 +22,33 @@ DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def reduced(motion: np.ndarray, rigid: np.ndarray, relief: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Compliance [m/N, rad/(N m)] of each frame with each held, diagonal of the six, shape (p, p, 6).
+    """Return the compliance [m/N, rad/(N m)] of each frame with each held: diagonals, shape (p, p, 6).
 
-    motion: of p frames per modal coordinate, axes of the frame, shape (p, 6, n).  rigid: of the frames per rigid
-    motion of the body, shape (p, 6, 6).  relief: rigid motion in each shape, (R^T M R)^-1 R^T M Phi, shape (6, n).
-    stiffness: modal, shape (n, n).
+    motion: of p frames per modal coordinate, axes of the frame, shape (p, 6, n). rigid: of the frames per rigid motion
+    of the body, shape (p, 6, 6). relief: rigid motion in each shape, (R^T M R)^-1 R^T M Phi, shape (6, n). stiffness:
+    modal, shape (n, n).
     """
     p = len(motion)
     result = np.empty((p, p, 6))
     for i in range(p):
         for j in range(p):
-            carried = relief if i == j else np.linalg.solve(rigid[j], motion[j])
-            moved = motion[i] - rigid[i] @ carried
-            result[i, j] = np.einsum("dn,nd->d", moved, np.linalg.solve(stiffness, moved.T))
+            rigid_motion = relief if i == j else np.linalg.solve(rigid[j], motion[j])
+            deformation = motion[i] - rigid[i] @ rigid_motion
+            result[i, j] = np.einsum("dn,nd->d", deformation, np.linalg.solve(stiffness, deformation.T))
     return result
 
 
 def fractions(of_modes: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """Compliance of the modes over that of the full model; one where this has none, as of a frame to itself."""
+    """Return the modes' compliance over that of the full model; 1 where the latter is negligible."""
     negligible = full <= 1e-9 * full.max(axis=(0, 1), keepdims=True)
     return np.where(negligible, 1.0, of_modes / np.where(negligible, 1.0, full))
 
 
 def of_bundle(bundle: xr.Dataset) -> np.ndarray:
-    """`reduced` for a bundle, shape (frame, frame, 6)."""
+    """Return the compliances of a bundle's frames as `reduced` does, shape (frame, frame, 6)."""
     R_BF = bundle["frame_rotation"].values
-    turned = [np.swapaxes(R_BF, 1, 2) @ bundle[f"frame_{name}_shape"].values for name in ("translation", "rotation")]
-    motion = np.concatenate(turned, axis=1)
+    shapes = [np.swapaxes(R_BF, 1, 2) @ bundle[f"frame_{name}_shape"].values for name in ("translation", "rotation")]
+    motion = np.concatenate(shapes, axis=1)
     arms = -skew(bundle["frame_position"].values)
     eye = np.broadcast_to(np.eye(3), arms.shape)
     rigid = np.block([[eye, arms], [np.zeros_like(arms), eye]])
@@ -58,7 +58,7 @@ def of_bundle(bundle: xr.Dataset) -> np.ndarray:
 
 
 def _relief(bundle: xr.Dataset) -> np.ndarray:
-    """Rigid motion in each shape, about the origin of the body frame, shape (6, n)."""
+    """Return the rigid motion in each shape, about the origin of the body frame, shape (6, n)."""
     mass, first, second = (bundle[name].values for name in ("mass", "first_moment", "second_moment"))
     inertia = np.trace(second) * np.eye(3) - second
     arm = skew(first)

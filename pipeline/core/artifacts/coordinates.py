@@ -1,4 +1,4 @@
-"""Coordinates of the artifacts: what the entries of each dimension are called, and what belongs to them."""
+"""Coordinates of the artifacts: names of the entries of each dimension, and the data attached to them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.output import Schema, table
 
 AXES = ("x", "y", "z")
 QUATERNION = ("w", "x", "y", "z")
-#: what an entry of `<dimension>_motion` says; it decides the unit of variables whose entries slide or turn
+#: entries of `<dimension>_motion`; they decide the units of variables whose entries slide or turn
 TRANSLATION, ROTATION = "translation", "rotation"
 
 
@@ -100,7 +100,7 @@ frequency? | frequency | 1 | cycles per period
 lag? | lag | 1 | number of periods later
 component? | component | 1 | direction of the motion, by variance, from 0
 """)
-#: dimensions whose entries have no other name than their number, and the number of the first
+#: dimensions whose entries are named by numbers only, and the number of the first entry
 NUMBERED = {
     **dict.fromkeys(("node", "cell", "corner", "around", "point", "lump", "section", "slice", "fibre"), 0),
     **dict.fromkeys(("followed", "lag", "component", "band", "sector"), 0),
@@ -122,12 +122,12 @@ MOTIONS: Mapping[str, tuple[str, ...]] = {
 
 
 def motion(turning: bool) -> str:
-    """How `<dimension>_motion` calls an entry."""
+    """Return the entry of `<dimension>_motion`."""
     return ROTATION if turning else TRANSLATION
 
 
 def with_names(data: LabelledArrays) -> LabelledArrays:
-    """The same with the coordinates that follow from its dimensions alone."""
+    """Return the data with the coordinates that follow from its dimensions alone."""
     variables: dict[str, LabelledArray] = {}
     for name, length in data.sizes.items():
         if name in NAMED:
@@ -140,9 +140,9 @@ def with_names(data: LabelledArrays) -> LabelledArrays:
 
 
 def turning(data: LabelledArrays, dims: tuple[str, ...]) -> tuple[str, np.ndarray]:
-    """The dimension among `dims` whose entries slide or turn, and which of them turn; of none, an empty name.
+    """Return the dimension among `dims` whose entries slide or turn, and which of them turn; "" without such entries.
 
-    Events and impacts are of the kind of their contacts.
+    Events and impacts move as their contacts do.
     """
     for dim in dims:
         if f"{dim}_motion" in data.coords:

@@ -1,6 +1,6 @@
-"""What a bundle lacks, in words and as a table, from the bundle alone.
+"""Deficits of a bundle, in words and as a table, from the bundle alone.
 
-The simulate stage may ask `warnings` with the frames at which joints and drives act on the body.
+The simulate stage calls `warnings` with the frames at which joints and drives act on the body.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: a fraction of the static compliance below this is worth a warning
+#: fraction of the static compliance below which a warning is given
 ENOUGH_COMPLIANCE = 0.9
-#: references whose shapes answer static loads at the interfaces exactly
+#: reference conditions whose shapes represent static loads at the interfaces exactly
 STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")
 WIDTH = 9
 
 
 def table(bundle: xr.Dataset) -> str:
-    """The deficits of a bundle (schema BUNDLE) as lines of text."""
+    """Return the deficits of a bundle (schema BUNDLE) as lines of text."""
     a = bundle.attrs
     resolved = float(a["resolved_frequency"])
     first = float(a["first_free_frequency"])
@@ -59,9 +59,9 @@ def _row(frame: str, held: str, values: Sequence[object]) -> str:
 
 
 def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body") -> list[str]:
-    """Sentences about static compliance that is missing between the frames at which forces act.
+    """Return sentences about static compliance that the modes lack between the frames at which forces act.
 
-    frames_used: named frames of the bundle.  A single frame is judged with nothing held.
+    frames_used: named frames of the bundle. A single frame is judged with nothing held.
     """
     used = list(dict.fromkeys(frames_used))
     pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]] or [(i, i) for i in used]
@@ -83,7 +83,7 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
 
 
 def _remedy(bundle: Labelled, used: Sequence[str]) -> str:
-    """What gives the body the missing compliance: static shapes, those of the frames used, or more modes."""
+    """Return the remedy for missing compliance: static shapes, static shapes of all frames used, or more modes."""
     if bundle.attrs["reference"] not in STATIC:
         return (
             f'Static shapes mend that, as modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
@@ -99,7 +99,7 @@ def _remedy(bundle: Labelled, used: Sequence[str]) -> str:
 
 
 def _percent(fraction: float) -> str:
-    """Per cent with three digits; rounding is nothing."""
+    """Return a fraction in per cent with three digits; fractions of the size of rounding errors are 0."""
     return f"{100.0 * fraction:.3g}" if fraction > 1e-9 else "0"
 
 

@@ -1,7 +1,7 @@
-"""Files that are there in full or not at all, that carry their own digest, that are shown as copies; locks; sweeping.
+"""Atomically written files with their own digests, copies for display, locks, and the removal of leftovers.
 
-Temporary files and locks of a process that died are left behind, whatever it died of; `sweep` knows them by the name
-of their owner, or by nobody holding them.
+Temporary files and locks of a process that died stay on disk, whatever ended it; `sweep` recognises temporary files by
+the name of their owner, and locks by nobody holding them.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from flexclear.pipeline.core.system.errors import ResourceError
 if TYPE_CHECKING:
     from filelock import FileLock
 
-#: bytes that no table of records, facts or imports has
+#: bytes that no table of records, facts or imports exceeds
 LARGEST_TABLE = 64 << 20
-#: bytes that are copied at once: more are new to memory each time, which takes longer than to copy them
+#: bytes copied at once: a larger buffer is newly allocated each time, which takes longer than copying
 PIECE = 1 << 17
-#: what a full or limited disk answers
+#: error numbers of a full or limited disk
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-#: temporary files of other machines that share the disk, and unfinished work, are swept when they are so old [s]
-FORGOTTEN = 7 * 86400.0
-#: what a file system without locks answers
+#: age at which temporary files of other machines that share the disk, and unfinished work, are removed [s]
+ABANDONED_AFTER = 7 * 86400.0
+#: error numbers of a file system without locks
 LOCKLESS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _TEMPORARY = re.compile(r"\.(?P<stem>[^.]*)\.(?P<host>[0-9a-f]{8})-(?P<pid>\d+)\.[0-9a-f]{8}\.tmp")
 
 
 def sha256(content: bytes) -> str:
-    """Hexadecimal digest."""
+    """Return the hexadecimal SHA-256 digest of bytes."""
     return hashlib.sha256(content).hexdigest()
 
 
 def require_ordinary(path: Path) -> int:
-    """Bytes of a file; OSError for a folder, a device, which may have no end, or a pipe, which waits for a writer."""
+    """Return a file's size [bytes]; raise OSError for a folder, a device (possibly endless) or a pipe (may wait)."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise OSError(errno.EINVAL, "it is no ordinary file", str(path))
@@ -54,7 +54,7 @@ def require_ordinary(path: Path) -> int:
 
 
 def read_whole(path: Path, largest: int | None = None) -> bytes:
-    """What an ordinary file holds; OSError for others, and for more bytes than `largest`."""
+    """Read an ordinary file; raise OSError for other files, and for more bytes than `largest`."""
     size = require_ordinary(path)
     if largest is not None and size > largest:
         raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
@@ -62,43 +62,43 @@ def read_whole(path: Path, largest: int | None = None) -> bytes:
 
 
 def digest_of(path: Path) -> str:
-    """The sha256 of an ordinary file, however large; OSError for others."""
+    """Return the SHA-256 digest of an ordinary file of any size; raise OSError for other files."""
     require_ordinary(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def publish(path: Path, content: bytes) -> str:
-    """Write a file so that it is either there in full or not at all; returns its sha256."""
-    with temporary(path) as made:
-        made.write_bytes(content)
-        if made.read_bytes() != content:
+    """Write a file so that it exists in full or not at all; return its SHA-256 digest."""
+    with temporary(path) as scratch:
+        scratch.write_bytes(content)
+        if scratch.read_bytes() != content:
             raise OSError(errno.EIO, "what was written does not read back", str(path))
-        digest = settle(made, path)
+        digest = settle(scratch, path)
     platforms.sync_folder(path.parent)
     return digest
 
 
-def settle(made: Path, path: Path) -> str:
-    """Force the bytes of a file to the disk and give it its name; returns its sha256.
+def settle(scratch: Path, path: Path) -> str:
+    """Force a file's bytes to the disk and rename the file to `path`; return its SHA-256 digest.
 
-    The name is on the disk after `platforms.sync_folder`, together with all others of its folder.
+    The new name is on the disk only after `platforms.sync_folder`, which covers all names of the folder.
     """
-    with made.open("rb+") as file:  # Windows forces only what could be written
+    with scratch.open("rb+") as file:  # Windows syncs only files that are open for writing
         os.fsync(file.fileno())
-    digest = digest_of(made)
-    platforms.replace(made, path)
+    digest = digest_of(scratch)
+    platforms.replace(scratch, path)
     return digest
 
 
 def checked(table: Mapping[str, Any]) -> bytes:
-    """A table as a file that carries its own digest: ``{"content": ..., "sha256": ...}``."""
+    """Encode a table as a file that carries its own digest: ``{"content": ..., "sha256": ...}``."""
     whole = {"content": table, "sha256": _digest(table)}
     return json.dumps(whole, indent=1, sort_keys=True, ensure_ascii=False).encode() + b"\n"
 
 
 def read_checked(path: Path) -> dict[str, Any] | None:
-    """The table in a file that `checked` made; None when there is none or one bit of it has changed."""
+    """Return the table in a file of `checked`; None when there is no such file or a bit of it has changed."""
     try:
         whole = json.loads(read_whole(path, LARGEST_TABLE))
         table = whole["content"]
@@ -112,20 +112,20 @@ def _digest(table: Mapping[str, Any]) -> str:
 
 
 def copy(source: Path, target: Path) -> None:
-    """Let `target` be a read-only copy with the time of `source`; it takes no space where the disk can share bytes."""
+    """Make `target` a read-only copy with the time of `source`; where the disk can share blocks, it takes no space."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    with temporary(target) as made:
-        with source.open("rb") as old, made.open("wb") as new:
+    with temporary(target) as scratch:
+        with source.open("rb") as old, scratch.open("wb") as new:
             if not platforms.share_blocks(old, new):
                 shutil.copyfileobj(old, new, PIECE)
         status = source.stat()
-        os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))
-        made.chmod(0o444)
-        platforms.replace(made, target)
+        os.utime(scratch, ns=(status.st_atime_ns, status.st_mtime_ns))
+        scratch.chmod(0o444)
+        platforms.replace(scratch, target)
 
 
 def is_copy(source: Path, target: Path) -> bool:
-    """Whether `target` is as `copy` left it: of its own, of equal size and time."""
+    """Return True when `target` is as `copy` left it: a file of its own, of equal size and time."""
     try:
         old, new = source.stat(), target.stat()
     except OSError:
@@ -136,19 +136,19 @@ def is_copy(source: Path, target: Path) -> bool:
 
 @contextlib.contextmanager
 def temporary(path: Path) -> Iterator[Path]:
-    """A name next to `path` that no other process uses; gone afterwards, however it ends."""
+    """Yield a name next to `path` that no other process uses; remove the file at the end, also after an error."""
     stem = path.name.lstrip(".").partition(".")[0]
-    made = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
+    scratch = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
     try:
-        yield made
+        yield scratch
     finally:
-        with contextlib.suppress(PermissionError):  # a library that failed has it still open, on Windows: `sweep` will
-            platforms.remove(made)
+        with contextlib.suppress(PermissionError):  # on Windows, open in a library that failed: `sweep` removes it
+            platforms.remove(scratch)
 
 
 @contextlib.contextmanager
 def disk_limits(folder: Path) -> Iterator[None]:
-    """OSError on the way to disk, as a limit of the machine, in words."""
+    """Convert OSError of writing to ResourceError, with the limit of the machine in words."""
     try:
         yield
     except OSError as error:
@@ -158,29 +158,29 @@ def disk_limits(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambda: None) -> Iterator[bool]:
-    """Whether this process has the lock of a file, which is gone afterwards; `waiting` is called before it waits.
+    """Yield True when this process holds the lock file, and remove it after; call `waiting` before any wait.
 
-    The system drops the lock of a process that dies, whatever it dies of.
+    The operating system drops the lock of a process that dies, whatever ended it.
     """
-    from filelock import FileLock  # here, since what finds everything fresh locks nothing
+    from filelock import FileLock  # here, since a command whose results are all up to date locks nothing
 
     platforms.set_aside(path)
     lock = FileLock(path, thread_local=False, fallback_to_soft=False)
-    mine = _acquire(lock, wait=False)
-    if mine is None and wait:
+    held = _acquire(lock, wait=False)
+    if held is None and wait:
         waiting()
-        mine = _acquire(lock, wait=True)
+        held = _acquire(lock, wait=True)
     try:
-        yield mine is not None
+        yield held is not None
     finally:
-        stays = mine is not None and not _unlinked(path)  # while it is held: who waits will look for the file again
+        remains = held is not None and not _removed(path)  # while held: waiting processes then look for the file again
         lock.release()
-        if stays:  # Windows removes no file that is open; nor this one, where somebody else holds it by now
-            _unlinked(path)
+        if remains:  # Windows removes no open file; this attempt, too, fails where another process now holds the lock
+            _removed(path)
 
 
-def _unlinked(path: Path) -> bool:
-    """Whether there is no such file any more."""
+def _removed(path: Path) -> bool:
+    """Remove a file; return True when it no longer exists."""
     try:
         path.unlink(missing_ok=True)
     except OSError:
@@ -189,10 +189,10 @@ def _unlinked(path: Path) -> bool:
 
 
 def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
-    """The lock, or None when another process holds it.
+    """Return the lock, or None when another process holds it.
 
-    A file system without locks counts as free: unique temporary names and atomic replacement keep results right, work
-    may then be done twice.
+    A file system without locks counts as free: unique temporary names and atomic replacement keep results correct, but
+    work may then be done twice.
     """
     from filelock import Timeout
 
@@ -207,8 +207,8 @@ def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
 
 
 def sweep(root: Path) -> int:
-    """Remove temporary files and locks below `root` that processes left which are no more, and unfinished work that
-    nobody has continued for long; how many."""
+    """Remove temporary files and locks of ended processes below `root`, and unfinished work that nobody has continued
+    for long; return the number of removed files."""
     removed = 0
     for folder, _, names in os.walk(root):
         for name in names:
@@ -216,19 +216,19 @@ def sweep(root: Path) -> int:
                 continue
             path = Path(folder, name)
             if (name.endswith(".tmp") and _abandoned(path)) or (name.endswith(".part") and _old(path)):
-                with contextlib.suppress(OSError):  # nothing can be written there, or another sweeps
+                with contextlib.suppress(OSError):  # the folder is read-only, or another process removes the file
                     path.unlink()
                     removed += 1
             elif name.endswith(".lock"):
-                with contextlib.suppress(OSError), locked(path, wait=False) as mine:
-                    removed += mine  # gone when it is released
+                with contextlib.suppress(OSError), locked(path, wait=False) as held:
+                    removed += held  # its release removes it
     return removed
 
 
 def _abandoned(path: Path) -> bool:
     match = _TEMPORARY.fullmatch(path.name)
     if match is None:
-        return False  # none of ours
+        return False  # not a file of this program
     if match["host"] != _host():
         return _old(path)
     return not platforms.alive(int(match["pid"]))
@@ -236,7 +236,7 @@ def _abandoned(path: Path) -> bool:
 
 def _old(path: Path) -> bool:
     with contextlib.suppress(OSError):
-        return time.time() - path.stat().st_mtime > FORGOTTEN
+        return time.time() - path.stat().st_mtime > ABANDONED_AFTER
     return False
 
 

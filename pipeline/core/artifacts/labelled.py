@@ -1,7 +1,7 @@
-"""Arrays with named dimensions: what a run, and what follows from it, is from the engine to the disk.
+"""Arrays with named dimensions: the form of runs and of derived data from the engine to the disk.
 
-xarray's datasets are the same with many operations on top, and what users are given. Importing xarray takes 1.5 s of
-the processor, NumPy and netCDF4 0.3 s, so what is only written, read back and derived from does without it.
+xarray's datasets contain the same with many operations on top; users get these. Importing xarray takes 1.5 s of
+processor time, NumPy and netCDF4 0.3 s, so data that is only written, read back and processed does without xarray.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-#: what stages read, of which names, dimensions and values are asked alone
+#: inputs of stages that use only names, dimensions and values
 Labelled: TypeAlias = "xr.Dataset | LabelledArrays"
 
 
@@ -31,9 +31,9 @@ class LabelledArray:
 
 @dataclass(frozen=True)
 class LabelledArrays:
-    """Arrays by name, in the order in which they are written; `coords` are those that name entries of dimensions.
+    """Arrays by name, in the order in which they are written; `coords` names the arrays that label dimensions.
 
-    Arrays of the same dimension have the same length along it, or ValueError is raised.
+    Raises ValueError when arrays have different lengths along the same dimension.
     """
 
     variables: Mapping[str, LabelledArray]
@@ -52,12 +52,12 @@ class LabelledArrays:
         return name in self.variables
 
     def __iter__(self) -> Iterator[str]:
-        """Names of what is no coordinate."""
+        """Yield the names of the arrays that are not coordinates."""
         return (name for name in self.variables if name not in self.coords)
 
     @cached_property
     def sizes(self) -> dict[str, int]:
-        """Length of each dimension, in the order in which arrays name them."""
+        """Length of each dimension, in the order of the arrays."""
         return {
             dim: length
             for array in self.variables.values()
@@ -66,20 +66,20 @@ class LabelledArrays:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all values."""
+        """Size of all values [bytes]."""
         return sum(array.values.nbytes for array in self.variables.values())
 
     def assign_attrs(self, **text: Any) -> LabelledArrays:
-        """The same with more attributes."""
+        """Return a copy with more attributes."""
         return replace(self, attrs={**self.attrs, **text})
 
     def assign_coords(self, coordinates: Mapping[str, LabelledArray]) -> LabelledArrays:
-        """The same with these coordinates last, instead of others of their names."""
+        """Return a copy with these coordinates last; they replace arrays of the same names."""
         remaining = {name: array for name, array in self.variables.items() if name not in coordinates}
         return replace(self, variables=remaining | dict(coordinates), coords=self.coords | coordinates.keys())
 
     def to_xarray(self) -> xr.Dataset:
-        """The same for users; values are shared."""
+        """Return an xarray dataset that shares the values."""
         import xarray as xr
 
         every = {name: xr.Variable(a.dims, a.values, dict(a.attrs)) for name, a in self.variables.items()}
@@ -89,9 +89,9 @@ class LabelledArrays:
 def labelled(
     variables: Mapping[str, tuple[tuple[str, ...], Any]], coords: Mapping[str, Any], **attrs: Any
 ) -> LabelledArrays:
-    """Arrays from (dimensions, values) by name, coordinates last.
+    """Return arrays from (dimensions, values) by name, coordinates last.
 
-    coords: the same, or the entries of the dimension of that name alone, or arrays as they are.
+    coords: pairs likewise, or only the entries of the dimension of that name, or labelled arrays.
     """
     named = {name: _array(name, value) for name, value in {**variables, **coords}.items()}
     return LabelledArrays(named, frozenset(coords), attrs)
@@ -107,7 +107,7 @@ def _array(name: str, value: Any) -> LabelledArray:
 
 
 def of(dataset: xr.Dataset | LabelledArrays) -> LabelledArrays:
-    """Arrays of a dataset; values are shared."""
+    """Return the labelled arrays of a dataset; values are shared."""
     if isinstance(dataset, LabelledArrays):
         return dataset
     variables = {

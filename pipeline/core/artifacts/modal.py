@@ -1,4 +1,4 @@
-"""``dataset.modal``: fewer modes of a bundle, in all of its variables at once; registered by importing this module."""
+"""``dataset.modal``: truncation of a bundle's modes in all variables at once; registered by importing this module."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from flexclear.pipeline.core.system.errors import InputError
 
 #: dimensions that count modes
 DIMENSIONS = ("mode", "mode2")
-#: what was measured of all modes together and cannot be derived for fewer
+#: variables computed for all modes together, which cannot be derived for fewer
 OF_ALL = ("error_bound", "bound_frequency", "stress_field", "field")
 
 
 @xr.register_dataset_accessor("modal")
 class Modal:
-    """Modes of a dataset that has some: a bundle, modes, or a run. Keeps no state besides the dataset."""
+    """Modes of a dataset (bundle, modes, or run). Holds no state besides the dataset."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
@@ -26,11 +26,11 @@ class Modal:
         return int(self._dataset.sizes.get("mode", 0))
 
     def truncate(self, count: int) -> xr.Dataset:
-        """The dataset with its first `count` modes only, in every variable that counts modes.
+        """Return the dataset with its first `count` modes only, in every variable that counts modes.
 
         The modes of a bundle are eigenvectors of its reduced matrices, so that the first of them are a basis of their
-        own. Fractions of compliance are computed again; the error bound and the resolved frequency are dropped.
-        Raises InputError for a count that is not there, or that cuts a pair of equal frequencies.
+        own. Fractions of compliance are computed again; the error bound and the resolved frequency are dropped. Raises
+        InputError for a count out of range, or that cuts a pair of equal frequencies.
         """
         self._check(count)
         result = self._dataset.isel({name: slice(count) for name in DIMENSIONS if name in self._dataset.dims})

@@ -1,7 +1,7 @@
-"""NetCDF-4 files of labelled arrays, with all that xarray writes into them: the one writer and the one reader.
+"""NetCDF-4 files of labelled arrays, in the conventions of xarray: the only writer and the only reader.
 
-What xarray keeps next to NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
-stored as bytes with the attribute `dtype`, and floats have NaN for what was never written.
+Conventions that xarray adds to NetCDF are here, too: attributes `coordinates` list coordinates, Booleans are stored as
+bytes with the attribute `dtype`, and unwritten floats are NaN.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays
 
-#: bytes of a dataset from which on room on the disk counts for more than time
+#: size above which datasets are compressed, since disk space then counts more than time [bytes]
 COMPRESSED = 1 << 26
-#: how the library takes values of a kind, where otherwise than they are
+#: types that the library requires for kinds of values that it does not accept as they are
 _TAKEN = {"U": np.dtype("O"), "b": np.dtype("i1")}
 _LOCK = Lock()
 _COORDINATES, _BOOL, _FILL = "coordinates", {"dtype": "bool"}, "_FillValue"
 
 
 def write(path: Path, data: LabelledArrays) -> None:
-    """Write a file; OSError or RuntimeError of the library where it cannot.
+    """Write a file; OSError or RuntimeError of the library where it fails.
 
-    Numeric arrays carry fletcher32 sums, so that other programs notice damage too, wherever the file is taken; without
-    them writing takes three quarters of the time.  From `COMPRESSED` bytes on they are deflated; below that it takes
-    longer than making them, since what a run records has few digits to spare.  They are written when all are defined:
-    each change between the two lets the library write all that it has so far, which took as long as the rest.
+    Numeric arrays carry fletcher32 checksums, so that other programs notice damage, too, wherever the file goes;
+    without them writing takes three quarters of the time. From `COMPRESSED` bytes on arrays are deflated. For smaller
+    files deflating takes longer than computing the run, since recorded values have few spare digits. Values are written
+    after all definitions: each change between the two makes the library flush, which took as long as the rest.
     """
     import netCDF4
 
     listed, whole = _listed(data)
     compress = data.nbytes >= COMPRESSED
-    with _alone(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+    with _serialised(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
         for name, value in {**data.attrs, **whole}.items():
             texts = isinstance(value, (list, tuple)) and len(value) and all(isinstance(one, str) for one in value)
             (file.setncattr_string if texts else file.setncattr)(name, value)
@@ -50,15 +50,15 @@ def write(path: Path, data: LabelledArrays) -> None:
 
 
 @contextlib.contextmanager
-def _alone() -> Iterator[None]:
-    """The library is not made for threads: one at a time, and none of those in which xarray uses it."""
-    theirs = sys.modules.get("xarray.backends.netCDF4_")  # which another thread may just be importing
-    with _LOCK, getattr(theirs, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
+def _serialised() -> Iterator[None]:
+    """Serialise the use of the library, which is not made for threads, also against its use by xarray."""
+    backend = sys.modules.get("xarray.backends.netCDF4_")  # another thread may be importing it, so it may lack its lock
+    with _LOCK, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
         yield
 
 
 def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str], compress: bool) -> Any:
-    """A variable of the file, with all but its values."""
+    """Define a variable of the file, without its values."""
     values, kind = array.values, array.values.dtype.kind
     truth = _BOOL if kind == "b" else {}
     stored_type = str if kind in "OU" else values.dtype.newbyteorder("=") if not truth else np.dtype("i1")
@@ -79,34 +79,34 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
 
 
 def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
-    """The attribute `coordinates` of each array, and that of the file for those that no array has all dimensions of."""
+    """Return attribute `coordinates` by array, and that of the file for coordinates that fit no array's dimensions."""
     additional = sorted(data.coords - data.sizes.keys())
-    attributes, left = dict[str, dict[str, str]](), set(additional)
+    attributes, unlisted = dict[str, dict[str, str]](), set(additional)
     for name, array in data.variables.items():
         if name in additional or name in array.dims:
             continue
         own = [other for other in additional if set(data[other].dims) <= set(array.dims)]
         if own:
             attributes[name] = {_COORDINATES: " ".join(own)}
-            left -= set(own)
-    return attributes, {_COORDINATES: " ".join(sorted(left))} if left else {}
+            unlisted -= set(own)
+    return attributes, {_COORDINATES: " ".join(sorted(unlisted))} if unlisted else {}
 
 
 def read(content: bytes) -> LabelledArrays:
-    """The arrays in the bytes of a file.
+    """Return the arrays in the bytes of a file.
 
     Raises OSError, ValueError, RuntimeError or TypeError for other bytes.
     """
     import netCDF4
 
-    with _alone(), netCDF4.Dataset("in memory", memory=content) as file:
+    with _serialised(), netCDF4.Dataset("in memory", memory=content) as file:
         file.set_auto_maskandscale(False)
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
-        coords = {name for name in file.variables if name in file.dimensions} | set(_words(attrs))
+        coords = {name for name in file.variables if name in file.dimensions} | set(_taken_coordinates(attrs))
         variables = {}
         for name, variable in file.variables.items():
             own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != _FILL}
-            coords |= set(_words(own))
+            coords |= set(_taken_coordinates(own))
             values = np.asarray(variable[...], dtype=str if variable.dtype is str else None)
             if own.get("dtype") == "bool":
                 del own["dtype"]
@@ -115,6 +115,6 @@ def read(content: bytes) -> LabelledArrays:
     return LabelledArrays(variables, frozenset(coords & variables.keys()), attrs)
 
 
-def _words(attrs: dict[str, Any]) -> list[str]:
-    """The coordinates that attributes list, which are then taken away."""
+def _taken_coordinates(attrs: dict[str, Any]) -> list[str]:
+    """Remove the list of coordinates from the attributes and return it."""
     return str(attrs.pop(_COORDINATES, "")).split()

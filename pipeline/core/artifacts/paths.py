@@ -7,7 +7,7 @@ from pathlib import Path
 
 from flexclear.pipeline.core.system.version import version
 
-#: folder that holds the packages `pipeline` and `stages`: `flexclear`, or, where links are not followed, a checkout
+#: folder of the packages `pipeline` and `stages`: `flexclear`, or a checkout when they are imported from there directly
 PACKAGES = Path(__file__).absolute().parents[3]
 #: folder that holds the package `flexclear`; sources are read below it
 TREE = PACKAGES if (PACKAGES / "flexclear" / "__init__.py").is_file() else PACKAGES.parent
@@ -16,8 +16,8 @@ DATA = PACKAGES
 
 
 def results_root() -> Path:
-    """Folder of all results: FLEXCLEAR_RESULTS; else ``results`` of the source checkout, where the command is called
-    from inside of one's own, else of the current folder."""
+    """Return the folder of all results: FLEXCLEAR_RESULTS; else ``results`` of the source checkout when the current
+    folder is inside of it; else ``results`` of the current folder."""
     named = os.environ.get("FLEXCLEAR_RESULTS")
     if named:
         return Path(named).resolve()
@@ -27,17 +27,17 @@ def results_root() -> Path:
 
 
 def kernel_root() -> Path:
-    """The folder of compiled kernels: FLEXCLEAR_KERNELS, or one per user and version in the user's cache folder.
+    """Return the folder of compiled kernels: FLEXCLEAR_KERNELS, or one per user and version in the user's cache.
 
-    Not below the results, which people send to each other: to load a kernel is to run code. The names of kernels say
-    all that they depend on, so that every project of a user may share one folder.
+    Kernels are not below the results, which people send to each other: loading a kernel executes code. A kernel's name
+    covers all that the kernel depends on, so that all projects of a user can share one folder.
     """
     named = os.environ.get("FLEXCLEAR_KERNELS")
     return Path(named).resolve() if named else kernel_home() / version().replace(" ", "_") / "kernels"
 
 
 def kernel_home() -> Path:
-    """The user's cache folder of this program, with a folder for each version that has been used."""
-    from platformdirs import user_cache_path  # here, since few commands ask for it
+    """Return the user's cache folder of this program, which has one folder per version in use."""
+    from platformdirs import user_cache_path  # here, since few commands need it
 
     return user_cache_path("flexclear", appauthor=False)

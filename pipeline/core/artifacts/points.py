@@ -1,4 +1,4 @@
-"""Points of a sweep: what is left of each, batches of them as artifacts, and the dataset of all of them."""
+"""Points of a sweep: the data stored of each, batches of points as artifacts, and the dataset of all points."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from flexclear.pipeline.core.scene.quantity import Recorded
 from flexclear.pipeline.core.scene.units import udunits
 
 Values = dict[str, np.ndarray]
-#: what became of a point
+#: states of a point
 STATUS = ("done", "refused", "not_run")
 DONE, REFUSED, NOT_RUN = range(3)
-#: what is recorded of each quantity: its value, and where asked for the difference from a run at a tighter tolerance,
-#: or the standard deviation over members; and what that adds to its meaning
+#: statistics of a recorded quantity: its value, and on request the difference from a run at a tighter tolerance or the
+#: standard deviation over members; with the text appended to the quantity's long name
 MEANINGS = {
     "values": "",
     "error": "; distance from the value at a hundredth of the tolerance",
@@ -31,12 +31,12 @@ STATISTICS = tuple(MEANINGS)
 
 @dataclass(frozen=True)
 class Point:
-    """What is left of one point.
+    """Recorded data of one point.
 
-    values: by the names of the recorded quantities, in SI; with members their mean.  error: distance from the values at
-    a tighter tolerance.  deviation: standard deviation over the members.  Both are empty where nobody asked.
-    evaluations: of the right-hand side, all runs of the point together.
-    refused: why there are no values; else empty.  members: values of each start; artifacts lack them.
+    values: by the names of the recorded quantities, in SI; with members their mean. error: distance from the values at
+    a tighter tolerance. deviation: standard deviation over the members. Both are empty unless requested. evaluations:
+    of the right-hand side, in all runs of the point. refused: why there are no values; else empty. members: values of
+    each start; artifacts lack them.
     """
 
     values: Values
@@ -48,13 +48,13 @@ class Point:
 
 
 def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Dataset:
-    """Finished points by their keys, as a dataset."""
+    """Return finished points, with their keys, as a dataset."""
     done = list(points.values())
     variables: dict[str, Any] = {}
     for statistic, one in itertools.product(STATISTICS, recorded):
-        there = [getattr(point, statistic)[one.name] for point in done if one.name in getattr(point, statistic)]
-        if there:
-            rows = _rows(done, one.name, statistic, np.shape(there[0]))
+        values = [getattr(point, statistic)[one.name] for point in done if one.name in getattr(point, statistic)]
+        if values:
+            rows = _rows(done, one.name, statistic, np.shape(values[0]))
             variables[variable(one, statistic)] = (("point", *one.dims), rows)
     variables["evaluations"] = (("point",), np.array([point.evaluations for point in done], dtype=np.int64))
     variables["refused"] = (("point",), np.array([point.refused for point in done], dtype=object))
@@ -62,7 +62,7 @@ def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Datas
 
 
 def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Point]:
-    """The points of a batch by their keys."""
+    """Return the points of a batch by their keys."""
     arrays = {str(name): stored[name].values for name in stored.variables}
     points = {}
     for k, key in enumerate(arrays["key"]):
@@ -76,7 +76,7 @@ def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Poin
 
 
 def variable(one: Recorded, statistic: str) -> str:
-    """Name of a variable; files take no stroke in it."""
+    """Return the name of a variable, with "÷" for "/", which names in files must not contain."""
     return (one.name if statistic == "values" else f"{one.name}.{statistic}").replace("/", "÷")
 
 
@@ -90,10 +90,10 @@ def dataset(
     attributes: Mapping[str, str | int],
     statistics: Sequence[str] = STATISTICS[:1],
 ) -> xr.Dataset:
-    """All points of a sweep on its own dimensions; nan where there is no value.
+    """Return all points of a sweep on its own dimensions; NaN where a value is missing.
 
-    keys: of the points, in their order.  points: the finished ones.  time: of the recorded series [s].
-    sections: how many there are of each point.  statistics: of `STATISTICS`, those that are asked for.
+    keys: of the points, in their order. points: the finished ones. time: of the recorded series [s]. sections: number
+    per point. statistics: the requested ones of `STATISTICS`.
     """
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
@@ -131,12 +131,12 @@ def dataset(
 
 
 def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
-    """Lengths of the dimensions that what is recorded of a point may have."""
+    """Return the lengths of all dimensions that recorded quantities of a point may have."""
     return {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
 
 
 def _rows(points: Sequence[Point | None], name: str, statistic: str, inner: tuple[int, ...]) -> np.ndarray:
-    """Values of points, shape (points, *inner); nan where there are none."""
+    """Return values of points, shape (points, *inner); NaN where they are missing."""
     rows = np.full((len(points), *inner), np.nan)
     for k, point in enumerate(points):
         if point is not None and name in getattr(point, statistic):

@@ -24,26 +24,26 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.output import Output
     from flexclear.pipeline.core.scene.schema import TimeSpan
 
-#: two output times are the same when they differ by less than this fraction of the latest: rounding of sums and
-#: products only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure
-#: would take them for one, and the motion in between for an error
+#: two output times are the same when they differ by less than this fraction of the latest: by rounding only. Times of
+#: events are outputs, too. In two accurate runs they are so close that a coarser measure would identify them, and count
+#: the motion in between as an error
 SAME_TIME = 1e-13
 #: closings with an approach above this count as impacts [m/s]
 IMPACT = 1e-4
-#: fraction of its clearance by which the perturbed run moves each contact at the start: the order of the offset in
-#: ensembles, and far above what an integration at the default tolerance errs by
+#: fraction of its clearance by which the perturbed run moves each contact at the start: of the order of the offset in
+#: ensembles, and far above the error of an integration at the default tolerance
 PERTURBATION = 2e-5
-#: neighbouring runs are visibly separated where they differ by this fraction of the largest motion
+#: fraction of the largest motion by which visibly separated neighbouring runs differ
 SEPARATED = 1e-3
-#: they diverge where they differ by this one: between 0.01 and 0.05 it changes the horizon of none of 40 scenes
+#: fraction by which diverged runs differ: between 0.01 and 0.05 its value changes the horizon of none of 40 scenes
 DIVERGED = 0.03
-#: a separation that lasts for this fraction of the run counts; an impact that comes a little earlier in one of two runs
-#: separates them for its duration only
+#: fraction of the run for which a separation must last to count; an impact that occurs slightly earlier in one of two
+#: runs separates them only for its duration
 LASTING = 1.0 / 36.0
 
 
 def lasting(time: np.ndarray, separated: np.ndarray, least: float) -> np.ndarray:
-    """Indices of the times from which on `separated` holds for `least` [s] or to the last time.
+    """Return the indices of the times from which `separated` holds for at least `least` [s] or to the last time.
 
     time [s], separated: shape (n,).
     """
@@ -53,30 +53,30 @@ def lasting(time: np.ndarray, separated: np.ndarray, least: float) -> np.ndarray
 
 
 def divergence(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
-    """Index of the first time at which two runs diverge, for good as is assumed; None where they do not.
+    """Return the index of the first time at which two runs diverge, assumed to be final; None where they do not.
 
-    time [s], separation (fraction of the largest motion): shape (n,).  span: of the whole run [s].
+    time [s], separation (fraction of the largest motion): shape (n,). span: duration of the whole run [s].
     """
     return next(iter(lasting(time, separation > DIVERGED, LASTING * span).tolist()), None)
 
 
 def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
-    """Index of the time from which on two runs are visibly separated; None where they stay close.
+    """Return the index of the time from which two runs are visibly separated; None where they stay close.
 
-    From there on they are so most of the time, until they diverge or end: damped motions forget an impact after some
-    others, and such a difference is none.  Arguments: as of `divergence`.
+    From there on they are separated most of the time, until they diverge or end: damped motions forget an impact after
+    some others, and such a temporary difference does not count. Arguments: as in `divergence`.
     """
     diverged = divergence(time, separation, span)
     if diverged is not None:
         time, separation = time[: diverged + 1], separation[: diverged + 1]
     visible = separation > SEPARATED
-    left = np.cumsum(visible[::-1])[::-1]  # how often from each time on
+    left = np.cumsum(visible[::-1])[::-1]  # number of visibly separated outputs from each time on
     starts = lasting(time, visible, LASTING * span)
     return next(iter(starts[2 * left[starts] > len(time) - starts].tolist()), None)
 
 
 def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
-    """Values over time, shape (time, components); only of quantities that have a value at every time [SI]."""
+    """Return values over time [SI], shape (time, components), of a quantity that has a value at every time."""
     if not quantity.steps:
         return _of_part(run, quantity)
 
@@ -104,10 +104,10 @@ _OPERATORS: dict[str, Callable[..., np.ndarray]] = {
 def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
     kind = KINDS[quantity.kind]
     values: np.ndarray = run[kind.variable].values
-    if kind.owner == "section":  # of all sections of the body the one where it is largest
-        mine = values[:, run["section_body"].values == quantity.owner].reshape(len(values), -1, 3 if kind.dim else 1)
-        largest = np.argmax(np.linalg.norm(mine, axis=2), axis=1)
-        values = np.take_along_axis(mine, largest[:, None, None], axis=1)
+    if kind.owner == "section":  # at each time the section of the body with the largest value
+        of_body = values[:, run["section_body"].values == quantity.owner].reshape(len(values), -1, 3 if kind.dim else 1)
+        largest = np.argmax(np.linalg.norm(of_body, axis=2), axis=1)
+        values = np.take_along_axis(of_body, largest[:, None, None], axis=1)
     elif kind.owner:
         values = values[:, run[kind.owner].values.tolist().index(quantity.owner)]
     values = values.reshape(len(values), -1)
@@ -115,9 +115,9 @@ def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray
 
 
 def evaluate(run: xr.Dataset, text: str) -> xr.DataArray:
-    """A quantity of a run by its name, over time, with its unit; the contacts' of each event, or of the run.
+    """Return a quantity of a run by its name, over time, with its unit; for contacts of each event, or of the run.
 
-    text: as `[view] watch` has it (`pipeline.core.scene.quantity`).  Raises InputError for one that the run lacks.
+    text: as in `[view] watch` (`pipeline.core.scene.quantity`). Raises InputError for a quantity that the run lacks.
     """
     import xarray as xr  # here, since a run needs none of it
 
@@ -135,7 +135,7 @@ def evaluate(run: xr.Dataset, text: str) -> xr.DataArray:
 
 
 def owners(run: xr.Dataset) -> dict[str, dict[str, bool]]:
-    """Names of what owns the quantities of a run, and whether they are about an axis, as `parse` takes them."""
+    """Return names of a run's components by kind, and whether each acts about an axis, as `parse` takes them."""
     known: dict[str, dict[str, bool]] = {"": {}}
     for dim in {kind.owner for kind in KINDS.values()} - {""}:
         names = "section_body" if dim == "section" else dim
@@ -149,17 +149,17 @@ def owners(run: xr.Dataset) -> dict[str, dict[str, bool]]:
 
 
 def has(run: xr.Dataset, quantity: Quantity) -> bool:
-    """Whether a run holds this quantity."""
+    """Return True when a run holds this quantity."""
     known = owners(run)
     return quantity.is_there(known) and all(KINDS[term.kind].variable in run for term in quantity.terms())
 
 
-#: where a run says of each part whether it pushes or turns, where that is not the quantity's own variable
+#: variable whose units say whether a component exerts a force or a torque, where it is not the quantity's own
 PUSHES = {"peak_force": "contact_normal_force"}
 
 
 def unit(run: xr.Dataset, quantity: Quantity) -> str:
-    """The SI unit of a quantity in a run: of what acts along a rotation that of a torque."""
+    """Return the SI unit of a quantity in a run: for components that act along a rotation that of a torque."""
     kind = KINDS[quantity.kind]
     name = PUSHES.get(quantity.kind, kind.variable)
     if f"{name}_units" in run.coords:
@@ -170,31 +170,31 @@ def unit(run: xr.Dataset, quantity: Quantity) -> str:
     return kind.units[1] if turns else quantity.unit
 
 
-def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.ndarray:
-    """Impact times [s] or the largest contact force [N] of contacts that begin up to a time [s], shape (n,).
+def events(run: xr.Dataset | LabelledArrays, quantity: Quantity, until: float = np.inf) -> np.ndarray:
+    """Return impact times [s], or the largest contact force [N], of contacts that begin up to `until` [s], shape (n,).
 
-    Or the total normal impulse of the run [N s].
+    For `impulse` return the total normal impulse of the run [N s].
     """
     if quantity.kind == "impulse":
         return series(run, quantity)[-1]
-    mine = (run["event_contact"].values == quantity.owner) & (run["event_kind"].values == "closing")
-    mine &= run["event_time"].values <= until
+    selected = (run["event_contact"].values == quantity.owner) & (run["event_kind"].values == "closing")
+    selected &= run["event_time"].values <= until
     if quantity.kind == "peak_force":
-        return np.array([run["event_peak_force"].values[mine].max(initial=0.0)])
-    impact = mine & (run["event_approach_speed"].values > IMPACT)
+        return np.array([run["event_peak_force"].values[selected].max(initial=0.0)])
+    impact = selected & (run["event_approach_speed"].values > IMPACT)
     times: np.ndarray = run["event_time"].values[impact]
     return times
 
 
 def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices into a and into b of the times that both have, ascending, each time once."""
+    """Return indices into a and into b of the times that both contain, ascending, each time once."""
     unit = SAME_TIME * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)) or 1.0
     _, first, second = np.intersect1d(np.round(a / unit), np.round(b / unit), return_indices=True)
     return first, second
 
 
 def deviation(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
-    """Common times [s] and the distance of the two runs at each, shape (n,); of a series."""
+    """Return common times [s] and the distance of two runs at each, shape (n,), of a quantity over time."""
     i, j = common_times(run["time"].values, reference["time"].values)
     a, b = series(run, quantity)[i], series(reference, quantity)[j]
     distance = rotation_between(a, b) if quantity.kind == "orientation" else np.linalg.norm(a - b, axis=1)
@@ -202,9 +202,9 @@ def deviation(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -> tup
 
 
 def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: float = np.inf) -> float:
-    """Largest distance between two runs up to a time [s], in the quantity's unit.
+    """Return the largest distance between two runs up to a time [s], in the quantity's unit.
 
-    Infinite when the runs differ in the number of impacts before `until`.
+    The error is infinite when the runs differ in the number of impacts before `until`.
     """
     if quantity.over_time:
         time, distance = deviation(run, reference, quantity)
@@ -218,9 +218,9 @@ def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: flo
 
 
 def standard_error(ensemble: xr.Dataset, quantity: Quantity) -> float | None:
-    """Largest standard error over time of the mean of the members' values, in the quantity's unit.
+    """Return the largest standard error over time of the mean of the members' values, in the quantity's unit.
 
-    None where an ensemble does not say: events, orientations, and owners that it does not keep.
+    None for quantities that ensembles do not record: events, orientations, and components that are not recorded.
     """
     kind = KINDS[quantity.kind]
     if kind.variable not in ensemble or quantity.kind == "orientation" or "time" not in ensemble[kind.variable].dims:
@@ -235,9 +235,9 @@ def standard_error(ensemble: xr.Dataset, quantity: Quantity) -> float | None:
 
 
 def scale(run: xr.Dataset, quantity: Quantity) -> float:
-    """What a relative error is relative to: the largest change from the start; of forces the largest value.
+    """Return the reference of relative errors: the largest change from the start; for forces the largest value.
 
-    For impact times it is the time from the start to the last one.
+    For impact times it is the time from the start to the last impact.
     """
     if quantity.kind == "impact_times":
         times = events(run, quantity)
@@ -252,10 +252,10 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
 
 
 def natural_size(run: xr.Dataset, unit: str) -> float:
-    """Size that the motion of a whole mechanism gives a length, speed, force or torque [SI]; 0 of other units.
+    """Return the size that a mechanism's motion gives a length, speed, force or torque [SI]; 0 for other units.
 
-    The extent of all frames and centres of mass; the largest speed of a centre of mass, or of a point at that distance;
-    the kinetic energy over the extent, or all of it. Values that are a tiny fraction of it are rounding.
+    Length: the extent of all frames and centres of mass. Speed: the largest of a centre of mass, or of a point at that
+    distance. Force: the kinetic energy over the extent; torque: the kinetic energy. Tiny fractions of it are rounding.
     """
     points = np.concatenate([run["frame_position"].values, run["position"].values], axis=1).reshape(-1, 3)
     extent = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
@@ -269,7 +269,7 @@ def natural_size(run: xr.Dataset, unit: str) -> float:
 
 
 def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
-    """The part of a run that `error` and `scale` need for these quantities."""
+    """Return the part of a run that `error` and `scale` need for these quantities."""
     recorded: dict[str, xr.DataArray] = {}
     terms = [term for quantity in chosen for term in quantity.terms()]
     for kind in {KINDS[term.kind] for term in terms if term.kind not in ("peak_force", "impact_times")}:
@@ -286,9 +286,9 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
 
 
 def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
-    """Recorded values of a series (`pipeline.core.scene.quantity`); shape () or (components,).
+    """Return the recorded value of a series (`pipeline.core.scene.quantity`), shape () or (components,).
 
-    time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
+    time: shape (n,), increasing; its steps are the weights of means. values: shape (n, components).
     """
     if reduction == "final":
         return np.asarray(values[-1])
@@ -302,13 +302,13 @@ def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
 
 
 def of_impacts(times: np.ndarray, reduction: str) -> float:
-    """Number of impacts, or time of the first or last one, nan where there is none. times: ascending [s]."""
+    """Return the number of impacts, or the time of the first or last, NaN without impacts. times: ascending [s]."""
     if reduction == "count":
         return float(len(times))
     return float(times[0 if reduction == "first" else -1]) if len(times) else np.nan
 
 
 def regular_times(time: TimeSpan, output: Output) -> np.ndarray:
-    """The regular output times of a run, those of breaks and events left out, shape (n,) [s]."""
+    """Return the regular output times of a run, without breaks and events, shape (n,) [s]."""
     count = int(np.floor((time.end - time.start) / output.interval * (1 + 1e-12))) + 1
     return np.asarray(time.start + output.interval * np.arange(count))

@@ -1,7 +1,7 @@
 """The contract of the artifacts: dimensions, units and meaning of every variable.
 
-The three towers never import each other; whoever writes a dataset calls `conform`, whoever
-reads one may rely on this page.
+The three towers never import each other: code that writes a dataset calls `conform`, and code that reads one can rely
+on these tables.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ patch_node | patch | 1 | node of the boundary in a named region
 patch_region | patch | 1 | index of that region among `surface_region`
 """)
 
-#: next to stage 3: what a rigid body made from a mesh needs
+#: next to stage 3: a rigid body with the mass properties of a mesh
 RIGID: Schema = table("""
 mass | | kg | mass
 com | axis | m | centre of mass in the mesh frame
@@ -55,7 +55,7 @@ frame_position | frame axis | m | origin of the named frame in the mesh frame
 frame_rotation | frame axis axis2 | 1 | rotation matrix, frame to mesh frame
 """)
 
-#: stage 1 of a body that another code has assembled: matrices by their entries, and what the unknowns are
+#: stage 1 of a body assembled by another code: matrices by their entries, and the meaning of the unknowns
 MATRICES: Schema = table("""
 unknown_node | unknown | 1 | number of the node
 unknown_component | unknown | | ux uy uz rx ry rz, or internal where rigid motion has no part
@@ -81,7 +81,7 @@ pair_column? | pair_entry | 1 | unknown of S_l
 pair_value? | pair_entry | kg | integral of rho S_k S_l
 """)
 
-#: stage 3 on request: what section forces and stresses follow from, of rods and of solids
+#: stage 3 on request: data for section forces and stresses, of rods and of solids
 STRESS: Schema = table("""
 section_place? | section | m | position of the section along the rod; one at either end of each cell
 section_position? | section axis | m | undeformed centre of the section, body frame
@@ -104,7 +104,7 @@ gauge_node? | gauge_entry | 1 | node of a gauge
 gauge_index? | gauge_entry | 1 | index of that gauge among `gauge`
 """)
 
-#: stages 2 and 3: what the reduced body lacks next to the full model
+#: stages 2 and 3: deficits of the reduced body against the full model
 DEFICITS: Schema = table("""
 compliance_full? | frame frame_held direction | m N-1, rad N-1 m-1 | static compliance of a frame with another held
     (itself: with nothing held), full model, axes of the frame
@@ -232,10 +232,10 @@ impact_velocity? | impact body axis | m s-1 | velocity of the centre of mass at 
 _STILL = """position quaternion frame_position joint_force joint_moment joint_position modal_coordinate
 drive_force drive_position load_force load_moment load_length contact_gap contact_penetration contact_force
 contact_normal_force contact_offset potential elastic"""
-#: static equilibrium, or steady motion: what a run says at one instant
+#: static equilibrium, or steady motion: variables of a run at one instant
 EQUILIBRIUM: Schema = {name: replace(RUN[name], dims=RUN[name].dims[1:]) for name in _STILL.split()}
 
-#: natural vibrations about it; shapes per unit of a coordinate with a modal mass of 1 kg, parts real and imaginary
+#: natural vibrations about the equilibrium; shapes (real, imaginary) per unit of a coordinate with modal mass 1 kg
 LINEAR: Schema = EQUILIBRIUM | table("""
 frequency | vibration | Hz | frequency of the vibration, damping included
 undamped_frequency | vibration | Hz | magnitude of the eigenvalue over 2 pi
@@ -262,23 +262,23 @@ frame_position~ | speed frame axis | m | origin of the named frame in steady mot
 """)
 
 
-#: variables that say what the entries of their dimension are, where their schema has them
+#: variables that become coordinates of their dimension, where their schema has them
 _NAMING = ("event_time", "event_contact", "event_kind", "impact_time", "impact_contact")
-#: what the run's end cuts short has no duration
+#: prefixes of variables that may be NaN: a contact that the end of the run cuts short has no duration
 _MAY_BE_OPEN = ("event_", "impact_")
 
 
 def conform(dataset: xr.Dataset, schema: Schema, *, title: str, **attributes: str | int | float) -> xr.Dataset:
-    """What `conformed` gives, of a dataset."""
+    """Return a dataset with units, long names and coordinates of `schema`, see `conformed`."""
     return conformed(of(dataset), schema, title=title, **attributes).to_xarray()
 
 
 def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes: str | int | float) -> LabelledArrays:
-    """`data` with units, long names and coordinates of `schema`; ValueError where it differs.
+    """Return `data` with units, long names and coordinates of `schema`; raise ValueError where it differs.
 
-    Every mandatory variable must be there with its dimensions; nothing undeclared may be. The attribute `units` is that
-    of all entries; where some slide and others turn, the coordinate `<variable>_units` has the one of each instead.
-    title: of the dataset, in words.
+    Every mandatory variable must be present with its dimensions; undeclared variables are errors. The attribute `units`
+    is that of all entries; where some slide and others turn, the coordinate `<variable>_units` has one per entry
+    instead. title: of the dataset, in words.
     """
     missing = [n for n, v in schema.items() if not v.optional and n not in data]
     unknown = [n for n in data if n not in schema]
@@ -311,7 +311,7 @@ def _is_unit(name: str) -> bool:
 
 
 def _units(data: LabelledArrays, name: str, variable: Variable) -> tuple[str, LabelledArray | None]:
-    """The unit of all entries, or none and the unit of each."""
+    """Return the unit of all entries, or an empty text and the unit of each."""
     if not variable.turning:
         return variable.units, None
     dim, turns = turning(data, variable.dims)
@@ -324,12 +324,12 @@ def _units(data: LabelledArrays, name: str, variable: Variable) -> tuple[str, La
 
 
 def incomplete(run: AnyRun, why: str) -> AnyRun:
-    """What there is of a run that was stopped, marked: attributes `complete` (0), `stopped_at` [s] and `stopped_by`."""
+    """Mark a run that was stopped: attributes `complete` (0), `stopped_at` [s] and `stopped_by`."""
     return run.assign_attrs(complete=0, stopped_at=float(run["time"].values[-1]), stopped_by=why)
 
 
 def require_complete(run: xr.Dataset | LabelledArrays, what: str = "the run") -> None:
-    """InputError for what is left of a run that was stopped, which is no result."""
+    """Raise InputError for a run that was stopped before its end, which is no result."""
     if not run.attrs.get("complete", 1):
         raise InputError(
             what,

@@ -1,9 +1,8 @@
-"""The cache on disk: artifacts by content key, written atomically, checked whenever they are read.
+"""The cache on disk: artifacts by content key, written atomically, checked at every read.
 
-An artifact is one or more files ``cache/<stage>/<key>.<file>`` and, written last, its record
-``<key>.json`` with the sha256 of each file and the facts behind the key. Without a record there is
-no artifact, so a process killed at any moment leaves nothing that could be taken for one. A file
-that differs from its digest counts as absent.
+An artifact is one or more files ``cache/<stage>/<key>.<file>`` and, written last, its record ``<key>.json`` with the
+SHA-256 digest of each file and the facts behind the key. Files without a record are no artifact, so a process killed at
+any moment leaves nothing that could be taken for one. A file that differs from its digest counts as absent.
 """
 
 from __future__ import annotations
@@ -42,27 +41,27 @@ if TYPE_CHECKING:
 
     Product = Mapping[str, xr.Dataset | LabelledArrays | bytes]
 
-#: part of a stage (those of sweeps are folders in folders), key or file of an artifact: no way to another folder
+#: part of a stage (those of sweeps have subfolders), key or file name of an artifact: it cannot lead to another folder
 _PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
 #: the file of an artifact that other stages read
 MAIN = "nc"
-#: represents the key of all artifacts of a stage, such as the batches of a sweep's points
+#: key of a record that stands for all artifacts of a stage, such as the batches of a sweep's points
 FAMILY = "family"
-#: attributes of the main file that a command reports, without opening the file
+#: attributes of the main file that the record repeats, so that commands report them without opening the file
 REPORTED = ("warnings", "accuracy_verdict")
-#: lies next to what is shown and is not of the scene as it is now
+#: note next to shown results that are not of the scene's current state
 OUTDATED = "OUTDATED.txt"
-#: between stem and suffix of what is left of a stopped run
+#: inserted before the suffix in the file name of an incomplete run
 PARTIAL = ".partial"
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key.
+    """The record of a stored artifact: SHA-256 digest of each file by name, and the facts of its key.
 
-    said: those of the main file's attributes that a command shows its user (`REPORTED`).
-    computed_by: the processor and its settings, no part of the key (`machine.instruction_set`).
+    said: attributes of the main file that a command reports to its user (`REPORTED`). computed_by: the processor and
+    its settings, not part of the key (`machine.instruction_set`).
     """
 
     stage: str
@@ -74,11 +73,11 @@ class Record:
 
     @property
     def digest(self) -> str:
-        """Content of the artifact in one digest: that of its main file, else of all its files."""
+        """Digest of the artifact's content: that of its main file, else of all its files."""
         return self.files.get(MAIN) or sha256(json.dumps(self.files, sort_keys=True).encode())
 
     def table(self) -> dict[str, object]:
-        """What its file holds, and `read_record` reads."""
+        """Return the content of the record's file, which `read_record` reads."""
         content = {"files": self.files, "facts": self.facts, "said": self.said, "computed_by": self.computed_by}
         return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in content.items()}}
 
@@ -91,11 +90,11 @@ class Store:
     say: Callable[[str], None] = lambda text: None
 
     def path(self, stage: str, key: str, file: str) -> Path:
-        """Where a file of an artifact is, or would be."""
+        """Return the path of an artifact's file, whether it exists or not."""
         return self.root / "cache" / stage / f"{key}.{file}"
 
     def find(self, stage: str, key: str) -> Record | None:
-        """The artifact, all its files checked; None when it is absent or broken."""
+        """Return the record of an artifact after checking all its files; None when it is absent or damaged."""
         record = read_record(self.path(stage, key, "json"))
         if record is None:
             return None
@@ -105,7 +104,7 @@ class Store:
         return record if fault is None else None
 
     def fault(self, record: Record) -> str | None:
-        """What is wrong with the files of a record, in words; None when nothing is."""
+        """Return in words what is wrong with the files of a record; None when all are sound."""
         for name, digest in record.files.items():
             path = self.path(record.stage, record.key, name)
             try:
@@ -124,9 +123,9 @@ class Store:
         facts: Mapping[str, str],
         computed_by: Mapping[str, str] | None = None,
     ) -> Record:
-        """Store an artifact; the record goes last and makes it valid.
+        """Store an artifact; its record is written last and makes it valid.
 
-        Raises ResourceError when the disk is full or cannot be written; nothing half-written stays.
+        Raises ResourceError when the disk is full or read-only; no partly written file stays.
         """
         digests: dict[str, str] = {}
         folder = self.root / "cache" / stage
@@ -135,18 +134,18 @@ class Store:
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else _written(path, content)
-            attributes = getattr(product.get(MAIN), "attrs", {})  # none where it is no dataset
-            said = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
-            record = Record(stage, key, digests, dict(facts), said, computed_by or {})
+            attributes = getattr(product.get(MAIN), "attrs", {})  # empty where the main file is no dataset
+            reported = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
+            record = Record(stage, key, digests, dict(facts), reported, computed_by or {})
             publish(self.path(stage, key, "json"), checked(record.table()))
         return record
 
     def load(self, record: Record) -> xr.Dataset:
-        """The main file as a Dataset in memory: what `arrays` gives."""
+        """Return the main file as a Dataset in memory."""
         return self.arrays(record).to_xarray()
 
     def arrays(self, record: Record) -> LabelledArrays:
-        """The main file in memory. The bytes that were checked are those that are parsed."""
+        """Return the main file as arrays in memory; the bytes that are parsed are those that were checked."""
         from flexclear.pipeline.core.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
@@ -155,14 +154,13 @@ class Store:
             raise ResourceError(f"{self.below(path)} changed while it was read; run again to rebuild it")
         try:
             return netcdf.read(content)
-        except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
+        except (OSError, ValueError, RuntimeError, TypeError) as error:  # the digest is right: it never was a dataset
             raise ResourceError(f"{self.below(path)} holds no dataset ({shown(str(error))}); remove it") from None
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
-        """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
+        """Show the current artifact: read-only copies in `folder`, and its facts in ``folder/.facts``.
 
-        An empty `folder` shows nothing.  A shown file that somebody has edited is renamed, and
-        reported.
+        An empty `folder` shows nothing. A shown file that somebody has edited is renamed, and the renaming is reported.
         """
         if not folder:
             return
@@ -171,21 +169,21 @@ class Store:
         with disk_limits(self.root / folder):
             for name, target in shown.items():
                 source = self.path(record.stage, record.key, name)
-                # bit rot changes neither size nor time; what is read as data is compared whole
+                # bit rot changes neither size nor time, so the file that users read as data is compared by content
                 if not is_copy(source, target) or (name == MAIN and digest_of(target) != record.files[name]):
-                    self._keep_edited(target, name, folder, label)
+                    self._set_edited_aside(target, name, folder, label)
                     copy(source, target)
             _partial(shown[MAIN] if MAIN in shown else self.root / folder / label).unlink(missing_ok=True)
             self._facts(folder, label, "failed").unlink(missing_ok=True)
-            self._tell_outdated(folder)
+            self._write_outdated_note(folder)
 
-    def _keep_edited(self, target: Path, name: str, folder: str, label: str) -> None:
-        """Move a shown file out of the way that is neither of the artifact shown last nor of any other."""
+    def _set_edited_aside(self, target: Path, name: str, folder: str, label: str) -> None:
+        """Rename a shown file that was edited, so that showing the artifact does not overwrite the edit."""
         last = self.last(folder, label)
         platforms.set_aside(target)
         if not target.is_file() or target.is_symlink():
             return
-        # of what is not known to have been shown, what could be written to is not ours
+        # a file without known digest is taken as the user's when it is writable: shown copies are read-only
         known = last.files.get(name) if last is not None else None
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
@@ -193,9 +191,9 @@ class Store:
             self.say(f"{self.below(target)} was edited; the edit is stored as {aside.name}, and the result shown again")
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
-        """Put what is left of work that was stopped next to what is shown; its path, where anything is shown.
+        """Write an incomplete run next to the shown files; return its path, or None where nothing is shown.
 
-        It is no artifact, and `show` takes it away.
+        The file is no artifact, and `show` removes it.
         """
         if not folder:
             return None
@@ -206,21 +204,21 @@ class Store:
         return path
 
     def outdated(self, folder: str, label: str, why: str) -> None:
-        """Note next to what is shown that it is of an earlier state, and why; `show` takes the note away."""
+        """Write a note next to the shown files that they are outdated, and why; `show` removes the note."""
         if not folder:
             return
         with disk_limits(self.root / folder):
             self._facts(folder, label).parent.mkdir(parents=True, exist_ok=True)
             publish(self._facts(folder, label, "failed"), checked({"label": label, "why": why}))
-            self._tell_outdated(folder)
+            self._write_outdated_note(folder)
 
     def why_outdated(self, folder: str, label: str) -> str | None:
-        """What `outdated` has noted, if it has."""
+        """Return the reason that `outdated` has noted; None without a note."""
         table = read_checked(self._facts(folder, label, "failed")) if folder else None
         return None if table is None else str(table.get("why"))
 
     def show_families(self, folder: str, families: Mapping[str, Mapping[str, str]]) -> None:
-        """Note in ``folder/.facts`` what is shown there in a dataset of its own: stages with all their artifacts.
+        """Write to ``folder/.facts`` which families a dataset shown there contains: stages with all their artifacts.
 
         families: facts of each stage.
         """
@@ -233,7 +231,7 @@ class Store:
                 if path not in paths:
                     path.unlink(missing_ok=True)
 
-    def _tell_outdated(self, folder: str) -> None:
+    def _write_outdated_note(self, folder: str) -> None:
         path = self.root / folder / OUTDATED
         notes = [read_checked(path_of_note) for path_of_note in sorted((path.parent / ".facts").glob("*.failed"))]
         lines = [f"{note.get('label')}: {note.get('why')}\n" for note in notes if note is not None]
@@ -246,16 +244,16 @@ class Store:
         return self.root / folder / ".facts" / f"{label.replace(' ', '.')}.{suffix}"
 
     def last(self, folder: str, label: str) -> Record | None:
-        """The artifact that was shown last, whatever its key; its files are not checked."""
+        """Return the record of the artifact shown last, whatever its key; its files are not checked."""
         if not folder:
             return None
         return read_record(self._facts(folder, label))
 
     @contextlib.contextmanager
     def lock(self, stage: str, key: str, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Held by one process at a time, so that concurrent runs make an artifact once.
+        """Hold the lock of an artifact, so that concurrent processes produce the artifact once.
 
-        Whoever holds it may remove what a killed predecessor left. The system drops the lock of a
+        The holder removes temporary files that a killed predecessor left. The operating system drops the lock of a
         process that dies.
         """
         path = self.path(stage, key, "lock")
@@ -263,21 +261,21 @@ class Store:
             with disk_limits(path.parent):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 stack.enter_context(locked(path, waiting=waiting))
-            for left in path.parent.glob(f".{key}.*.tmp"):
-                left.unlink(missing_ok=True)
+            for leftover in path.parent.glob(f".{key}.*.tmp"):
+                leftover.unlink(missing_ok=True)
             yield
 
     def sweep(self) -> None:
-        """Remove what killed processes left anywhere."""
+        """Remove the temporary files and locks that killed processes left anywhere."""
         sweep(self.root)
 
     def below(self, path: Path) -> str:
-        """A path as messages name it."""
+        """Return a path in the form in which messages name it."""
         return str(path.relative_to(self.root.parent))
 
 
 def read_record(path: Path) -> Record | None:
-    """The record in a file; None when there is none, it is damaged, or it cannot be understood."""
+    """Return the record in a file; None when the file is absent, damaged, or not understood."""
     try:
         table = read_checked(path) or {}
         named = (table.get(name, {}).items() for name in ("files", "facts", "said", "computed_by"))
@@ -285,18 +283,18 @@ def read_record(path: Path) -> Record | None:
         record = Record(str(table["stage"]), str(table["key"]), files, facts, *others)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
-    # a record of somebody else's must not lead out of its folder: what is pruned is removed
+    # a foreign record must not lead out of its folder, since pruning removes the files that records name
     inside = all(_PART.fullmatch(name) for name in (*record.stage.split("/"), record.key, *record.files))
     return record if inside and (record.files or record.key == FAMILY) else None
 
 
 def _partial(shown: Path) -> Path:
-    """Where what is left of a stopped run is, next to the shown file of a whole one."""
+    """Return the path of an incomplete run, next to the shown file of a complete one."""
     return shown.with_name(f"{shown.stem}{PARTIAL}{shown.suffix}")
 
 
 def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
-    """Write NetCDF-4 atomically; returns its sha256.
+    """Write a dataset as NetCDF-4 atomically; return its SHA-256 digest.
 
     Equal datasets give equal bytes: no times or names of this machine.
     """
@@ -306,16 +304,16 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
 
 def _written(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
-    """The same; its name is not forced to the disk yet."""
-    from flexclear.pipeline.core.artifacts import netcdf  # here, since what finds everything fresh writes nothing
+    """Write a dataset as `write_dataset` does, without forcing its name to the disk."""
+    from flexclear.pipeline.core.artifacts import netcdf  # here, since commands with nothing to compute write nothing
     from flexclear.pipeline.core.artifacts.labelled import of
 
     data = of(dataset)
-    with temporary(path) as made:
+    with temporary(path) as scratch:
         try:
-            netcdf.write(made, data)
+            netcdf.write(scratch, data)
         except (OSError, RuntimeError) as error:
-            # the HDF5 library reports that it cannot write, but not that the disk is full; plain bytes get the reason
-            made.write_bytes(bytes(data.nbytes + 2**20))
+            # the HDF5 library does not report that the disk is full; writing plain bytes raises that error
+            scratch.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
-        return settle(made, path)
+        return settle(scratch, path)

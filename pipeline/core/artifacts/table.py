@@ -1,4 +1,4 @@
-"""Datasets as tables: a row per value of some dimensions, a column per component of each variable."""
+"""Datasets as tables: one row per value of some dimensions, one column per component of each variable."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ class Recorded(xr.Dataset):
     __slots__ = ()
 
     def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> pd.DataFrame:
-        """What is recorded over time, as `table` gives it; with `dim_order`, what xarray makes of all dimensions."""
+        """Return the variables over time as in `table`; with `dim_order`, xarray's table of all dimensions."""
         return table(self) if dim_order is None else super().to_dataframe(dim_order)
 
 
 def recorded(data: xr.Dataset) -> Recorded:
-    """The dataset of a run with its table."""
+    """Return the dataset of a run with its own `to_dataframe`."""
     return Recorded(data.data_vars, coords=data.coords, attrs=data.attrs)
 
 
 def table(dataset: xr.Dataset, rows: Sequence[Hashable] = ("time",)) -> pd.DataFrame:
-    """Every variable with the dimensions `rows`, a column per component: ``position platform x [m]``."""
+    """Tabulate every variable with the dimensions `rows`, one column per component: ``position platform x [m]``."""
     columns = {}
     for name, variable in dataset.data_vars.items():
         if not set(rows) <= set(variable.dims) or not variable.size:

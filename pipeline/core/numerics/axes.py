@@ -1,4 +1,4 @@
-"""Whether directions are the axes of a frame. Without NumPy: every command asks this of the scenes that it reads."""
+"""Checks of the axes of frames. Without NumPy: every command checks the scenes that it reads."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 Vector = Sequence[float]
 
-#: how far the lengths and the directions of three axes may be off, as they are typed by hand
+#: tolerances of the squared lengths and of the scalar products of three axes, which are typed by hand
 LENGTH, DIRECTION = 1.1e-5, 1e-6
 #: two directions are parallel when the sine of the angle between them is below this
 PARALLEL = 1e-9
@@ -39,10 +39,10 @@ def check_axis(axis: Vector) -> None:
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """Scalar product of two vectors of three components."""
+    """Return the scalar product of two vectors of three components."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def cross(a: Vector, b: Vector) -> tuple[float, float, float]:
-    """Vector product."""
+    """Return the vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -1,1 +1,1 @@
-"""Scene files: what they may say (schema and its parts), how they are read and composed (load)."""
+"""Scene files: their possible content (schema and its parts), their reading and composition (load)."""

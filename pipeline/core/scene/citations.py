@@ -1,4 +1,4 @@
-"""Where a method is from: what docstrings say in a paragraph that begins with ``Source:``."""
+"""Sources of methods, from the paragraphs of docstrings that begin with ``Source:``."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import sys
 from functools import cache
 from typing import Any
 
-#: from this level of optimisation on Python strips docstrings (`python -OO`)
+#: level of optimisation from which Python strips docstrings (`python -OO`)
 STRIPPED = 2
 _SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
 def cited(docstring: str | None) -> list[str]:
-    r"""The sources that a docstring names, each on one line.
+    r"""Return the sources that a docstring names, each on one line.
 
     >>> cited("A law.\n\nSource: Hertz (1881), Journal f. Math.\n92, 156-171.")
     ['Hertz (1881), Journal f. Math. 92, 156-171.']
@@ -25,7 +25,7 @@ def cited(docstring: str | None) -> list[str]:
 def docstring(thing: Any) -> str | None:
     """Return the docstring of a module, class or function, from its source file where Python strips docstrings.
 
-    What results name, such as their references, must not depend on the interpreter's options.
+    The content of results, such as references, must not depend on the interpreter's options.
     """
     if sys.flags.optimize < STRIPPED:
         return getattr(thing, "__doc__", None)
@@ -37,7 +37,7 @@ def docstring(thing: Any) -> str | None:
 
 @cache
 def _written(path: str) -> dict[str, str | None]:
-    """Return the docstrings of a source file by qualified name; that of the module is called by the empty name."""
+    """Return the docstrings of a source file by qualified name; the module has the empty name."""
     with open(path, encoding="utf-8") as file:
         tree = ast.parse(file.read())
     return dict(_docstrings(tree, ""))

@@ -1,6 +1,6 @@
-"""Contacts as a scene says them: geometry, materials, normal law, friction law; and the friction of ideal joints.
+"""Contacts in a scene: geometry, materials, normal law, friction law; and the friction of ideal joints.
 
-What a friction law called 'modified-coulomb' does is in `pipeline.dynamics.contact.friction.modified_coulomb`.
+The friction law 'modified-coulomb' is described in `pipeline.dynamics.contact.friction.modified_coulomb`.
 """
 
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, Union, get_args
@@ -27,17 +27,17 @@ class NormalLaw(Part):
     law: str
     """name of the law, as docs/contact.md lists them"""
     restitution: Annotated[Number, Share] | None = None
-    """the law's own parameter c_r; a free impact rebounds with it only as well as the law achieves"""
+    """the law's own parameter c_r; a free impact rebounds with c_r only as well as the law achieves"""
     delivered_restitution: Annotated[Number, Share] | None = None
-    """the rebound that a free impact is to have; the parameter follows from it"""
+    """coefficient of restitution that a free impact must have; the law's parameter follows from it"""
     exponent: Annotated[Number, Field(ge=1.0)] | None = None
-    """default 1.5, for linear laws 1"""
+    """exponent of the penetration; default 1.5, for linear laws 1"""
     stiffness: Annotated[Number, Positive] | None = None
-    """K in force = K depth^exponent; without it, from materials and radii"""
+    """K in force = K penetration^exponent; default: from materials and radii"""
     damping: Annotated[Number, Field(ge=0.0)] | None = None
-    """of linear laws [N s/m]"""
+    """damping coefficient of linear laws [N s/m]"""
     effective_mass: Annotated[Mass, Positive] | None = None
-    """of linear laws: mass that rebounds; default: the reduced mass of the two links"""
+    """mass that rebounds, for linear laws; default: the reduced mass of the two bodies"""
 
     @model_validator(mode="after")
     def _one_restitution(self) -> Self:
@@ -59,7 +59,7 @@ class ModifiedCoulomb(Part):
     v_static: Annotated[Speed, Positive]
     """sliding speed at which the coefficient is `static`"""
     v_dynamic: Annotated[Speed, Positive]
-    """sliding speed from which on the coefficient is `dynamic`"""
+    """sliding speed from which the coefficient is `dynamic`"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -79,9 +79,9 @@ class Ambrosio(Part):
     dynamic: Annotated[Number, Field(ge=0.0)]
     """coefficient of friction"""
     v0: Annotated[Speed, Field(ge=0.0)]
-    """sliding speed up to which there is no friction"""
+    """sliding speed up to which friction is zero"""
     v1: Annotated[Speed, Positive]
-    """sliding speed from which on it has its full value"""
+    """sliding speed from which friction has its full value"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -125,7 +125,7 @@ class LuGre(Part):
 
 
 Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre, Field(discriminator="law")]
-#: all of them
+#: all friction laws
 FRICTIONS: tuple[Any, ...] = get_args(get_args(Friction)[0])
 
 
@@ -141,31 +141,31 @@ class Wear(Part):
     """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area)."""
 
     coefficient: Annotated[Number, Positive]
-    """k [-], for the pair of surfaces"""
+    """wear coefficient k [-] of the pair of surfaces"""
     hardness: Annotated[Pressure, Positive]
-    """of the softer one"""
+    """hardness of the softer surface"""
     sectors: Annotated[int, Field(ge=4, le=720)] = 36
-    """into which both surfaces are divided around their axis for the map of depths; a ball and its socket also into
-    bands of equal area"""
+    """number of sectors about their axis into which both surfaces are divided for the map of depths; a ball and its
+    socket also into bands of equal area"""
 
 
 class _Contact(Part):
-    """What all contacts between surfaces have."""
+    """Keys of all contacts between surfaces."""
 
     between: tuple[FrameName, FrameName]
     """frames of the outer and the inner surface, each as body.FRAME"""
     normal: NormalLaw
     """law of the normal force"""
     friction: Friction | None = None
-    """law of friction; without it there is none"""
+    """law of friction; default: no friction"""
     floor: Annotated[Speed, Positive] | None = None
     """least approach speed used as the impact rate of a closing [m/s]; keeps the law regular for grazing and resting
-    contact. Without it, 1e-5 of the size of the mechanism per second, at most 1e-6 m/s"""
+    contact. Default: 1e-5 of the size of the mechanism per second, at most 1e-6 m/s"""
     initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
-    """impact rate of a contact that the scene's start already has, 0 of one that rests there; without it, a start in
-    contact is refused"""
+    """impact rate of a contact that exists at the start, 0 for a resting one; without this key a start in contact is
+    refused"""
 
-    #: what the outer and the inner surface are called in keys
+    #: names of the outer and the inner surface in keys
     surfaces: ClassVar[tuple[str, str]]
 
     @model_validator(mode="after")
@@ -182,18 +182,18 @@ class _Contact(Part):
 
     @property
     def materials(self) -> tuple[Material | None, Material | None]:
-        """Of the outer and the inner surface."""
+        """Materials of the outer and the inner surface."""
         outer, inner = (getattr(self, f"{surface}_material") for surface in self.surfaces)
         return outer, inner
 
     @property
     def shape(self) -> tuple[float, float]:
-        """What else the kernels of its surfaces take."""
+        """Further sizes that the kernels of the surfaces need."""
         return 0.0, 0.0
 
 
 class _Clearance(_Contact):
-    """What all clearance joints have;"""
+    """Keys of all clearance joints."""
 
     clearance: Annotated[Length, Positive]
     """half the difference of the diameters"""
@@ -211,7 +211,7 @@ class ClearanceSpherical(_Clearance):
     ball_material: Material | None = None
     """elastic constants, for the stiffness"""
     wear: Wear | None = None
-    """of both surfaces; absent means none"""
+    """wear of both surfaces; default: none"""
 
 
 class ClearanceRevolute(_Clearance):
@@ -222,13 +222,13 @@ class ClearanceRevolute(_Clearance):
     pin_radius: Annotated[Length, Positive]
     """radius of the pin"""
     length: Annotated[Length, Positive]
-    """of the bearing, along the axis"""
+    """length of the bearing along the axis"""
     journal_material: Material | None = None
     """elastic constants, for the stiffness"""
     pin_material: Material | None = None
     """elastic constants, for the stiffness"""
     wear: Wear | None = None
-    """of both surfaces; absent means none"""
+    """wear of both surfaces; default: none"""
 
 
 class ClearanceSlot(_Clearance):
@@ -240,14 +240,14 @@ class ClearanceSlot(_Clearance):
     surfaces = ("slot", "pin")
     type: Literal["clearance-slot"]
     clearance: Annotated[Length, Positive]
-    """half the slot's width less the pin's radius"""
+    """half the slot's width minus the pin's radius"""
     travel: Annotated[Length, Positive]
-    """of the pin's centre in the middle of the slot, from where the one end's half circle has its centre to the
-    other's"""
+    """travel of the pin's centre along the slot's middle line, from the centre of one end's half circle to that of the
+    other"""
     pin_radius: Annotated[Length, Positive]
     """radius of the pin"""
     length: Annotated[Length, Positive]
-    """of the bearing, along the axis"""
+    """length of the bearing along the axis"""
     slot_material: Material | None = None
     """elastic constants, for the stiffness"""
     pin_material: Material | None = None
@@ -260,9 +260,9 @@ class ClearanceSlot(_Clearance):
 
 
 class BallOnPlane(_Contact):
-    """Ball above a plane without end; between = [plane frame, ball frame].
+    """Ball above an unbounded plane; between = [plane frame, ball frame].
 
-    The plane is that of x and y of its frame; the ball is on the side of z.
+    The plane contains x and y of its frame; the ball is on the side of z.
     """
 
     surfaces = ("plane", "ball")
@@ -276,15 +276,15 @@ class BallOnPlane(_Contact):
 
     @property
     def clearance(self) -> float:
-        """Way that counts as far [m]: there is no other wall."""
+        """Distance that counts as far [m], since no second wall limits it: the radius."""
         return self.ball_radius
 
 
 Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
-#: all of them
+#: all types of contacts
 CONTACTS: tuple[Any, ...] = get_args(Clearance)
 
-#: sizes that the bearing of a joint may have, and the one that it must have
+#: sizes that the bearing of a joint may have, and those that it must have
 SIZES: dict[str, tuple[set[str], set[str]]] = {
     "revolute": ({"radius", "length", "axial_radius"}, {"radius"}),
     "prismatic": ({"radius", "length"}, set()),
@@ -295,22 +295,22 @@ SIZES: dict[str, tuple[set[str], set[str]]] = {
 
 
 class _Bearing(Part):
-    """Where an ideal joint rubs; absent sizes mean that what they would turn into a pressure is not counted."""
+    """Surfaces of an ideal joint with friction; loads whose conversion needs an absent size are not counted."""
 
     radius: Annotated[Length, Positive] | None = None
-    """of the pin, the ball, or the pins of a universal joint's cross; of a prismatic joint the arm of the pads that
-    hold moments about its axis"""
+    """radius of the pin, the ball, or the pins of a universal joint's cross; of a prismatic joint the lever arm of the
+    pads that carry moments about its axis"""
     length: Annotated[Length, Positive] | None = None
-    """between the two ends that carry moments across the axis; of a prismatic joint that of the slider, its middle at
-    the second frame's origin"""
+    """distance between the two ends that carry moments across the axis; of a prismatic joint the length of the slider,
+    its middle at the second frame's origin"""
     axial_radius: Annotated[Length, Positive] | None = None
-    """of the collar that carries what a revolute joint is pushed along its axis; default: `radius`"""
+    """radius of the collar that carries the axial force of a revolute joint; default: `radius`"""
     preload: Annotated[Force, Field(ge=0.0)] = 0.0
-    """normal force that is always there"""
+    """constant normal force, added to the others"""
 
 
 def _rubbing(law: Any) -> Any:
-    """The parameters of a friction law of contacts, and those of a bearing."""
+    """Return a model with the parameters of a friction law and those of a bearing."""
     return create_model(f"{law.__name__}Bearing", __base__=(_Bearing, law), __doc__=law.__doc__, __module__=__name__)
 
 
@@ -321,7 +321,7 @@ else:
 
 
 def require_fitting(kind: str, friction: Any) -> None:
-    """ValueError for a joint type that does not rub, and for sizes that its bearing lacks or cannot have."""
+    """Raise ValueError for a joint type without friction, and for sizes that its bearing lacks or cannot have."""
     if kind not in SIZES:
         known = ", ".join(SIZES)
         raise ValueError(f"a joint of type '{kind}' has no friction of its own; those that have: {known}")

@@ -1,4 +1,4 @@
-"""The points of a sweep: values of all its parameters, and the paths in the scene that take them."""
+"""The points of a sweep: values of all its parameters, and the key paths that take them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.sweep import Sample, Sweep, number_and_unit
 
-#: a value of a parameter as a scene takes it: a number in SI, text with an SI unit, or anything else as it was written
+#: a value of a parameter in a scene: a number in SI, text with an SI unit, or anything else as written
 Value = Any
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter. values: as the scene takes them, those of all points or of one dimension of the grid.
+    """One parameter. values: for the scene, those of all points or of one dimension of the grid.
 
-    unit: SI unit of the values where they were written with one; else empty.
+    unit: SI unit of the values where they were written with a unit; else empty.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Axis:
 
     @property
     def coordinate(self) -> list[float] | list[str]:
-        """The values as numbers in SI; as text where they are none."""
+        """Values as numbers in SI; as text where they are no numbers."""
         numeric = all(_is_number(value) for value in self.values)
         return (
             [number_and_unit(v)[0] for v in self.values]
@@ -40,7 +40,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Design:
-    """All parameters of a sweep; in a grid each is a dimension, the last one running fastest."""
+    """All parameters of a sweep; in a grid each is a dimension, and the last one varies fastest."""
 
     axes: tuple[Axis, ...]
     grid: bool
@@ -56,7 +56,7 @@ class Design:
         return tuple(axis.name for axis in self.axes) if self.grid else ("point",)
 
     def points(self) -> list[dict[str, Value]]:
-        """Place of the scene -> value, point by point."""
+        """Return the points in order, each as key path of the scene -> value."""
         combined = (itertools.product if self.grid else zip)(*(axis.values for axis in self.axes))
         return [
             {where: value for axis, value in zip(self.axes, values, strict=True) for where in axis.places}
@@ -65,7 +65,7 @@ class Design:
 
 
 def design(sweep: Sweep) -> Design:
-    """The points of a sweep; the same ones whenever it is asked."""
+    """Return the points of a sweep; repeated calls give the same points."""
     if sweep.sample is not None:
         fractions = _unit_points(sweep.sample, len(sweep.vary)).T
         axes = [_sampled(sweep, name, fraction) for name, fraction in zip(sweep.vary, fractions, strict=True)]
@@ -84,7 +84,7 @@ def _listed(sweep: Sweep, name: str) -> Axis:
 
 
 def _sampled(sweep: Sweep, name: str, fractions: np.ndarray) -> Axis:
-    """A parameter whose distribution has these fractions below each value, shape (points,)."""
+    """Return a parameter with the values below which its distribution has these fractions, shape (points,)."""
     parameter = sweep.vary[name]
     if parameter.mean is not None:
         from scipy.special import ndtri
@@ -103,14 +103,14 @@ def _numbered(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:
 
 
 def _unit_points(sample: Sample, parameters: int) -> np.ndarray:
-    """Points of the unit cube, shape (points, parameters), none on its faces."""
+    """Return points of the unit cube, shape (points, parameters), none on its faces."""
     from scipy.stats import qmc
 
     if sample.method == "random":
         return np.random.default_rng(sample.seed).uniform(np.finfo(float).tiny, 1.0, (sample.points, parameters))
     kind = qmc.Sobol if sample.method == "sobol" else qmc.LatinHypercube
     with warnings.catch_warnings():
-        # a number of points that is no power of two is the user's choice; docs/sweeps.md says what it costs
+        # the user may choose a number that is no power of two; docs/sweeps.md states the cost
         warnings.simplefilter("ignore", UserWarning)
         drawn = kind(parameters, rng=np.random.default_rng(sample.seed)).random(sample.points)
     return np.clip(drawn, np.finfo(float).eps, 1.0 - np.finfo(float).eps)

@@ -1,4 +1,4 @@
-"""Drives: what prescribes a motion. Either a coordinate of a joint, or the pose of a frame in the world."""
+"""Drives, which prescribe a motion: either a coordinate of a joint, or the pose of a frame in the world."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
@@ -10,10 +10,10 @@ from flexclear.pipeline.core.scene.laws import Bare
 
 
 class JointDrive(OnCoordinate):
-    """Prescribes one coordinate of a joint; joints with several freedoms need its name."""
+    """Prescribes one coordinate of a joint; needs its name if the joint has several."""
 
     law: Bare
-    """position over time"""
+    """position as a law of time"""
 
 
 class Components(Part):
@@ -27,7 +27,7 @@ class Components(Part):
     """law of this component"""
 
     def laws(self) -> dict[str, Any]:
-        """The laws that there are, by axis."""
+        """Return the given laws, by axis."""
         return {axis: getattr(self, axis) for axis in given(self, ("x", "y", "z"))}
 
 
@@ -36,18 +36,18 @@ class PathDrive(Part):
 
     frame: FrameName
     position: Components | None = None
-    """its origin [m]"""
+    """position of the frame's origin [m]"""
     rotation: Components | None = None
-    """from the world's axes to the frame's, by `angles`: 'cardan' is about x, then about y of the turned frame, then
-    about z of the frame so turned; 'rotation-vector' takes all three components"""
+    """rotation from the world's axes to the frame's, by `angles`: 'cardan' rotates about x, then about the rotated y,
+    then about the rotated z; 'rotation-vector' takes all three components"""
     angles: Literal["cardan", "rotation-vector"] = "cardan"
-    """what the components of rotation are, cardan angles or a rotation vector"""
+    """meaning of the components of rotation: Cardan angles or a rotation vector"""
     actuators: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    """joints (``P1``, or ``C.rotation`` where a joint has several freedoms) whose forces shall produce this motion;
+    """joints (``P1``, or ``C.rotation`` where a joint has several coordinates) whose forces produce this motion;
     without them the drive itself acts on the frame"""
     allocation: Literal["unique", "least-norm"] = "unique"
-    """what to do with more actuators than freedoms: refuse, or give the forces whose sum of squares (in N and N m) is
-    least"""
+    """with more actuators than degrees of freedom: refuse, or choose the forces with the least sum of squares (in N and
+    N m)"""
 
     @model_validator(mode="after")
     def _prescribes(self) -> Self:
@@ -64,7 +64,7 @@ class PathDrive(Part):
         return self
 
     def components(self) -> Iterator[tuple[str, Any]]:
-        """Prescribed components, as ``position.x``, and their laws."""
+        """Yield the prescribed components, as ``position.x``, and their laws."""
         for kind in ("position", "rotation"):
             part = getattr(self, kind)
             for axis, law in (part.laws() if part is not None else {}).items():

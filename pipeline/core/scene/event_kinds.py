@@ -1,9 +1,9 @@
-"""Kinds of the events of a run: kernels write these numbers, datasets hold them, and readers ask for them."""
+"""Kinds of the events of a run: numbers in kernels and datasets, and their names."""
 
 from __future__ import annotations
 
-#: names by number, in attributes of datasets
+#: names by number, for attributes of datasets
 EVENT_KINDS = ("opening", "closing", "compression", "sticking", "slipping")
 OPENING, CLOSING, COMPRESSION, STICKING, SLIPPING = range(len(EVENT_KINDS))
-#: what events of a scene do
+#: changes that events of a scene make
 CHANGES = ("release", "lock", "switch")

@@ -1,4 +1,4 @@
-"""Events of a scene: a part that ceases, a motion that stops, a part that becomes another one; each happens once."""
+"""Events of a scene, each at most once: a part is released, a motion is locked, a part is switched to another."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from flexclear.pipeline.core.scene.quantity import condition
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.units import quantity
 
-#: families of the parts that each may name
+#: families of the parts that each change may name
 NAMED = {
     "release": ("joint", "drive", "load", "stop", "gear", "event"),
     "lock": ("joint",),
@@ -28,7 +28,7 @@ NAMED = {
 
 
 def _at(value: Any) -> float | str:
-    """A time [s], or the text of a comparison."""
+    """Return a time [s], or the text of a comparison."""
     return value if isinstance(value, str) and ("<" in value or ">" in value) else quantity(value, "time")
 
 
@@ -37,21 +37,21 @@ When = Annotated[float | str, BeforeValidator(_at), WithJsonSchema(_WHEN)]
 
 
 class Event(Part):
-    """Something that changes once in the run: when a time has come, or a comparison of quantities becomes true."""
+    """A change that happens once in the run: at a time, or when a comparison of quantities becomes true."""
 
     at: When
     """a time, or a comparison of quantities with < or >; vectors count by their magnitude"""
     after: PartName | None = None
-    """another event, which happens first"""
+    """another event, which must happen first"""
     release: str | None = None
-    """part that ceases: joint.NAME, drive.NAME, load.NAME, stop.NAME, gear.NAME, or event.NAME of a lock"""
+    """part that is removed: joint.NAME, drive.NAME, load.NAME, stop.NAME, gear.NAME, or event.NAME of a lock"""
     lock: str | None = None
-    """joint.NAME, whose coordinates stop and stay where they are"""
+    """joint.NAME, whose coordinates stop and stay fixed"""
     switch: str | None = None
-    """load.NAME, or drive.NAME of a joint, that becomes another one"""
+    """load.NAME, or drive.NAME of a joint, that is replaced by another one"""
     to: dict[str, Any] | None = None
     """the keys that change; with another type, all keys of the part; laws and expressions count time from the event,
-    and laws of drives positions from where the coordinate is"""
+    and laws of drives count positions from the coordinate at the event"""
 
     @model_validator(mode="after")
     def _one_change(self) -> Self:
@@ -62,12 +62,12 @@ class Event(Part):
 
     @property
     def kind(self) -> str:
-        """Which of `CHANGES` it is."""
+        """The change in `CHANGES` that the event makes."""
         return given(self, CHANGES)[0]
 
     @property
     def part(self) -> tuple[str, str]:
-        """Family and name of the part that it changes."""
+        """Family and name of the part that the event changes."""
         family, _, name = str(getattr(self, self.kind)).partition(".")
         return family, name
 
@@ -84,9 +84,9 @@ def _reader(family: str) -> Any:
 
 
 def switched(part: Any, event: Event) -> Any:
-    """The part that an event makes of one; ValueError for keys that cannot be.
+    """Return the part that replaces another at an event; raise ValueError for impossible keys.
 
-    A part of its own type has the other keys of the old one.
+    A new part of the same type takes the other keys of the old one.
     """
     to = event.to or {}
     old = part.model_dump(mode="json", exclude_none=True)
@@ -100,23 +100,23 @@ def switched(part: Any, event: Event) -> Any:
 
 
 def with_switched(scene: Any) -> Any:
-    """The scene with all parts that its events make of others next to these: what a run of it may reach by names."""
-    made: dict[str, dict[str, Any]] = {}
+    """Return the scene with the new parts of all switches added, so that it names all parts that a run may need."""
+    new_parts: dict[str, dict[str, Any]] = {}
     for name, event in scene.event.items():
         if event.kind == "switch":
             family, part = event.part
-            made.setdefault(family, {})[f"{part}.{name}"] = switched(getattr(scene, family)[part], event)
-    return scene.model_copy(update={family: {**getattr(scene, family), **parts} for family, parts in made.items()})
+            new_parts.setdefault(family, {})[f"{part}.{name}"] = switched(getattr(scene, family)[part], event)
+    return scene.model_copy(update={family: {**getattr(scene, family), **parts} for family, parts in new_parts.items()})
 
 
 def require_possible(scene: Any) -> None:
-    """ValueError, opening with the path of what is wrong, for events that cannot be in a scene."""
+    """Raise ValueError, which opens with the key path, for events that are impossible in a scene."""
     if not scene.event:
         return
     for name, event in scene.event.items():
         for key, problem in _problems(scene, name, event):
             raise ValueError(f"event.{name}{'.' if key else ''}{key}: {problem}")
-    _require_apart(scene)
+    _require_distinct(scene)
     for name, load in scene.load.items():
         if isinstance(load, SampledPid):
             raise ValueError(f"load.{name}: a sampled controller does not go on over events: use a continuous 'pid'")
@@ -131,7 +131,7 @@ def require_possible(scene: Any) -> None:
 
 
 def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
-    """What is wrong with one event: its key, and why."""
+    """Yield what is wrong with one event: its key, and why."""
     kind, (family, part) = event.kind, event.part
     if family not in NAMED[kind] or not part:
         yield kind, f"names {' or '.join(f'{one}.NAME' for one in NAMED[kind])}, not '{getattr(event, kind)}'"
@@ -189,7 +189,7 @@ def _of_switch(scene: Any, part: Any, event: Event) -> Iterator[tuple[str, str]]
 
 
 def _chain(events: Mapping[str, Event], name: str) -> Collection[str]:
-    """All events that happen before one, itself included; also of circles."""
+    """Return all events that happen before one, including itself; circles are allowed."""
     waiting, before = [name], set[str]()
     while waiting:
         one = waiting.pop()
@@ -199,8 +199,8 @@ def _chain(events: Mapping[str, Event], name: str) -> Collection[str]:
     return before
 
 
-def _require_apart(scene: Any) -> None:
-    """ValueError for two events that release, or lock, the same."""
+def _require_distinct(scene: Any) -> None:
+    """Raise ValueError for two events that release, or lock, the same part."""
     done: dict[tuple[str, tuple[str, str]], str] = {}
     for name, event in scene.event.items():
         other = done.setdefault((event.kind, event.part), name)

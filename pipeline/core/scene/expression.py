@@ -1,8 +1,8 @@
-"""Expressions: one grammar of what is watched and of loads, and the check of their units.
+"""Expressions of watched quantities and of loads: one grammar, and the check of units.
 
-Numbers with units, named constants and quantities, ``+ - * / ^``, parentheses and `FUNCTIONS`. An expression is read
-into postfix order: leaves (numbers with their SI units as pairs, and quantities) and the names of operators. `fold`
-evaluates that order in any algebra: of units, of numbers, of arrays, of lines of code.
+An expression consists of numbers with units, named constants and quantities, ``+ - * / ^``, parentheses and
+`FUNCTIONS`. It is read into postfix order: leaves (numbers with their SI units as pairs, and quantities) and names of
+operators. `fold` evaluates that order in any algebra: of units, of numbers, of arrays, of lines of code.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import Any, TypeVar
 from flexclear.pipeline.core.scene import units
 
 T = TypeVar("T")
-#: functions of one argument, and those of two or more
+#: functions of one argument, and functions of two or more
 FUNCTIONS = ("abs", "sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "sign", "step", "norm")
 SEVERAL = ("max", "min")
-#: functions whose slope jumps where their argument, or the difference of the two, is zero; and whose value does
+#: functions whose slope, and functions whose value jumps where their argument, or the difference of the two, is zero
 BENT, JUMPING = ("max", "min", "abs"), ("sign", "step")
 #: operands of each operator
 OPERANDS = {**dict.fromkeys((*"+-*/^", *SEVERAL), 2), **dict.fromkeys(("minus", *FUNCTIONS), 1)}
 NUMBER, ANGLE = units.measured("1"), units.measured("rad")
-#: exponents of a unit, those of a bare zero being any; dimension of the components; the value of a number
+#: exponents of a unit (None for a bare zero, which fits any); dimension of the components; the value of a number
 Measure = tuple[units.Exponents | None, str, float | None]
 
 _TOKEN = re.compile(
@@ -40,9 +40,9 @@ def fold(
     apply: Callable[[str, list[T]], T],
     operands: Callable[[Any], int] = lambda step: OPERANDS[step] if isinstance(step, str) else 0,
 ) -> T:
-    """Value of an expression in postfix order: `leaf` of each leaf, `apply` of each operator and its operands.
+    """Evaluate an expression in postfix order: `leaf` for each leaf, `apply` for each operator and its operands.
 
-    operands: how many each step has, 0 of a leaf.
+    operands: number of operands of each step, 0 for a leaf.
     """
     stack: list[T] = []
     for step in steps:
@@ -54,18 +54,18 @@ def fold(
 
 
 def measure(steps: Sequence[Any]) -> tuple[units.Exponents, str]:
-    """Exponents of the unit, and the dimension of the components; ValueError where the parts do not go together."""
+    """Return the exponents of the unit, and the dimension of the components; raise ValueError where units conflict."""
     exponents, dim, _ = fold(steps, _measured, _combined)
     return exponents or NUMBER, dim
 
 
 def with_name(text: str, name: str, other: str) -> str:
-    """The expression with another text wherever it has a name."""
+    """Return the expression with another text wherever it contains a name."""
     return _TOKEN.sub(lambda token: f" {other} " if token["name"] == name else token[0], text)
 
 
 def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) -> None:
-    """ValueError unless an expression is a number, or a vector, of this dimension; a bare zero is of any."""
+    """Raise ValueError unless an expression is a number, or a vector, of this dimension; a bare zero fits any."""
     exponents, dim, _ = fold(steps, _measured, _combined)
     if bool(dim) != vector:
         raise ValueError(
@@ -137,15 +137,15 @@ def _same(a: units.Exponents | None, b: units.Exponents | None) -> bool:
 def postfix(
     text: str, term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]] | None = None
 ) -> list[Any]:
-    """An expression in postfix order; ValueError for what is none.
+    """Return an expression in postfix order; raise ValueError for other text.
 
-    term: the quantity of a name; ValueError where there is none.  constants: value and SI unit of each, by name.
+    term: returns the quantity of a name, or raises ValueError. constants: value and SI unit of each, by name.
     """
     words, leaves = _as_python(text)
 
     def steps(node: ast.AST) -> list[Any]:
         rights = []
-        while isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:  # of a long sum the left side is deep
+        while isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:  # no recursion: long sums nest to the left
             rights.append((node.right, _OPERATORS[type(node.op)]))
             node = node.left
         match node:
@@ -173,13 +173,13 @@ def postfix(
         raise _misread(text) from None
 
 
-#: letters of an expression that a message shows
+#: characters of an expression that a message shows
 LONGEST_SHOWN = 200
 _OPERATORS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 
 
 def _as_python(text: str) -> tuple[list[str], list[re.Match[str]]]:
-    """The words of an expression with names in the place of its leaves, ``_0`` of the first, and the leaves."""
+    """Return the words of an expression with its leaves replaced by names, ``_0`` the first, and the leaves."""
     words, leaves, place = list[str](), list[re.Match[str]](), 0
     while place < len(text):
         token = _TOKEN.match(text, place)
@@ -233,7 +233,7 @@ def _misread(text: str) -> ValueError:
 
 
 def _number(operator: str, operands: list[float]) -> float:
-    """Arithmetic in an exponent."""
+    """Evaluate an operator in an exponent."""
     a, b = operands[0], operands[-1]
     try:
         return {"+": lambda: a + b, "-": lambda: a - b, "*": lambda: a * b, "/": lambda: a / b, "minus": lambda: -a}[

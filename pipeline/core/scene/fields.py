@@ -40,7 +40,7 @@ class Measure:
         return {"type": "array", "items": one, "minItems": 3, "maxItems": 3} if self.vector else one
 
     def read(self, value: Any) -> Any:
-        """SI value; ValueError in words."""
+        """Return the SI value; raise ValueError in words."""
         if not self.vector:
             return quantity(value, self.dimension)
         if not isinstance(value, (list, tuple)) or len(value) != 3:
@@ -71,12 +71,12 @@ Direction = Annotated[Three, Measure("number", vector=True)]
 RotationVector = Annotated[Three, Measure("angle", vector=True)]
 Positive = Field(gt=0.0)
 
-#: what computing an inertia elsewhere, such as by turning it, may leave of symmetry and of a zero moment
+#: relative rounding errors, of symmetry and of a zero moment, in an inertia that was computed elsewhere, as by rotation
 _ROUNDING = 1e-12
 
 
 def _inertia(value: Any) -> list[list[float]]:
-    """``[Ixx, Iyy, Izz]`` or a full 3x3 matrix, as three rows [kg m^2]."""
+    """Return ``[Ixx, Iyy, Izz]`` or a full 3x3 matrix as three rows [kg m^2]."""
     given = [
         row if isinstance(row, (list, tuple)) else [row] for row in (value if isinstance(value, (list, tuple)) else [])
     ]
@@ -106,10 +106,10 @@ def _symmetric(rows: list[list[float]]) -> list[list[float]]:
 
 
 def _principal(rows: list[list[float]]) -> list[float]:
-    """Principal moments, ascending."""
+    """Return the principal moments, ascending."""
     if not any(rows[i][j] for i in range(3) for j in range(i)):
         return sorted(rows[k][k] for k in range(3))
-    import numpy as np  # here, as in `Pose`: most scenes are checked without it, and commands start in half the time
+    import numpy as np  # here, as in `Pose`: most scenes need no NumPy, and without it commands start in half the time
 
     moments: list[float] = np.linalg.eigvalsh(np.array(rows)).tolist()
     return moments
@@ -123,12 +123,12 @@ Inertia = Annotated[
 
 #: names of bodies and frames: letters of any script, digits, underscores and hyphens
 _NAME = r"\w[\w-]*"
-#: files are called by them, whose names have 255 bytes at most, and ours more than that of the part
+#: longest name of a part in characters and bytes: file names contain it and more, and have 255 bytes at most
 LONGEST_NAME, LONGEST_BYTES = 100, 200
 
 
 def part_name(name: str) -> str:
-    """A part's name that may be part of paths such as ``body.FRAME`` and in names of files; ValueError otherwise."""
+    """Return a part's name if it fits into paths such as ``body.FRAME`` and into file names; else raise ValueError."""
     if len(name) > LONGEST_NAME or not re.fullmatch(_NAME, name):
         raise ValueError(f"'{name}' is no name: it is made of up to {LONGEST_NAME} letters, digits, _ and -")
     if len(name.encode()) > LONGEST_BYTES:
@@ -147,14 +147,14 @@ def _frame(value: Any) -> Any:
 PartName = Annotated[str, AfterValidator(part_name)]
 FrameName = Annotated[str, BeforeValidator(_frame), WithJsonSchema({"type": "string", "description": "body.FRAME"})]
 
-#: where values come from: one text for the whole part, or one per key; "assumed: why" for assumptions
+#: provenance of values: one text for the whole part, or one per key; "assumed: why" for assumptions
 Source = str | dict[str, str]
 
 
 class Part(BaseModel):
-    """Base of everything a scene may say: frozen, and no unknown keys. Texts below keys say in schemas what they mean.
+    """Base of all models of scene files: frozen, without unknown keys. Texts below keys are their meaning in schemas.
 
-    Modules of parts evaluate their annotations as they are: as texts each would be compiled by each command.
+    Modules of parts do not postpone the evaluation of annotations: every command would have to compile each as text.
     """
 
     model_config = ConfigDict(
@@ -166,48 +166,48 @@ class Part(BaseModel):
 
 
 class OnCoordinate(Part):
-    """What is about a joint coordinate."""
+    """Keys of parts that act on a joint coordinate."""
 
     joint: str
     """name of the joint"""
     coordinate: str | None = None
-    """name of its coordinate, where it has several"""
+    """name of the joint's coordinate, if the joint has several"""
 
 
 def given(part: Part, keys: tuple[str, ...]) -> list[str]:
-    """Those of the keys that a part has."""
+    """Return those of the keys that a part has."""
     return [key for key in keys if getattr(part, key) is not None]
 
 
 def require_one(part: Part, keys: tuple[str, ...], says: str) -> None:
-    """ValueError unless a part has exactly one of these keys; says: what they do, as "says where"."""
-    there = given(part, keys)
-    if len(there) != 1:
-        text = f"{' and '.join(there)} do" if there else "nothing does"
+    """Raise ValueError unless a part has exactly one of these keys; says: their purpose, as "says where"."""
+    present = given(part, keys)
+    if len(present) != 1:
+        text = f"{' and '.join(present)} do" if present else "nothing does"
         raise ValueError(f"one of {', '.join(keys)} {says}; here {text}")
 
 
 def given_once(part: Part, ways: tuple[str, ...]) -> None:
-    """ValueError when an orientation is given in more than one of these ways."""
-    if len(there := given(part, ways)) > 1:
-        raise ValueError(f"an orientation is given once, not by {' and '.join(there)}")
+    """Raise ValueError when an orientation is given in more than one of these ways."""
+    if len(present := given(part, ways)) > 1:
+        raise ValueError(f"an orientation is given once, not by {' and '.join(present)}")
 
 
 class Pose(Part):
-    """Position and orientation of a frame in its parent; at most one way to say the orientation."""
+    """Position and orientation of a frame in its parent; the orientation in at most one way."""
 
     position: Position = (0.0, 0.0, 0.0)
     """origin of the frame in its parent"""
     quaternion: tuple[float, float, float, float] | None = None
-    """w, x, y, z, of the frame in its parent"""
+    """orientation of the frame in its parent as unit quaternion w, x, y, z"""
     rotation_vector: RotationVector | None = None
-    """axis times angle, of the frame in its parent"""
+    """orientation of the frame in its parent as axis times angle"""
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
     """two of the frame's axes as directions in the parent, e.g. ``{ z = [0, 1, 2], x = [1, 0, 0] }``; the first is
     exact, the second is made perpendicular to it. Or all three, as a list [x, y, z]"""
     axis: Direction | None = None
-    """direction of z alone, where x and y do not matter; the frame is turned from its parent by the least rotation that
-    brings z there (for the parent's -z, by half a turn about x)"""
+    """direction of z alone, where x and y do not matter: the frame is rotated from its parent by the least rotation
+    that brings z there (for the parent's -z, by half a turn about x)"""
 
     @model_validator(mode="after")
     def _one_orientation(self) -> Self:
@@ -224,7 +224,7 @@ class Pose(Part):
         return self
 
     def as_quaternion(self) -> "np.ndarray":
-        """Unit quaternion w x y z, frame to parent, shape (4,)."""
+        """Return the unit quaternion w x y z, frame to parent, shape (4,)."""
         import numpy as np
 
         from flexclear.pipeline.core.numerics.rotations import (

@@ -1,8 +1,8 @@
-"""Expressions of loads in the form that code is made of: structure as text, numbers separately.
+"""Expressions of loads in the form from which code is generated: structure as text, numbers separately.
 
 The text is the expression in postfix order: ``c0`` is its first number, ``p0.x`` a component of a position that it
-reads, ``q1`` a joint coordinate, ``t`` the time. Expressions that differ in numbers and names alone have the same text,
-and share code.
+reads, ``q1`` a joint coordinate, ``t`` the time. Expressions that differ only in numbers and names have the same text,
+and share compiled code.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ READ = {
 }
 #: letters of vectors
 VECTORS = "pvo"
-#: largest exponent that is multiplied out
+#: largest exponent computed by multiplication
 WHOLE = 8
 
 
 @dataclass(frozen=True)
 class Local:
-    """A name that only loads of one kind know: its letter and SI unit."""
+    """A name that exists only in loads of one kind: its letter and SI unit."""
 
     letter: str
     unit: str
@@ -53,7 +53,7 @@ class Local:
     over_time: bool = True
 
 
-#: what an expression along a line knows of the line
+#: names that an expression along a line may use
 OF_LINES = {"length": Local("l", "m"), "rate": Local("s", "m/s")}
 
 
@@ -61,8 +61,8 @@ OF_LINES = {"length": Local("l", "m"), "rate": Local("s", "m/s")}
 class Formula:
     """Expressions of one load.
 
-    code: their structure, separated by ``;``.  numbers: SI values.  reads: sort (``body``, ``frame`` or ``coordinate``)
-    and name of all that is read.
+    code: their structure, separated by ``;``. numbers: SI values. reads: kind (``body``, ``frame`` or ``coordinate``)
+    and name of every component that is read.
     """
 
     code: str
@@ -71,19 +71,19 @@ class Formula:
 
     @property
     def bends(self) -> int:
-        """Number of values at whose zero a slope jumps."""
+        """Number of functions whose slope jumps where their argument is zero."""
         return sum(token in BENT for token in self.code.split())
 
 
 def operands(token: str) -> int:
-    """Number of operands of a token of a code; 0 of a leaf."""
+    """Return the number of operands of a token of a code; 0 for a leaf."""
     return 1 if token[0] == "^" and len(token) > 1 else OPERANDS.get(token, 0)
 
 
 def formula(scene: Any, name: str) -> Formula | None:
-    """The formula of a load of a scene; None of one without an expression.
+    """Return the formula of a load of a scene; None for a load without an expression.
 
-    Raises ValueError, in words, for what cannot be computed, and for values of another unit.
+    Raises ValueError, in words, for an expression that cannot be computed or has another unit than the load.
     """
     load = scene.load[name]
     if not isinstance(load, EXPRESSIONS):
@@ -107,7 +107,7 @@ def formula(scene: Any, name: str) -> Formula | None:
 
 
 def check_formulas(scene: Any) -> None:
-    """ValueError, with the load's name, for an expression of a scene that cannot be computed."""
+    """Raise ValueError, with the load's name, for an expression of a scene that cannot be computed."""
     for name in scene.forces():
         try:
             formula(scene, name)
@@ -116,7 +116,7 @@ def check_formulas(scene: Any) -> None:
 
 
 def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
-    """Value and SI unit of named constants; ValueError for what is no name of one."""
+    """Return value and SI unit of named constants; raise ValueError for an invalid name."""
     known = {}
     for name, value in values.items():
         if not re.fullmatch(r"[^\W\d]\w*", name) or name in (*FUNCTIONS, *SEVERAL, "t", "time", "pi", *OF_LINES):
@@ -130,14 +130,14 @@ def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
 
 
 def require_used(known: Iterable[str], texts: Sequence[str]) -> None:
-    """ValueError for a constant that no text names."""
+    """Raise ValueError for a constant that no text uses."""
     for name in known:
         if not any(re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) for text in texts):
             raise ValueError(f"values.{name} is not used: remove it, or name it in the expression")
 
 
 def _check(scene: Any, step: Any) -> None:
-    """ValueError for a step that no load can compute."""
+    """Raise ValueError for a step that no load can compute."""
     if step in JUMPING:
         raise ValueError(
             f"{step}(...) jumps, and no step of the integration can cross that: write a steep tanh(...), or a ramp of "

@@ -1,4 +1,4 @@
-"""What each integrator is, said once: for scenes, stages, studies and refusals, which must not import its code.
+"""Properties of each integrator, for scenes, stages, studies and refusals, which must not import its code.
 
 To add one: a module of `pipeline.dynamics.integrate` with a `METHOD` (`pipeline.dynamics.integrate.method`), and a line
 in `INTEGRATORS`. A method with parameters of its own also has their keys in `pipeline.core.scene.solver`.
@@ -10,38 +10,38 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-#: of a scene that names none
+#: integrator of a scene that names none
 DEFAULT = "dop853"
-#: the implicit method for what is stiff
+#: implicit integrator for stiff equations
 STIFF = "radau"
-#: the one that flexible bodies' vibrations do not slow down
+#: integrator that vibrations of flexible bodies do not slow down
 VIBRATING = "exponential"
-#: what studies of costs compare: decades of tolerances, as far as rounding or patience go, and steps [s]
+#: tolerances (decades, as far as rounding or processor time allow) and steps [s] that studies of costs compare
 TO_1E_9, TO_1E_13 = (tuple(10.0**-k for k in range(3, last + 1)) for last in (9, 13))
 STEPS = (1e-4, 3e-5, 1e-5, 3e-6)
 
 
 def by_need(flexible: bool) -> tuple[str, ...]:
-    """Integrators among which one is chosen where a scene asks for accuracy alone."""
+    """Return the integrators among which the program chooses where a scene requests an accuracy only."""
     return (DEFAULT, *((VIBRATING,) if flexible else ()), STIFF)
 
 
 @dataclass(frozen=True)
 class Traits:
-    """What is known of a method without its code; none of it may enter compiled code, which is not keyed by it.
+    """Properties of a method without its code; compiled code must not depend on them, since no key contains them.
 
     module: of `pipeline.dynamics.integrate`, which holds its METHOD.
     order: the error of a run falls with this power of the step.
     implicit: its steps solve equations, by iteration.
-    multistep: its steps use slopes of earlier ones, so that it is begun by a one-step method.
-    estimates: it estimates its error, by which steps can be chosen; otherwise a scene must give their length.
+    multistep: its steps use slopes of earlier ones, so that a one-step method starts it.
+    estimates: it estimates its error, which controls its steps; otherwise a scene must give the step.
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
-    long_steps: they hold many vibrations, whose work on the drives is known less exactly than the motion.
+    long_steps: they span many vibrations, whose work on the drives is known less exactly than the motion.
     retracts: it needs positions after a displacement (`pipeline.dynamics.equations.retraction`).
-    reads_all: it reads more of some evaluations than the rates, and is given a second way to make these.
-    hands_over_to: implicit method that continues where stability limits the steps that it chooses, and that is named as
-        the remedy where steps are given; empty for methods that are stable themselves.
-    tolerances, steps: at which `flexclear cost` runs it; steps in s.
+    reads_all: it reads more of some evaluations than the rates, and receives a second function for these.
+    hands_over_to: implicit method that continues where stability limits the steps that it chooses, and that messages
+        recommend where steps are given; empty for methods that are stable themselves.
+    tolerances, steps: those at which `flexclear cost` runs it; steps in s.
     """
 
     module: str
@@ -58,7 +58,7 @@ class Traits:
     steps: tuple[float, ...] = ()
 
 
-#: by the name that a scene gives it
+#: properties by the name of the integrator in scenes
 INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
     {
         "dop853": Traits("dop853", 8, hands_over_to=STIFF, tolerances=TO_1E_13),

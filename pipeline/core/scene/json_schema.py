@@ -1,7 +1,7 @@
 """JSON schemas of scene files, for editors that complete and check while one types.
 
-A file may say less than a whole scene: with `extends` it only says what differs, and under `set` parts may be given in
-part.  What is in a file may be text with a unit wherever a number is meant; the loader knows which unit fits.
+A file may contain less than a whole scene: with `extends` it contains only differences, and under `set` parts may be
+incomplete. Numbers may be text with a unit; the loader checks which unit fits.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.sweep import Sweep
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-#: definitions of parts of which only some keys are given, next to those of whole parts
+#: prefix of the definitions of incomplete parts
 PARTIAL = "Partial"
 
 
 def scene_schema() -> dict[str, Any]:
-    """The schema of a scene file, with everything by which it may edit another."""
+    """Return the schema of a scene file, including the keys by which it edits another."""
     schema = Scene.model_json_schema(mode="validation")
     definitions, properties = schema["$defs"], schema["properties"]
     required = schema.pop("required")
@@ -43,7 +43,7 @@ def scene_schema() -> dict[str, Any]:
 
 
 def sweep_schema() -> dict[str, Any]:
-    """The schema of a sweep file; the values of a parameter may be a list without a key."""
+    """Return the schema of a sweep file; the values of a parameter may be a list without a key."""
     schema = Sweep.model_json_schema(mode="validation", by_alias=True)
     vary = schema["properties"]["vary"]
     vary["additionalProperties"] = {"anyOf": [vary["additionalProperties"], {"type": "array", "minItems": 1}]}
@@ -51,7 +51,7 @@ def sweep_schema() -> dict[str, Any]:
 
 
 def identified(schema: dict[str, Any], kind: str) -> dict[str, Any]:
-    """The schema with its dialect and name."""
+    """Return the schema with its dialect and name."""
     return {"$schema": DIALECT, "$id": f"urn:flexclear:schema:{kind}", **schema}
 
 
@@ -61,7 +61,7 @@ def _edit(text: str, properties: dict[str, Any], more: tuple[str, ...] = ()) -> 
 
 
 def _accuracy(flat: dict[str, Any]) -> dict[str, Any]:
-    """A file writes quantities as they are, nested or quoted, not below a key of their own."""
+    """Return the schema of `[accuracy]` in files: quantities directly, nested or quoted, not below `quantities`."""
     value = {"type": ["number", "string", "object"], "description": '"1 um", "0.1 %", or { relative = 1e-6 }'}
     settings = {name: flat["properties"][name] for name in ("source", "allow_missed")}
     description = flat.get("description", "")
@@ -69,7 +69,7 @@ def _accuracy(flat: dict[str, Any]) -> dict[str, Any]:
 
 
 def _partial(node: Any) -> Any:
-    """A schema with nothing required, that of the parts below included."""
+    """Return a schema with nothing required, also in the parts below."""
     if isinstance(node, list):
         return [_partial(item) for item in node]
     if not isinstance(node, dict):
@@ -78,7 +78,7 @@ def _partial(node: Any) -> Any:
     for key, value in node.items():
         if key in ("required", "discriminator", "minProperties"):
             continue
-        if key == "oneOf":  # without what distinguishes them, several may fit
+        if key == "oneOf":  # without the required keys that distinguish them, several may fit
             key = "anyOf"
         result[key] = value.replace("#/$defs/", f"#/$defs/{PARTIAL}") if key == "$ref" else _partial(value)
     return result

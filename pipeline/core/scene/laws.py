@@ -1,7 +1,7 @@
-"""Laws of time: what a prescribed coordinate, or the size of a load, does. One language for drives and loads.
+"""Laws of time for prescribed coordinates and for loads: one language for both.
 
-The values of a law are lengths, angles, forces or torques, as the quantity that it prescribes demands;
-a bare number is in SI units. How a law of type 'step' goes is in `pipeline.dynamics.drives.step`.
+The values of a law are lengths, angles, forces or torques, as the prescribed quantity demands; a bare number is in SI
+units. The course of a law of type 'step' is described in `pipeline.dynamics.drives.step`.
 """
 
 import csv
@@ -20,7 +20,7 @@ Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJso
 
 
 def _listed(value: Any) -> Any:
-    """One entry may be written without its list."""
+    """Return a single entry, written without brackets, as a list."""
     return [value] if isinstance(value, (int, float, str)) else value
 
 
@@ -28,19 +28,19 @@ _LIST = BeforeValidator(_listed, json_schema_input_type=float | str | tuple[floa
 Values: TypeAlias = Annotated[tuple[Value, ...], _LIST]
 Times: TypeAlias = Annotated[tuple[Time, ...], _LIST]
 
-#: bytes of a table; every row is a piece of a law, at which integration stops
+#: largest size of a table [bytes]; every row is a piece of a law, at which integration stops
 LARGEST_TABLE = 16 << 20
-#: most coefficients of a polynomial law
+#: largest number of coefficients of a polynomial law
 COEFFICIENTS = 8
-#: most steps of one law, and pieces of laws that are made of others: each is examined next to all others
+#: largest number of steps of one law, and of pieces of composed laws: each is compared with all others
 MOST_STEPS, MOST_PIECES = 5_000, 200_000
-#: most pieces of a sum times its laws, each of which is evaluated at the start of each piece
+#: largest product of pieces and laws of a sum: each law is evaluated at the start of each piece
 MOST_SUMMED = 1_000_000
 Ends = Literal["not-a-knot", "natural", "clamped", "periodic"]
 
 
 class Constant(Part):
-    """It keeps a value."""
+    """A constant value."""
 
     type: Literal["constant"]
     value: Value = 0.0
@@ -56,7 +56,7 @@ class Step(Part):
     end: Times
     """times at which each step begins and ends"""
     change: Values
-    """by how much each step changes the value"""
+    """change of the value by each step"""
 
     @field_validator("change")
     @classmethod
@@ -79,7 +79,7 @@ class Step(Part):
 
 
 def _coefficient(value: Any) -> Any:
-    """A number, or text with a unit; which one belongs there is known where the law is."""
+    """Return a number, or text with a unit, which the part that has the law checks."""
     if isinstance(value, str) and not any(character.isalpha() for character in value):
         return quantity(value, "number")
     return value if isinstance(value, str) else quantity(value, "number")
@@ -103,11 +103,11 @@ class Harmonic(Part):
 
     type: Literal["harmonic"]
     amplitude: Annotated[Values, Field(min_length=1)]
-    """of each sine"""
+    """amplitude of each sine"""
     frequency: Annotated[tuple[Rate, ...], _LIST]
-    """of each sine, as angular velocity or in Hz"""
+    """frequency of each sine, as angular velocity or in Hz"""
     phase: Annotated[tuple[Angle, ...], _LIST] | None = None
-    """of each sine at t = 0; default: 0"""
+    """phase of each sine at t = 0; default: 0"""
     offset: Value = 0.0
     """mean value"""
 
@@ -131,10 +131,10 @@ class Spline(Part):
     value: tuple[Value, ...]
     """values at these times"""
     degree: Literal[3, 5] = 3
-    """3 or 5"""
+    """degree of the polynomials between points, 3 or 5"""
     ends: Ends = "not-a-knot"
-    """'not-a-knot'; 'natural' (second derivative zero; of degree 5 third and fourth); 'clamped' (first derivative zero;
-    of degree 5 second too); 'periodic'. It must cover the run"""
+    """end conditions: 'not-a-knot'; 'natural' (second derivative zero; for degree 5 third and fourth); 'clamped' (first
+    derivative zero; for degree 5 second, too); 'periodic'. The points must cover the run"""
 
     @model_validator(mode="after")
     def _drawable(self) -> Self:
@@ -147,12 +147,12 @@ class Spline(Part):
 
 
 class Column(Part):
-    """A column of a table: its header, or its number from 1, and the unit of what is there."""
+    """A column of a table, and the unit of its numbers."""
 
     column: str | Annotated[int, Field(ge=1)]
-    """header, or number from 1"""
+    """header of the column, or its number from 1"""
     unit: str
-    """of the numbers in the column"""
+    """unit of the numbers in the column"""
 
     @field_validator("unit")
     @classmethod
@@ -165,7 +165,7 @@ class Column(Part):
 class Table(Part):
     """A spline through the rows of a CSV file, searched for next to the scene and in the folders above it.
 
-    The file is read with the scene: `points` are its numbers, time in seconds, values in their column's unit.
+    The file is read with the scene: `points` holds its numbers, time in seconds, values in their column's unit.
     """
 
     type: Literal["table"]
@@ -176,16 +176,16 @@ class Table(Part):
     value: Column
     """columns of the times and of the values"""
     degree: Literal[3, 5] = 3
-    """of the spline, 3 or 5"""
+    """degree of the spline, 3 or 5"""
     ends: Ends = "not-a-knot"
-    """as of a spline"""
+    """end conditions, as for a spline"""
     points: tuple[tuple[float, float], ...] = ()
-    """what was read; not written in a scene"""
+    """the numbers read from the file; not written in a scene"""
 
     @model_validator(mode="before")
     @classmethod
     def _read(cls, data: Any) -> Any:
-        """Read the file unless its numbers are there; afterwards only its name is stored."""
+        """Read the file unless its numbers are given; afterwards only its name is stored."""
         if not isinstance(data, dict) or "points" in data or not isinstance(data.get("file"), str):
             return data
         if not isinstance(data.get("time"), dict) or not isinstance(data.get("value"), dict):
@@ -209,7 +209,7 @@ class Sum(Part):
 
     type: Literal["sum"]
     laws: Annotated[tuple["Bare", ...], Field(min_length=1)]
-    """those that are added"""
+    """the laws that are added"""
 
     @model_validator(mode="after")
     def _countable(self) -> Self:
@@ -219,12 +219,12 @@ class Sum(Part):
 
 
 class Section(Part):
-    """From this time on the law holds, until the next section starts."""
+    """A law that holds from this time until the next section starts."""
 
     start: Time
-    """time from which it holds"""
+    """time from which the law holds"""
     law: "Bare"
-    """what holds then"""
+    """law of this section"""
 
 
 class Piecewise(Part):
@@ -244,17 +244,17 @@ class Piecewise(Part):
 
 
 class Repeated(Part):
-    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one continues."""
+    """A law that repeats: its course over a `period` from `start`, `times` times; the last one continues."""
 
     type: Literal["repeated"]
     period: Annotated[Time, Field(gt=0)]
     """length of one course"""
     times: Annotated[int, Field(ge=1)]
-    """how often"""
+    """number of courses"""
     start: Time = 0.0
-    """where the first course begins"""
+    """time at which the first course begins"""
     law: "Bare"
-    """what is repeated"""
+    """law that is repeated"""
 
     @model_validator(mode="after")
     def _countable(self) -> Self:
@@ -263,19 +263,19 @@ class Repeated(Part):
 
 
 class Delayed(Part):
-    """A law that counts time from a later moment on."""
+    """A law whose time is counted from a later moment."""
 
     type: Literal["delayed"]
     by: Time
-    """that moment [s]"""
+    """the moment from which the law counts time [s]"""
     law: "Bare"
-    """what is delayed"""
+    """law that is delayed"""
 
 
 class Expression(Part):
-    """An expression of the time `t` that makes polynomials and sines, as ``h * sin(w * t)^2``.
+    """An expression of the time `t` that consists of polynomials and sines, as ``h * sin(w * t)^2``.
 
-    `max`, `min`, `abs`, `sign` and `step` part it into pieces between start and end.
+    `max`, `min`, `abs`, `sign` and `step` divide it into pieces between start and end.
     """
 
     type: Literal["expression"]
@@ -284,9 +284,9 @@ class Expression(Part):
     values: dict[str, Value] = Field(default_factory=dict)
     """named constants, each a number or text with its unit"""
     start: Time = 0.0
-    """between which it is used, where it has such kinks"""
+    """interval in which the expression is used, for expressions in pieces"""
     end: Time | None = None
-    """between which it is used, where it has such kinks"""
+    """interval in which the expression is used, for expressions in pieces"""
 
     @model_validator(mode="after")
     def _lasts(self) -> Self:
@@ -299,12 +299,12 @@ Law = Annotated[
     Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated | Delayed | Expression,
     Field(discriminator="type"),
 ]
-#: all of them
+#: all types of laws
 KINDS: tuple[Any, ...] = get_args(get_args(Law)[0])
 
 
 def _bare(law: Any) -> Any:
-    """A bare value is a constant."""
+    """Return a bare value as a constant law."""
     return law if not isinstance(law, (int, float, str)) else {"type": "constant", "value": law}
 
 
@@ -312,7 +312,7 @@ Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float 
 
 
 def _count(law: Any) -> int:
-    """Pieces that a law becomes at most; at each, integration stops."""
+    """Return the largest number of pieces of a law; at each, integration stops."""
     match law:
         case Step():
             return 2 * len(law.start) + 1
@@ -338,7 +338,7 @@ def _check_count(law: Any) -> None:
 
 
 def law_types(node: object) -> Iterator[str]:
-    """Types of all laws anywhere in a part, those inside sums and sections included."""
+    """Yield the types of all laws anywhere in a part, also inside sums and sections."""
     if isinstance(node, KINDS):
         yield node.type
     below = [getattr(node, name) for name in type(node).model_fields] if isinstance(node, Part) else node
@@ -348,7 +348,7 @@ def law_types(node: object) -> Iterator[str]:
 
 
 def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list[tuple[float, float]]:
-    """Rows of two columns of a CSV file, time in seconds; ValueError, in words, when it cannot be read."""
+    """Return two columns of a CSV file, time in seconds; raise ValueError, in words, for unreadable files."""
     try:
         if not path.is_file() and path.exists():
             raise ValueError(f"the table {path.name} cannot be read: it is no ordinary file")

@@ -1,4 +1,4 @@
-"""What a scene may ask of the machine."""
+"""Limits on the resources that a scene may request from the machine."""
 
 import re
 from math import prod
@@ -28,25 +28,25 @@ Bytes = Annotated[float, BeforeValidator(_bytes), Field(gt=0.0), WithJsonSchema(
 
 
 class Limits(Part):
-    """What the work may take at most; it is estimated first, and refused at once (exit code 4)."""
+    """Largest resources of the work, which are estimated first; a larger request is refused at once (exit code 4)."""
 
     time: Annotated[Time, Field(gt=0.0)] | None = None
-    """on the clock, of each run, ensemble or study of sections; what there is by then is left;
-    ensembles and sections can continue from it"""
+    """wall time of each run, ensemble or study of sections; partial results are stored at the limit, and ensembles and
+    sections can continue from them"""
     memory: Bytes | None = None
     """default: four fifths of what is free"""
     disk: Bytes | None = None
     """default: four fifths of what is free"""
     parts: Annotated[int, Field(ge=1)] = 2000
-    """bodies, joints, drives and loads, of each at most so many"""
+    """largest number of parts of each family, such as bodies or joints"""
     cells: Annotated[int, Field(ge=1)] = 500_000
-    """elements or cells of one mesh"""
+    """largest number of elements or cells of one mesh"""
     modes: Annotated[int, Field(ge=1)] = 2000
-    """elastic coordinates of one body"""
+    """largest number of elastic coordinates of one body"""
     rows: Annotated[int, Field(ge=1)] = 10_000_000
-    """of a run"""
+    """largest number of rows of a run"""
     members: Annotated[int, Field(ge=2)] = 100_000
-    """of an ensemble"""
+    """largest number of members of an ensemble"""
 
     @property
     def time_words(self) -> str:
@@ -54,12 +54,12 @@ class Limits(Part):
         return f"it has taken the {self.time or 0.0:.6g} s that limits.time allows"
 
     def written(self) -> dict[str, Any]:
-        """As a table that can be read again."""
+        """Return the limits as a table that can be read again."""
         return self.model_dump(exclude={"source"}, exclude_none=True)
 
 
 def check_rows(rows: float, interval: float, limits: Limits) -> None:
-    """ResourceError when an interval of output [s] asks for more rows than a run may have."""
+    """Raise ResourceError when an output interval [s] requests more rows than a run may have."""
     if rows > limits.rows:
         raise ResourceError(
             f"[output.interval]: {interval:g} s asks for {rows:.3g} rows, more than the {limits.rows} that limits.rows "
@@ -68,23 +68,23 @@ def check_rows(rows: float, interval: float, limits: Limits) -> None:
 
 
 def check_members(members: int, limits: Limits, where: str = "[ensemble.members]") -> None:
-    """ResourceError when an ensemble is to have more members than it may."""
+    """Raise ResourceError when an ensemble has more members than the limits allow."""
     if members > limits.members:
         text = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
         raise ResourceError(f"{where}: {text} are more than the {limits.members} that limits.members allows")
 
 
 def require_scatter(scene: Any, where: str) -> None:
-    """InputError for members of a scene that would all be the same run."""
+    """Raise InputError for a scene whose ensemble members would all be the same run."""
     if not scene.contacts() and not scene.stop:
         problem = "members differ by a ball's offset, but there is no clearance joint and no stop"
         raise InputError(where, problem, "remove it")
 
 
 def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:
-    """ResourceError when a scene, not yet checked otherwise, has more parts of a family than it may."""
-    asked = table.get("limits")
-    most = asked.get("parts") if isinstance(asked, dict) else None
+    """Raise ResourceError when an otherwise unchecked scene has more parts of a family than the limits allow."""
+    limits = table.get("limits")
+    most = limits.get("parts") if isinstance(limits, dict) else None
     most = most if isinstance(most, int) else Limits().parts
     for family in families:
         count = len(table[family]) if isinstance(table.get(family), dict) else 0
@@ -96,7 +96,7 @@ def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) ->
 
 
 def check_cells(shape: Any, elements: Any, limits: Limits, recipe: Path) -> None:
-    """ResourceError when a recipe, not yet checked otherwise, asks for more elements or cells than it may."""
+    """Raise ResourceError when an otherwise unchecked recipe requests too many elements or cells."""
     given = [elements] if isinstance(elements, int) else []
     if isinstance(shape, dict):
         cells = shape.get("cells")

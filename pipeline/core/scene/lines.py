@@ -1,7 +1,7 @@
-"""Lines of TOML files: the one on which a path like ``body.rod.mesh`` is written, and what is wrong with a text that is
-not TOML, where it can be guessed with the line mended.
+"""Lines of TOML files: the line on which a key path like ``body.rod.mesh`` is written, and the cause of a syntax error,
+where it can be guessed, with the corrected line.
 
-The reader of the standard library gives no line numbers of keys, so that these are searched for in the text.
+The reader of the standard library gives no line numbers of keys, so they are searched for in the text.
 """
 
 from __future__ import annotations
@@ -19,43 +19,43 @@ _DOTTED = rf"{_KEY}(?:[ \t]*\.[ \t]*{_KEY})*"
 _HEADER = re.compile(rf"^[ \t]*\[\[?[ \t]*({_DOTTED})[ \t]*\]\]?[ \t]*(?:#.*)?$")
 _VALUE = re.compile(rf"^[ \t]*({_DOTTED})[ \t]*=")
 _PLACE = re.compile(r"^(?P<file>.+\.toml) \[(?P<keys>[^\[\]]+)\]$")
-#: tables of edits that a path may be written below
+#: prefixes of a key path in files that edit another
 EDITS: tuple[tuple[str, ...], ...] = ((), ("replace",), ("set",))
 
 
 def located(error: InputError) -> InputError:
-    """The error with the line of its path behind the path, where a file has it; of several, each."""
+    """Return the error with the line behind its key path, where a file contains the path; for several errors, each."""
     if isinstance(error, InputErrors):
         return InputErrors([located(one) for one in error.errors])
     position = where(error)
     if position is None:
         return error
     file, line = position
-    said = _PLACE.match(error.place)
-    other = "" if said is None or Path(said["file"]).resolve() == file.resolve() else f" of {file}"
+    match = _PLACE.match(error.place)
+    other = "" if match is None or Path(match["file"]).resolve() == file.resolve() else f" of {file}"
     return InputError(f"{error.place}, line {line}{other}", error.problem, error.remedy)
 
 
 def where(error: InputError) -> tuple[Path, int] | None:
-    """File and line of an error's path; the path may be written in a scene that its file extends."""
-    said = _PLACE.match(error.place)
-    if said is None:
+    """Return file and line of an error's key path, which may be written in a scene that the file extends."""
+    match = _PLACE.match(error.place)
+    if match is None:
         return None
-    return _found(Path(said["file"]), tuple(said["keys"].split(".")), ())
+    return _position(Path(match["file"]), tuple(match["keys"].split(".")), ())
 
 
-def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[Path, int] | None:
+def _position(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[Path, int] | None:
     try:
         extends, lines = _read(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return None
-    # the part itself: of a path below it, the nearest key that is written out
+    # of a path inside a part, the longest beginning that is written out, down to the part itself
     for length in range(len(keys), min(len(keys), 2) - 1, -1):
         for edit in EDITS:
             if (*edit, *keys[:length]) in lines:
                 return file, lines[(*edit, *keys[:length])]
     if isinstance(extends, str) and file not in above:
-        below = _found(file.parent / extends, keys, (*above, file))
+        below = _position(file.parent / extends, keys, (*above, file))
         if below is not None:
             return below
     return (file, lines[keys[:1]]) if keys[:1] in lines else None
@@ -63,17 +63,17 @@ def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[
 
 @lru_cache(maxsize=16)
 def _read(text: str) -> tuple[object, dict[tuple[str, ...], int]]:
-    """What a text extends, and its lines; many mistakes are searched for in one text."""
+    """Return the scene that a text extends, and the lines of its keys; cached, since one text may have many errors."""
     return tomllib.loads(text).get("extends"), written(text)
 
 
 def written(text: str) -> dict[tuple[str, ...], int]:
-    """The line on which each key of a TOML text is first written, tables included."""
+    """Return the line on which each key of a TOML text is first written, tables included."""
     lines_of: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
     quote = ""
     for number, line in enumerate(text.splitlines(), start=1):
-        if quote:  # inside of a text over several lines
+        if quote:  # inside a multi-line text
             quote = "" if quote in line else quote
             continue
         header, value = _HEADER.match(line), _VALUE.match(line)
@@ -92,12 +92,12 @@ def _keys(dotted: str) -> tuple[str, ...]:
     return tuple(key.strip("\"'") for key in re.findall(_KEY, dotted))
 
 
-#: characters of a line that is worth mending
+#: largest length of a line for which a correction is suggested
 LONGEST_MENDED = 300
 _NUMBER = re.compile(r"\(at line (\d+)")
 _AT = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
 _OTHER = "names with other characters than letters A to z, digits, - and _ are written in quotation marks"
-#: text in quotation marks, or a comment, both left alone; or a number and what is after it like a unit
+#: text in quotation marks, or a comment, both left unchanged; or a number and the text after it that may be a unit
 _PARTS = re.compile(
     r"""("[^"]*"|'[^']*'|\#.*)"""
     r"""|(?<![\w.])([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)[ \t]*"""
@@ -106,17 +106,17 @@ _PARTS = re.compile(
 
 
 def not_toml(path: Path, text: str, message: str) -> InputError:
-    """The error of a file with this text, which the reader of TOML refuses with this message."""
+    """Return the error for a file with this text, which the TOML reader refused with this message."""
     match, lines = _NUMBER.search(message), text.splitlines()
     number = int(match[1]) if match else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""
     where = f"{path}, line {number}" if number else str(path)
-    problem, hint = _guessed(line) or _said(message, line)
+    problem, hint = _common_error(line) or _reader_message(message, line)
     return InputError(where, f"is not TOML: {problem}", hint)
 
 
-def _guessed(line: str) -> tuple[str, str] | None:
-    """What is probably wrong with a line, and what to write instead; None where nothing usual is."""
+def _common_error(line: str) -> tuple[str, str] | None:
+    """Return the probable error in a line, and what to write instead; None where no common error fits."""
     bare = line.strip()
     value = re.match(r"([\w.\"'-]+)\s*=\s*(.*)$", bare)
     if bare.startswith(("//", ";", "/*")):
@@ -141,8 +141,8 @@ def _guessed(line: str) -> tuple[str, str] | None:
     return None
 
 
-def _said(message: str, line: str) -> tuple[str, str | None]:
-    """The reader's own message without its path, and a hint where it needs one."""
+def _reader_message(message: str, line: str) -> tuple[str, str | None]:
+    """Return the TOML reader's message without the position in the text, and a hint where it needs one."""
     text = _AT.sub("", message)
     twice = re.match(r"Cannot declare \((.*?),?\) twice", text)
     if twice:
@@ -161,12 +161,12 @@ def _said(message: str, line: str) -> tuple[str, str | None]:
 
 
 def _odd_name(line: str) -> bool:
-    """Whether the name of a table has characters that TOML takes in quotation marks only."""
+    """Return True when a table's name has characters that TOML allows in quotation marks only."""
     return bool(re.match(r"\s*\[[^\]\"']*[^\]\"'\x00-\x7f]", line))
 
 
 def _quoted(line: str) -> str:
-    """The line with its quantities in quotation marks."""
+    """Return the line with its quantities in quotation marks."""
 
     def mended(part: re.Match[str]) -> str:
         if part[1] is not None or unit(part[3]) is None:

@@ -1,4 +1,4 @@
-"""Reading scenes: TOML, composition by `extends`, overrides, all mistakes reported at once."""
+"""Reading scenes: TOML, composition by `extends`, overrides, all errors reported at once."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from flexclear.pipeline.core.system.errors import InputError, ResourceError, sho
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
-#: bytes that no scene or recipe needs: as many as the reader of TOML takes in a second, whatever they are
+#: largest size of a scene or recipe [bytes]: the TOML reader takes a second for the worst content of this size
 LARGEST_FILE = 1 << 20
-#: a key of more parts than a scene has levels; the reader of TOML takes their number squared
+#: a key with more parts than a scene has levels; the TOML reader's time grows with their number squared
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 DEEP = re.compile(rf"(?<![\w\\-])(?:{_PART}[ \t]*+\.[ \t]*+){{50}}")
-#: scenes that extend each other in a row; each is read, and what it extends is copied
+#: largest number of scenes that extend each other in a row; each is read, and the extended ones are copied
 LONGEST_CHAIN = 50
-#: keys of parts that name files, which are searched for where the scene is
+#: keys of parts that name files, which are searched for next to the scene
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
-#: what a TOML file may be
+#: kinds of TOML files, as messages name them
 SCENE, SWEEP, RECIPE = "a scene", "a sweep of a scene", "a mesh recipe"
-#: keys that only files of a kind have
+#: keys that only files of one kind have
 TYPICAL_KEYS = {
     SCENE: {"body", "joint", "extends", "time"},
     SWEEP: {"vary", "keep", "scene"},
     RECIPE: {"shape", "material", "section", "interfaces", "elements"},
 }
-#: what each kind is for, after its path
+#: use of each kind of file, with its path
 USE = {
     SCENE: "flexclear run {path}",
     SWEEP: "flexclear sweep {path}",
@@ -54,10 +54,10 @@ USE = {
 
 
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
-    """The scene in a TOML file, with everything that it extends.
+    """Load the scene in a TOML file, with all scenes that it extends.
 
-    override: dotted path -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the path's parent
-    must be there.  Raises InputError (all mistakes at once).
+    override: key path -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the path's parent must exist. Raises
+    InputError with all errors at once.
     """
     path = Path(path)
     name = scene_name(path)
@@ -70,7 +70,7 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
 
 
 def overridden(path: Path, override: Mapping[str, object]) -> dict[str, Any]:
-    """The plain table of a scene file, as `compose` makes it, with these values changed; files by their full paths."""
+    """Return the plain table of a scene file (`compose`) with these values changed; files by their full paths."""
     table = compose(path)
     for where, value in override.items():
         _put(table, where, value, f"override of {path}")
@@ -79,9 +79,9 @@ def overridden(path: Path, override: Mapping[str, object]) -> dict[str, Any]:
 
 
 def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
-    """The scene in a table with the keys of a scene file; files in it are relative to the current folder.
+    """Return the scene in a table with the keys of a scene file; files in it are relative to the current folder.
 
-    override and errors as of `load_scene`.  Its name is its title's.
+    override and errors: as in `load_scene`. The scene's name is derived from its title.
     """
     origin = Path("scene")
     copied = copy.deepcopy(dict(table))
@@ -99,9 +99,9 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
 
 
 def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted paths changed, as in `load_scene`; None takes a setting, a part or a key away.
+    """Return a copy of a scene with key paths changed, as in `load_scene`; None removes a setting, a part or a key.
 
-    Raises InputError for a part or key that is not there; a setting may be missing already.
+    Raises InputError for a part or key that does not exist; a setting may be absent already.
     """
     table = scene.model_dump(mode="json", exclude_none=True)
     for where, value in override.items():
@@ -119,8 +119,7 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
 
 
 def _read(table: dict[str, Any], where: Path) -> Scene:
-    """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are reported of this
-    path."""
+    """Return the scene in a table; validation errors, and requests beyond `[limits]`, are reported with this path."""
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
@@ -130,9 +129,9 @@ def _read(table: dict[str, Any], where: Path) -> Scene:
 
 
 def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
-    """What `edited` gives, at a tenth of the time: only the parts and settings that change are read again.
+    """Return the result of `edited` in a tenth of the time: only changed parts and settings are read again.
 
-    For many edits of one scene.  Raises InputError as `edited` does.
+    For many edits of one scene. Raises InputError as `edited` does.
     """
     changed: dict[tuple[str, str], dict[str, object]] = {}
     for where, value in override.items():
@@ -158,14 +157,14 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
             result = result.model_copy(update={family: whole})
             result.check()
         except (ValidationError, InputError, ResourceError, ValueError):
-            return edited(scene, override)  # which reports what is wrong, and where
+            return edited(scene, override)  # raises the error with its location
     return result
 
 
 def number_at(scene: Scene, path: str) -> tuple[float, str]:
-    """The number of a scene at a dotted path, in SI, and its unit if it is written with one.
+    """Return the number of a scene at a key path, in SI, and its unit if it is written with one.
 
-    Raises InputError where there is none.
+    Raises InputError for a value that is no number.
     """
     parent, key = _find(scene.model_dump(mode="json", exclude_none=True), path, path)
     if isinstance(parent[key], (int, float, str)) and not isinstance(parent[key], bool):
@@ -177,14 +176,14 @@ def number_at(scene: Scene, path: str) -> tuple[float, str]:
 
 @cache
 def _reader(family: str) -> Any:
-    """Reads a setting, or parts of a family by name, as `Scene` does."""
+    """Return the reader of a setting, or of the parts of a family by name, which works as `Scene` does."""
     info = Scene.model_fields[family]
     kind: Any = info.annotation
     return TypeAdapter(Annotated[kind, *info.metadata] if info.metadata else kind)
 
 
 def scene_name(path: Path) -> str:
-    """Path without suffix below the last folder called ``scenes``; else below the current folder; else the stem.
+    """Return the path without suffix below the last folder ``scenes``, or below the current folder, or the stem.
 
     Raises InputError where that cannot be the name of a folder.
     """
@@ -207,12 +206,12 @@ def scene_name(path: Path) -> str:
 def _resolved(path: Path) -> Path:
     try:
         return path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # it loops, is too long, or holds a NUL
+    except (OSError, RuntimeError, ValueError) as error:  # the path loops, is too long, or contains a NUL
         raise InputError(str(path), f"is no path: {error}", "name a TOML file") from None
 
 
 def is_file(path: Path) -> bool:
-    """Whether an ordinary file is there; what can be no path is none."""
+    """Return True when a path is that of an ordinary file; False also for an impossible path."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -220,7 +219,7 @@ def is_file(path: Path) -> bool:
 
 
 def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """The plain table of a scene file after `extends`, `replace`, `set` and `remove`."""
+    """Return the plain table of a scene file after `extends`, `replace`, `set` and `remove`."""
     path = _resolved(path)
     if path in above:
         chain = " -> ".join(p.name for p in (*above, path))
@@ -244,7 +243,7 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
 
 
 def _require_tables(table: dict[str, Any], path: Path) -> None:
-    """What is edited before the scene is checked as a whole must be there as tables of tables."""
+    """Raise InputError unless the data that is edited before validation consists of tables of tables."""
     wholes = [("", table), *((f"{edit}.", table[edit]) for edit in ("replace", "set") if edit in table)]
     for prefix, whole in wholes:
         if not isinstance(whole, dict):
@@ -268,7 +267,7 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file as a table; InputError when it cannot be read or parsed."""
+    """Read a TOML file as a table; raise InputError when it cannot be read or parsed."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
@@ -293,32 +292,32 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise not_toml(path, path.read_text(encoding="utf-8-sig"), str(error)) from None
     except RecursionError:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
-    except ValueError as error:  # a NUL in the path, a number of more digits than Python reads
+    except ValueError as error:  # a NUL in the path, or a number with more digits than Python reads
         raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
 
 
 def kind_of_file(table: Mapping[str, Any]) -> str:
-    """SCENE, SWEEP or RECIPE: the kind that most of a file's keys belong to; SCENE where none decides."""
+    """Return SCENE, SWEEP or RECIPE: the kind to which most keys of a file belong; SCENE where none decides."""
     matches = {kind: len(keys & set(table)) for kind, keys in TYPICAL_KEYS.items()}
     return max(matches, key=lambda kind: matches[kind])
 
 
 def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
-    """InputError when the table in a file is of another kind than requested."""
+    """Raise InputError when the table in a file is of another kind than requested."""
     kind = kind_of_file(table)
     if kind != requested and (kind != SCENE or TYPICAL_KEYS[SCENE] & set(table)):
         raise InputError(str(path), f"is {kind}, not {requested}", USE[kind].format(path=path))
 
 
 def _neighbours(path: Path) -> str | None:
-    if any("\\" in part for part in path.parts) or not str(path).isprintable():  # it separates folders on Windows only
+    if any("\\" in part for part in path.parts) or not str(path).isprintable():  # \ separates folders on Windows only
         return "write / between folders: every system takes it"
     names = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
     return suggestion(path.name, names) if names else None
 
 
 def _edited(result: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:
-    """What a table makes of the one that it extends, which is changed."""
+    """Apply a table's edits to the table that it extends, in place, and return that."""
     for where in table.get("remove", []):
         parent, key = _find(result, where, f"{path} [remove]")
         del parent[key]
@@ -345,17 +344,17 @@ def _edit_family(result: dict[str, Any], family: str, parts: object, edit: str, 
     if not isinstance(parts, dict):
         raise InputError(f"{where}]", "expected a table of named parts")
     _absolute_files({family: parts}, path)
-    there = result.get(family, {})
+    existing = result.get(family, {})
     for name, part in parts.items():
-        if name not in there:
+        if name not in existing:
             raise InputError(
-                f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, there)
+                f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, existing)
             )
-        there[name] = part if edit == "replace" else _merged(there[name], part)
+        existing[name] = part if edit == "replace" else _merged(existing[name], part)
 
 
 def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
-    """`old` with the named keys changed, tables key by key."""
+    """Return `old` with the named keys changed, tables key by key."""
     result = dict(old)
     for key, value in new.items():
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
@@ -364,19 +363,19 @@ def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path: Path) -> None:
-    there = result.setdefault(family, {})
+    existing = result.setdefault(family, {})
     for name, part in parts.items():
-        if name in there:
+        if name in existing:
             raise InputError(
                 f"{path} [{family}.{name}]",
                 f"the extended scene already has a {family} called '{name}'",
                 f"write [replace.{family}.{name}] or [set.{family}.{name}]",
             )
-        there[name] = part
+        existing[name] = part
 
 
 def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:
-    """The table or list that holds a path, and its last key; entries of lists are numbered from 0."""
+    """Return the table or list that contains a key path, and its last key; entries of lists count from 0."""
     keys = str(path).split(".")
     for depth, name in enumerate(keys):
         key = _entry(table, name)
@@ -391,7 +390,7 @@ def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:
 
 
 def _entry(table: Any, name: str) -> str | int | None:
-    """The key of a table, or the number of a list's entry; None when there is none."""
+    """Return a table's key, or the index of a list's entry; None when it does not exist."""
     if isinstance(table, dict):
         return name if name in table else None
     return int(name) if isinstance(table, list) and name.isdecimal() and int(name) < len(table) else None
@@ -417,7 +416,7 @@ def _put(table: dict[str, Any], path: str, value: object, where: str) -> None:
 
 
 def _absolute_files(table: dict[str, Any], path: Path) -> None:
-    """Recipes, tables and shapes are searched for next to the scene, then in each folder above it."""
+    """Make paths of recipes, tables and shapes absolute: next to the scene, else in the nearest folder above."""
 
     def absolute(name: str) -> str:
         return str(next((p for p in (folder / name for folder in path.parents) if is_file(p)), path.parent / name))
@@ -436,7 +435,7 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
 
 
 def _tables(node: object) -> Iterator[dict[str, Any]]:
-    """Laws that are read from a file, at any depth."""
+    """Yield the laws that are read from a file, at any depth."""
     if isinstance(node, dict):
         if node.get("type") == "table" and isinstance(node.get("file"), str) and "points" not in node:
             yield node

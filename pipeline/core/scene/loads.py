@@ -1,6 +1,6 @@
-"""Loads: gravity, forces and torques on frames, springs and dampers, and what acts along joint coordinates.
+"""Loads: gravity, forces and torques on frames, springs and dampers, and loads along joint coordinates.
 
-A load of type 'point-force' acts as `pipeline.dynamics.loads.point_force` says.
+The action of a load of type 'point-force' is described in `pipeline.dynamics.loads.point_force`.
 """
 
 import math
@@ -28,13 +28,13 @@ Components = tuple[Bare, Bare, Bare]
 #: a symmetric 6x6 matrix between three displacements and three rotations
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 NOTHING: Matrix = ((0.0,) * 6,) * 6
-#: what computing a matrix elsewhere, such as by turning it, may leave of symmetry and of a zero eigenvalue
+#: relative rounding errors, of symmetry and of a zero eigenvalue, in a matrix that was computed elsewhere
 _ROUNDING = 1e-9
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def _matrix(value: Any, what: str, dimensions: tuple[str, str, str]) -> Matrix:
-    """Rows of the matrix, SI; dimensions: of displacement rows and columns, mixed ones, rotation rows and columns."""
+    """Return the matrix in SI; dimensions: of displacement rows and columns, mixed ones, rotation rows and columns."""
     given = list(value) if isinstance(value, (list, tuple)) else []
     if len(given) == 6 and not any(isinstance(row, (list, tuple)) for row in given):
         given = [[entry if i == j else 0.0 for j in range(6)] for i, entry in enumerate(given)]
@@ -45,7 +45,7 @@ def _matrix(value: Any, what: str, dimensions: tuple[str, str, str]) -> Matrix:
 
 
 def _entry(value: Any, dimension: str) -> float:
-    """SI value of an entry; a mixed one, a force per angle, is a torque per displacement too, which is a force."""
+    """Return the SI value of an entry; a mixed entry is a force per angle, or equally a torque per displacement."""
     try:
         return quantity(value, dimension)
     except ValueError as error:
@@ -59,7 +59,7 @@ def _entry(value: Any, dimension: str) -> float:
 
 
 def _checked(rows: list[list[float]], what: str) -> Matrix:
-    """The matrix, symmetric to the last digit; ValueError unless it is symmetric and positive semidefinite."""
+    """Return the matrix made exactly symmetric; raise ValueError unless symmetric and positive semidefinite."""
     sizes = [math.sqrt(abs(rows[k][k])) for k in range(6)]
     for j, i in combinations(range(6), 2):
         asymmetry = abs(rows[i][j] - rows[j][i])
@@ -116,33 +116,33 @@ class Gravity(Part):
 
     type: Literal["gravity"]
     acceleration: Acceleration
-    """of a falling body, world axes"""
+    """acceleration of a falling body, world axes"""
 
 
 class PointForce(Part):
-    """Force [N] at the origin of a frame; each component a value or a law of time."""
+    """Force [N] at the origin of a frame; each component is a value or a law of time."""
 
     type: Literal["point-force"]
     frame: FrameName
     force: Components
     """components x, y, z [N]"""
     axes: Literal["world", "frame"] = "world"
-    """those of the world, or those of the frame, with which the force then turns"""
+    """axes of the components: those of the world, or those of the frame, with which the force then rotates"""
 
 
 class PointTorque(Part):
-    """Torque [N m] on the body of a frame; as `PointForce`."""
+    """Torque [N m] on the body of a frame; each component is a value or a law of time."""
 
     type: Literal["point-torque"]
     frame: FrameName
     torque: Components
     """components x, y, z [N m]"""
     axes: Literal["world", "frame"] = "world"
-    """those of the world, or of the frame"""
+    """axes of the components: those of the world, or those of the frame, with which the torque then rotates"""
 
 
 class SpringDamper(Part):
-    """Acts between the origins of two frames, along the line between them.
+    """Spring and damper between the origins of two frames, along the line between them.
 
     Tension: stiffness (length - free_length) + damping (rate of the length).
     """
@@ -155,7 +155,7 @@ class SpringDamper(Part):
     damping: Annotated[Damping, Field(ge=0.0)] = 0.0
     """force per speed"""
     free_length: Annotated[Length, Field(ge=0.0)] | None = None
-    """length at which the spring neither pulls nor pushes"""
+    """length at which the spring force is zero"""
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
@@ -175,20 +175,20 @@ class JointForce(OnCoordinate):
 
 
 class _ByExpression(Part):
-    """What loads by an expression have. It combines `values`, quantities of position and velocity, and the time `t`."""
+    """Keys of loads by an expression of `values`, quantities of position and velocity, and the time `t`."""
 
     values: dict[str, Value] = Field(default_factory=dict)
     """named constants, each a number or text with its unit"""
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """The expressions."""
+        """The expressions of the load's components."""
         force: str | tuple[str, ...] = self.force  # type: ignore[attr-defined]
         return (force,) if isinstance(force, str) else force
 
     @property
     def bends(self) -> bool:
-        """Whether it has values at which its slope jumps."""
+        """True when an expression contains functions whose slope jumps."""
         return any(f"{name}(" in text.replace(" ", "") for name in BENT for text in self.texts)
 
 
@@ -207,33 +207,33 @@ class LineExpression(_ByExpression):
     between: tuple[FrameName, FrameName]
     """the two frames"""
     force: str
-    """the expression; positive pulls them together. `length` is their distance, `rate` that of the length"""
+    """the expression; positive pulls the frames together. `length` is their distance, `rate` its rate"""
 
 
 class PointExpression(_ByExpression):
-    """Force [N] at the origin of a frame by an expression for each component, or by one whose value is a vector."""
+    """Force [N] at the origin of a frame by an expression for each component, or by one with a vector as value."""
 
     type: Literal["point-expression"]
     frame: FrameName
     force: str | tuple[str, str, str]
     """components x, y, z, or one vector"""
     axes: Literal["world", "frame"] = "world"
-    """those of the world, or those of the frame, with which the force then turns"""
+    """axes of the components: those of the world, or those of the frame, with which the force then rotates"""
 
 
 class JointSpring(OnCoordinate):
-    """Spring and damper along a joint coordinate: -stiffness (coordinate - rest) - damping (its rate).
+    """Spring and damper along a joint coordinate: -stiffness (coordinate - rest) - damping (rate).
 
-    Turns are counted: an angle may grow beyond 180 deg.
+    Full turns count: an angle may grow beyond 180 deg.
     """
 
     type: Literal["joint-spring"]
     stiffness: Value = 0.0
-    """per unit of the coordinate"""
+    """force, or torque, per unit of the coordinate"""
     damping: Value = 0.0
-    """per unit of its rate"""
+    """force, or torque, per unit of the coordinate's rate"""
     rest: Value = 0.0
-    """coordinate at which the spring does nothing"""
+    """coordinate at which the spring force is zero"""
 
 
 class Coulomb(Part):
@@ -250,22 +250,22 @@ class Coulomb(Part):
 
 
 class JointFriction(OnCoordinate):
-    """Friction along a joint coordinate: viscous coefficient times the rate, and Coulomb's of given strength."""
+    """Friction along a joint coordinate: viscous coefficient times the rate, plus Coulomb friction."""
 
     type: Literal["joint-friction"]
     viscous: Value = 0.0
     """friction per unit of the rate"""
     coulomb: Coulomb | None = None
-    """friction of given strength"""
+    """Coulomb friction of given strength"""
 
     @property
     def bends(self) -> bool:
-        """Whether it has speeds at which its slope or curvature jumps."""
+        """True when the friction has speeds at which its slope or curvature jumps."""
         return self.coulomb is not None
 
 
 class Bushing(Part):
-    """Elastic mount between two frames: force -(stiffness x + damping dx/dt) on six displacements x of the second one.
+    """Elastic mount between two frames: force -(stiffness x + damping dx/dt) on six displacements x of the second.
 
     The displacements are those of the second frame in the first one's axes: x, y, z of its origin and the rotation
     vector, which is followed up to a full turn.
@@ -273,11 +273,11 @@ class Bushing(Part):
 
     type: Literal["bushing"]
     between: tuple[FrameName, FrameName]
-    """the frame it is mounted in, and the frame it carries"""
+    """the frame of the mount, and the frame that it carries"""
     stiffness: BushingStiffness = NOTHING
-    """six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy"""
+    """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix"""
     damping: BushingDamping = NOTHING
-    """six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy"""
+    """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix"""
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
@@ -287,12 +287,12 @@ class Bushing(Part):
 
 
 class _Controller(OnCoordinate):
-    """What controllers have. They push `joint` along its coordinate by a law of the error = reference - measured."""
+    """Keys of controllers. They push `joint` along its coordinate by a law of the error = reference - measured."""
 
     measured: str | None = None
-    """the coordinate that is measured, ``A`` or ``A.rotation``; default: the one that is pushed"""
+    """the measured coordinate, ``A`` or ``A.rotation``; default: the one that is pushed"""
     reference: Bare
-    """a law of time of the measured coordinate"""
+    """desired value of the measured coordinate, a law of time"""
     proportional: Value = 0.0
     """gain [force, or torque, per unit of the measured coordinate]"""
     integral: Value = 0.0
@@ -302,7 +302,7 @@ class _Controller(OnCoordinate):
     limits: tuple[Value, Value] | None = None
     """least and largest force"""
     tracking_time: Annotated[Time, Field(gt=0.0)] | None = None
-    """how fast the integral follows a limited output [s]; default proportional/integral"""
+    """time in which the integral adapts to a limited output [s]; default proportional/integral"""
 
 
 class Pid(_Controller):
@@ -312,7 +312,7 @@ class Pid(_Controller):
 
 
 class SampledPid(_Controller):
-    """PID that looks every `period`, from the start of the run on, and holds its output in between (zero-order hold).
+    """PID that samples every `period` from the start of the run, and holds its output in between (zero-order hold).
 
     At sample k: proportional e_k + I_k + derivative (e_k - e_(k-1))/period, no derivative at the first;
     I_(k+1) = I_k + period (integral e_k + (force - asked)/tracking_time).
@@ -341,5 +341,5 @@ Load = Annotated[
     | SampledPid,
     Field(discriminator="type"),
 ]
-#: all of them
+#: all types of loads
 KINDS: tuple[Any, ...] = get_args(get_args(Load)[0])

@@ -1,7 +1,7 @@
-"""What a run records: its regular output times, and what is recorded on request only; how variables are described.
+"""The output of a run: regular output times, data recorded on request only, and the description of variables.
 
 A request is a key of ``[output]``, with the variables that it adds to the run's dataset below; the module of the same
-name in `pipeline.dynamics.record` makes them.
+name in `pipeline.dynamics.record` computes them.
 """
 
 import re
@@ -16,10 +16,10 @@ from flexclear.pipeline.core.scene.fields import Part, Position, Time, require_o
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One variable of an artifact. `optional` ones are absent where the scene has no such part.
+    """One variable of an artifact. `optional` ones are absent where the scene has no corresponding part.
 
-    units: as UDUNITS reads them; empty for words.  turning: units of entries that turn instead of sliding, where a
-    dimension has both.  gaps: whether entries may be NaN, where there is nothing.
+    units: as UDUNITS reads them; empty for words. turning: units of entries that turn instead of sliding, where a
+    dimension has both. gaps: whether entries may be NaN, where a value does not exist.
     """
 
     dims: tuple[str, ...]
@@ -34,15 +34,15 @@ Schema = dict[str, Variable]
 
 
 def rows(text: str) -> tuple[tuple[str, ...], ...]:
-    """Cells of a table, one row in each line: ``first | second | third``; an indented line continues the one before."""
+    """Return the cells of a table, one row per line: ``first | second | third``; indented lines continue a row."""
     return tuple(tuple(map(str.strip, line.split("|"))) for line in re.sub(r"\n +", " ", text.strip()).splitlines())
 
 
 def table(text: str) -> Schema:
-    """Variables by name, one in each line: ``name | dimensions | units | long name``.
+    """Return variables by name, one in each line: ``name | dimensions | units | long name``.
 
-    Behind the name ``?`` marks what is optional and ``~`` what may have gaps; ``units, units`` are those of entries
-    that slide and of those that turn. An indented line continues the long name of the line before.
+    After the name ``?`` marks optional variables and ``~`` those that may have gaps; ``units, units`` are those of
+    entries that slide and of those that turn. An indented line continues the long name of the line before.
     """
     variables = {}
     for name, dims, units, long_name in rows(text):
@@ -54,16 +54,16 @@ def table(text: str) -> Schema:
 
 
 class Gauge(Part):
-    """Where on the surface of a solid its stress is recorded: one of position, frame and region."""
+    """Part of a solid's surface where stress is recorded, given by one of position, frame and region."""
 
     body: str
     """the solid, one of those in `stress`"""
     position: Position | None = None
-    """of the nearest node, body frame"""
+    """position of the gauge, which is at the nearest node, body frame"""
     frame: str | None = None
-    """a frame of its recipe, for the nodes that are tied to it"""
+    """a frame of the solid's recipe: the gauge is at the nodes that are tied to it"""
     region: str | None = None
-    """a named region of its mesh"""
+    """a named region of the solid's mesh"""
 
     @model_validator(mode="after")
     def _one_rule(self) -> Self:
@@ -79,26 +79,26 @@ class Output(Part):
     stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     """flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids"""
     gauges: Annotated[dict[str, Gauge], Field(min_length=1)] | None = None
-    """where on solids stress is recorded next to the peak"""
+    """gauges on solids where stress is recorded besides the peak"""
 
     @model_validator(mode="after")
     def _gauges_are_on_stressed_bodies(self) -> Self:
         for name, gauge in (self.gauges or {}).items():
             if gauge.body not in (self.stress or ()):
-                asked = ", ".join(self.stress or ()) or "none"
-                raise ValueError(f"gauges.{name}: '{gauge.body}' is none of the bodies in `stress` ({asked}); add it")
+                known = ", ".join(self.stress or ()) or "none"
+                raise ValueError(f"gauges.{name}: '{gauge.body}' is none of the bodies in `stress` ({known}); add it")
         return self
 
     def gauge_names(self, body: str) -> list[str]:
-        """Gauges of a body, as the run calls them."""
+        """Return the names of a body's gauges in the run."""
         return [f"{body}.{name}" for name in self.on(body)]
 
     def on(self, body: str) -> dict[str, Gauge]:
-        """The gauges of a body."""
+        """Return the gauges of a body."""
         return {name: gauge for name, gauge in (self.gauges or {}).items() if gauge.body == body}
 
     def without(self, bodies: Collection[str]) -> dict[str, Any]:
-        """The same as a table in which the stresses of these bodies are not asked for."""
+        """Return the output as a table without the stresses of these bodies."""
         rest = self.model_dump(mode="json", exclude_none=True, exclude={"stress", "gauges"})
         stress = [name for name in self.stress or () if name not in bodies]
         gauges = {
@@ -109,8 +109,8 @@ class Output(Part):
         return rest | ({"stress": stress} if stress else {}) | ({"gauges": gauges} if gauges else {})
 
     def requests(self) -> dict[str, Any]:
-        """What is asked for, by key."""
-        return {name: asked for name in VARIABLES if (asked := getattr(self, name)) is not None}
+        """Return the requests, by key."""
+        return {name: request for name in VARIABLES if (request := getattr(self, name)) is not None}
 
 
 #: key of `Output` -> variables that it adds to a run; all are optional

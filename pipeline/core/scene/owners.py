@@ -1,4 +1,4 @@
-"""Which parts of a scene own quantities, by the dimension of a run that has them; a scene is whatever has its parts."""
+"""Components of a scene that own quantities, by the dimension of the run; a scene is any object with its parts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flexclear.pipeline.core.scene.loads import Bushing, Pid, SampledPid
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.quantity import KINDS
 
-#: joint type -> its coordinates by name, and whether each is an angle, as the classes of the joints have them
+#: joint type -> its coordinates by name, and whether each is an angle, as in the classes of the joints
 COORDINATES: Mapping[str, Mapping[str, bool]] = {
     "revolute": {"rotation": True},
     "prismatic": {"translation": False},
@@ -18,12 +18,12 @@ COORDINATES: Mapping[str, Mapping[str, bool]] = {
     "planar": {"x": False, "y": False, "rotation": True},
     "universal": {"first": True, "second": True},
 }
-#: quantities of the whole mechanism that need loads, or flexible bodies
+#: quantities of the whole mechanism that require loads, and one that requires flexible bodies
 _OF_LOADS, _OF_MODES = ("load_work", "load_loss"), ("modal_damping_loss",)
 
 
 def owners(scene: Any) -> dict[str, dict[str, bool]]:
-    """Names by `quantity.OWNERS`, and whether what they do is about an axis, so that forces are torques."""
+    """Return names by `quantity.OWNERS`, and whether each acts about an axis, so that forces are torques."""
     forces, contacts, moving = (
         scene.forces(),
         scene.contacts(),
@@ -64,7 +64,7 @@ def _of_all(scene: Any) -> Iterator[str]:
 
 
 def _frames(scene: Any) -> Iterator[str]:
-    """Frames of bodies; of those that recipes describe, the ones that the scene names."""
+    """Yield frames of bodies; of bodies that recipes describe, the frames that the scene names."""
     for name, body in scene.body.items():
         yield from (f"{name}.{frame}" for frame in getattr(body, "frames", {}))
     for part in (*scene.joint.values(), *scene.load.values(), *scene.drive.values()):
@@ -93,21 +93,21 @@ def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
 
 
 def locked(scene: Any, name: str, event: Any) -> dict[str, tuple[str, bool]]:
-    """Coordinates that a lock called `name` holds: name of what holds it -> coordinate, and whether it is an angle."""
+    """Return the coordinates that a lock called `name` holds: name of the drive -> coordinate, and whether an angle."""
     joint = scene.joint.get(event.part[1])
     known = COORDINATES.get(joint.type, {}) if joint is not None else {}
     return {f"{name}.{c}" if len(known) > 1 else name: (c, turning) for c, turning in known.items()}
 
 
 def turns(scene: Any, part: Any) -> bool:
-    """Whether the coordinate of a part with `joint` and `coordinate` is an angle."""
+    """Return True when the coordinate of a part with `joint` and `coordinate` is an angle."""
     joint = scene.joint.get(part.joint)
     known = COORDINATES.get(joint.type, {}) if joint is not None else {}
     return known.get(part.coordinate or next(iter(known), ""), False)
 
 
 def _named(scene: Any, text: str) -> bool:
-    """The same of ``A`` or ``A.rotation``."""
+    """Return True when the coordinate ``A`` or ``A.rotation`` is an angle."""
     known = _coordinates(scene)
     return known.get(text, known.get(text.partition(".")[0], False))
 

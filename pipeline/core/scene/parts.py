@@ -1,5 +1,5 @@
-"""The parts of a scene: bodies and what they look like, joints, stops and gears. An effect is a part; absent means not
-there."""
+"""The parts of a scene: bodies and their appearance, joints, stops and gears. Each effect is a part; an effect without
+its part is absent."""
 
 import math
 import re
@@ -37,7 +37,7 @@ from flexclear.pipeline.core.scene.fields import (
 from flexclear.pipeline.core.scene.laws import Value
 from flexclear.pipeline.core.scene.units import quantity
 
-#: keys of a body that only pictures see
+#: keys of a body that affect pictures only
 UNSEEN = ("geometry", "color")
 
 
@@ -48,7 +48,7 @@ class BoxShape(Part):
     size: Position
     """lengths of the edges along x, y and z"""
     pose: Pose = Pose()
-    """of the box's middle in the body frame"""
+    """pose of the box's centre in the body frame"""
 
     @model_validator(mode="after")
     def _extended(self) -> Self:
@@ -62,11 +62,11 @@ class CylinderShape(Part):
 
     type: Literal["cylinder"]
     radius: Annotated[Length, Positive]
-    """of the cylinder"""
+    """radius of the cylinder"""
     length: Annotated[Length, Positive]
-    """along z"""
+    """length of the cylinder along z"""
     pose: Pose = Pose()
-    """of the cylinder's middle in the body frame"""
+    """pose of the cylinder's centre in the body frame"""
 
 
 class SphereShape(Part):
@@ -74,13 +74,13 @@ class SphereShape(Part):
 
     type: Literal["sphere"]
     radius: Annotated[Length, Positive]
-    """of the sphere"""
+    """radius of the sphere"""
     pose: Pose = Pose()
-    """of the sphere's middle in the body frame"""
+    """pose of the sphere's centre in the body frame"""
 
 
 class FileShape(Part):
-    """A surface from a file that meshio reads: STL, VTK, PLY, OBJ; of volume meshes their boundary."""
+    """A surface from a file that meshio reads: STL, VTK, PLY, OBJ; of volume meshes the boundary."""
 
     type: Literal["file"]
     file: str
@@ -88,7 +88,7 @@ class FileShape(Part):
     unit: Annotated[Length, Positive] = 1.0
     """length of one unit of the file, such as 1 mm"""
     pose: Pose = Pose()
-    """of the file's axes in the body frame"""
+    """pose of the file's axes in the body frame"""
 
 
 Shape = Annotated[BoxShape | CylinderShape | SphereShape | FileShape, Field(discriminator="type")]
@@ -104,12 +104,12 @@ Color = Annotated[str, BeforeValidator(_color)]
 
 
 class Seen(Part):
-    """What pictures show of a body instead of what follows from its joints."""
+    """Appearance of a body in pictures, instead of the one that follows from its joints."""
 
     geometry: tuple[Shape, ...] | None = None
     """shapes that pictures show, [] for none; default: bars and plates between the joints"""
     color: Color | None = None
-    """in pictures, such as #0072B2"""
+    """colour of the body in pictures, such as #0072B2"""
 
 
 class Ground(Seen):
@@ -121,7 +121,7 @@ class Ground(Seen):
 
 
 class Moving(Seen):
-    """What all bodies that move have."""
+    """Keys of all bodies that move."""
 
     pose: Pose | None = None
     """start pose of the body frame; without it, it follows from a joint"""
@@ -143,12 +143,12 @@ class RigidBody(Moving):
     frames: dict[PartName, Pose] = Field(default_factory=dict)
     """named points with axes on the body, in the body frame"""
     frame_tolerance: Annotated[Length, Field(ge=0.0)] = 0.0
-    """how far its frames may be moved so that the joints fit, where they nearly do; of bodies from a mesh a thousandth
-    of the distance of their frames, as the nodes of a hole know its middle no better"""
+    """distance by which the body's frames may be moved so that the joints fit, where they nearly do; for bodies from a
+    mesh a thousandth of the distance of their frames, since the nodes of a hole determine its centre no better"""
 
 
 def _hertz(value: Any) -> float:
-    """A frequency [Hz]: a bare number, or text with a unit."""
+    """Return a frequency [Hz] from a bare number, or text with a unit."""
     number = f"{value} Hz" if isinstance(value, (int, float)) and not isinstance(value, bool) else value
     return quantity(number, "angular velocity") / (2.0 * math.pi)
 
@@ -159,7 +159,7 @@ Frequency = Annotated[
 
 
 class Modes(Part):
-    """Which elastic coordinates a flexible body keeps: one of count, up_to, compliance and mass says how many."""
+    """Elastic coordinates of a flexible body; their number is given by one of count, up_to, compliance and mass."""
 
     reference: str
     """name of the reference condition, as docs/structure.md lists them"""
@@ -177,7 +177,7 @@ class Modes(Part):
     held: tuple[FrameName, ...] = ()
     """motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes"""
     of: str | None = None
-    """the reference whose shapes "mean-axis" is based on"""
+    """reference condition of the shapes on which "mean-axis" is based"""
 
     @model_validator(mode="after")
     def _one_choice(self) -> Self:
@@ -189,7 +189,7 @@ class RatioPerMode(Part):
     """Damping ratio of each elastic coordinate, in the order of the bundle's modes."""
 
     ratios: tuple[Annotated[Number, Field(ge=0.0)], ...]
-    """of each mode, of critical damping"""
+    """damping ratio of each mode, as a fraction of critical damping"""
 
 
 class Rayleigh(Part):
@@ -199,9 +199,9 @@ class Rayleigh(Part):
     """
 
     alpha: Annotated[Number, Field(ge=0.0)] = 0.0
-    """of the mass [1/s]"""
+    """coefficient of the mass matrix [1/s]"""
     beta: Annotated[Time, Field(ge=0.0)] = 0.0
-    """of the stiffness [s]"""
+    """coefficient of the stiffness matrix [s]"""
 
 
 class Stiffening(Part):
@@ -215,17 +215,17 @@ class FlexibleBody(Moving):
     mesh: str
     """file of the mesh recipe, relative to the scene"""
     modes: Modes
-    """which elastic coordinates are retained"""
+    """elastic coordinates of the body"""
     damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
-    """one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none"""
+    """one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh damping; default: none"""
     stiffening: Stiffening | None = None
-    """``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes"""
+    """``{}`` for a beam that rotates fast or carries large axial loads; default: linear shapes"""
 
 
 class MeshedRigidBody(Moving):
     """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
 
-    ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.
+    ``modes = { count = 0 }`` of a flexible body means the same; damping and stiffening then have no effect.
     """
 
     type: Literal["rigid"]
@@ -244,7 +244,7 @@ class MeshedRigidBody(Moving):
 
 
 def _which(body: Any) -> str | None:
-    """Which model a body is of: its type, but of a body with a recipe and no modes that of such bodies."""
+    """Return the tag of a body's model: its type, but "meshed" for a body with a recipe and no modes."""
     if isinstance(body, MeshedRigidBody):
         return "meshed"
     if not isinstance(body, dict):
@@ -266,17 +266,17 @@ Body = Annotated[
 
 
 class IdealJoint(Part):
-    """Two frames; the axes of motion are those of the first, its axis is z.
+    """Two frames; the axes of motion are those of the first, and the axis of the joint is z.
 
-    A free joint holds nothing: it says that a body shall fly. The motion of each type is in `pipeline.dynamics.joints`.
+    A free joint constrains nothing, so that a body flies. The motion of each type is in `pipeline.dynamics.joints`.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
-    """which motion it leaves free"""
+    """relative motion that the joint leaves free"""
     between: tuple[FrameName, FrameName]
     """first frame, whose axes are those of motion, and second frame, each as body.FRAME"""
     friction: JointFriction | None = None
-    """follows the force that the joint carries; absent means none"""
+    """friction by the force that the joint carries; default: none"""
 
     @model_validator(mode="after")
     def _rubs(self) -> Self:
@@ -296,15 +296,15 @@ class Stop(OnCoordinate):
     """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint."""
 
     lower: Value | None = None
-    """the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the start"""
+    """ends of the coordinate, one or both; angles count full turns, from within half a turn of zero at the start"""
     upper: Value | None = None
-    """the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the start"""
+    """ends of the coordinate, one or both; angles count full turns, from within half a turn of zero at the start"""
     normal: NormalLaw
-    """a normal law of contacts with its stiffness, of angles in N m and rad"""
+    """normal law of contacts with its stiffness, for angles in N m and rad"""
     floor: Value | None = None
-    """least approach speed used as impact rate; without it 1e-6 rad/s, or of lengths that of contacts"""
+    """least approach speed used as impact rate; default: 1e-6 rad/s, or for lengths as in contacts"""
     initial_approach_speed: Value | None = None
-    """of an end that the scene's start has passed; without it, such a start is refused"""
+    """impact rate of an end that the coordinate has passed at the start; without this key such a start is refused"""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -322,7 +322,7 @@ class Stop(OnCoordinate):
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """Which ends there are."""
+        """Names of the given ends."""
         return tuple(given(self, ("lower", "upper")))
 
 
@@ -330,11 +330,11 @@ class Gear(Part):
     """A joint coordinate that follows another one: change of `second` = ratio times change of `first`."""
 
     first: str
-    """joints (``A``), with the coordinate where there are several (``A.rotation``)"""
+    """joint (``A``), with the coordinate if the joint has several (``A.rotation``)"""
     second: str
-    """joints (``A``), with the coordinate where there are several (``A.rotation``)"""
+    """joint (``A``), with the coordinate if the joint has several (``A.rotation``)"""
     ratio: Value
-    """a number; of a slide that follows an angle a length per angle ("10 mm/rad"), and the other way round"""
+    """a number; between a translation and a rotation a length per angle ("10 mm/rad") or an angle per length"""
 
     @model_validator(mode="after")
     def _two(self) -> Self:

@@ -1,4 +1,4 @@
-"""What a plan decides: of each effect whether it stays, by what evidence, and how the planned scene is integrated."""
+"""Decisions of a plan: whether each effect stays, by what evidence, and how the planned scene is integrated."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from dataclasses import dataclass, field
 
 from flexclear.pipeline.core.scene.variants import Effect
 
-#: evidence, cheapest first
+#: kinds of evidence, cheapest first
 BOUND, RESPONSE, PILOT, NONE = "bound", "response", "pilot", "none"
-#: what each says, in words
+#: description of each kind of evidence
 EVIDENCE = {
     BOUND: "a bound from the ideal motion",
     RESPONSE: "the first-order response along the ideal motion",
     PILOT: "short runs with and without it",
     NONE: "not examined",
 }
-#: why an effect stays for which no run was made
+#: reason why an effect stays that no run has examined
 NOT_WORTH = "to leave it out would save no time worth the look"
 
-#: why an effect stays that could be left out
+#: reason why an effect stays that could be removed
 NO_CHEAPER = "without it the run is not cheaper"
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What becomes of one effect. estimate, uncertainty: of its influence by quantity, SI; infinite where unknown."""
+    """Decision on one effect. estimate, uncertainty: of the effect size by quantity [SI]; infinite where unknown."""
 
     effect: Effect
     kept: bool
@@ -37,11 +37,10 @@ class Decision:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The finite elements of a body. given: how many it has.  called_for: how many what is requested calls for.
+    """The finite elements of a body. given: their number. called_for: number that the requested accuracy requires.
 
-    frequency, compliance: largest errors of its mesh, as fractions, of its retained frequencies and of its frames'
-    compliance.
-    error: estimated error that the mesh makes in each quantity, at most [SI].
+    frequency, compliance: largest relative errors of the body's mesh, in its retained frequencies and in the compliance
+    of its frames. error: estimated largest error of each quantity due to the mesh [SI].
     """
 
     given: int
@@ -53,13 +52,13 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Plan:
-    """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run; no integrator: as the scene.
+    """All decisions. requested: accuracy by quantity [SI].
 
-    modes: elastic coordinates of flexible bodies that stay that need fewer than they have.
-    integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
-    the plan has run.  runs: how many.  uncoupled: names of parts that nothing couples to the requested quantities.
-    meshes: finite elements of flexible bodies whose recipes give them.  ledger_tolerance: of the planned run, where it
-    is not the usual one.
+    integrator, rtol: of the planned run; empty integrator: as in the scene. modes: elastic coordinates of remaining
+    flexible bodies that need fewer than they have. integration: estimated error of the integration by quantity [SI].
+    evaluations: of the right-hand side in all runs of the plan. runs: their number. uncoupled: names of parts that
+    nothing couples to the requested quantities. meshes: finite elements of flexible bodies whose recipes give their
+    number. ledger_tolerance: of the planned run, where it differs from the usual one.
     """
 
     decisions: tuple[Decision, ...]
@@ -76,5 +75,5 @@ class Plan:
 
     @property
     def gone(self) -> tuple[Effect, ...]:
-        """The effects that are dropped."""
+        """The effects that the plan removes."""
         return tuple(d.effect for d in self.decisions if not d.kept)

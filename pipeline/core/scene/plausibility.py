@@ -1,4 +1,4 @@
-"""Plausibility checks: values of a scene that could be meant, but look like a slip of units, of sign or of digits."""
+"""Plausibility checks: values that could be intended, but look like an error of units, of sign or of digits."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from flexclear.pipeline.core.system.errors import InputError
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: largest plausible ratio of a body's radius of gyration to the extent of its frames: kg m^2 for kg mm^2 makes it 1000
-#: times larger, a flywheel on a short crank ten times
+#: largest plausible ratio of a body's radius of gyration to the extent of its frames: with kg m^2 for kg mm^2 the ratio
+#: is 1000 times larger, with a flywheel on a short crank ten times
 FAR = 30.0
-#: density [kg/m^3] above which a body with its frames close together may well be so large, as a disc on a thin shaft:
-#: about that of air
+#: density [kg/m^3], about that of air, above which a body may well be much larger than the extent of its frames, as a
+#: disc on a thin shaft
 AIRY = 1.0
 #: density [kg/m^3] above which no inertia is plausible; point masses of textbooks reach 1e8
 DENSE = 1e9
-#: the same of a body that has so many times the mass of every other body of the scene
+#: the same limit for a body whose mass exceeds that of every other body of the scene by the second factor
 DENSE_AND_HEAVY, HEAVY = 1e6, 100.0
-#: a bare angle that is a whole multiple of the first and not below the second looks like degrees
+#: a bare angle that is a whole multiple of the first number and not below the second looks like degrees
 DEGREES, FEWEST_DEGREES = 5.0, 30.0
 UNITS = 'bare numbers are SI; with a unit they are text, as "0.2 mm" or "100 kg mm^2"'
 
 
 def implausible(scene: Scene) -> list[InputError]:
-    """Implausible values, located as validation errors are; none of them is refused."""
+    """Return implausible values, located as validation errors are; none of them is refused."""
     checks = (_clearances, _inertias, _masses, _intervals, _angles, _gains)
     return [warning for check in checks for warning in check(scene)]
 
@@ -47,7 +47,7 @@ def _clearances(scene: Scene) -> Iterator[InputError]:
 
 
 def _inertias(scene: Scene) -> Iterator[InputError]:
-    """Inertias too large for a body of its size; a body with one frame is compared with the whole scene."""
+    """Yield inertias too large for a body of its size; a body with one frame is compared with the whole scene."""
     scene_points = [point for body in scene.body.values() for point in _points(body, getattr(body, "pose", None))]
     whole = _extent(scene_points)
     for name, body in scene.rigid().items():
@@ -61,19 +61,19 @@ def _inertias(scene: Scene) -> Iterator[InputError]:
 
 
 def _points(body: Any, pose: Any) -> list[tuple[float, float, float]]:
-    """Points that show how large a scene is: origins of bodies and of frames of the ground."""
+    """Return points that span a scene: origins of bodies and of frames of the ground."""
     if pose is not None:
         return [pose.position]
     return [frame.position for frame in getattr(body, "frames", {}).values()]
 
 
 def _extent(points: list[tuple[float, float, float]]) -> float:
-    """Diagonal of the box around points."""
+    """Return the diagonal of the box around points."""
     return sqrt(sum((max(x) - min(x)) ** 2 for x in zip(*points, strict=True)))
 
 
 def _masses(scene: Scene) -> Iterator[InputError]:
-    """Masses that no body with such an inertia can have."""
+    """Yield masses that no body with its inertia can have."""
     bodies = scene.rigid()
     for name, body in bodies.items():
         others = max((other.mass for key, other in bodies.items() if key != name), default=inf)
@@ -89,7 +89,7 @@ def _masses(scene: Scene) -> Iterator[InputError]:
 
 
 def least_density(body: RigidBody) -> float:
-    """Least density [kg/m^3] with which a body can have its mass and inertia: that of a homogeneous ball.
+    """Return the least density [kg/m^3] of a body with its mass and inertia: that of a homogeneous ball.
 
     Of all bodies with the same mass and sum of principal moments the ball has the largest volume; inf without inertia.
     """
@@ -108,7 +108,7 @@ def _intervals(scene: Scene) -> Iterator[InputError]:
 
 
 def _angles(scene: Scene) -> Iterator[InputError]:
-    """Bare numbers of angles that look like degrees."""
+    """Yield bare numbers of angles that look like degrees."""
     for name, drive in scene.drive.items():
         if isinstance(drive, JointDrive) and turns(scene, drive):
             yield from _degrees(scene, f"drive.{name}.law", _angles_of(drive.law))
@@ -137,7 +137,7 @@ def _degrees(scene: Scene, key: str, values: list[Any]) -> Iterator[InputError]:
 
 
 def _angles_of(law: Any) -> list[Any]:
-    """Values of a law that are angles; a polynomial's are rates but for the first, which continues another law."""
+    """Return the values of a law that are angles; none of a polynomial, whose coefficients are mostly rates."""
     match law:
         case Constant():
             return [law.value]
@@ -165,7 +165,7 @@ def _gains(scene: Scene) -> Iterator[InputError]:
 
 
 def negative_gains(scene: Scene) -> Iterator[tuple[str, str]]:
-    """Controllers with negative gains, each with the key of the gain."""
+    """Yield the names of controllers with negative gains, each with the key of the gain."""
     for name, load in scene.load.items():
         if isinstance(load, (Pid, SampledPid)):
             for key in ("proportional", "integral", "derivative"):
@@ -175,6 +175,6 @@ def negative_gains(scene: Scene) -> Iterator[tuple[str, str]]:
 
 
 def warning(scene: Scene, key: str, text: str, remedy: str) -> InputError:
-    """A warning about the value of a key."""
+    """Return a warning about the value of a key."""
     where = f"{scene.path} [{key}]" if scene.path is not None else f"[{key}]"
     return InputError(where, text, remedy)

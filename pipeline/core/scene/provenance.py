@@ -1,4 +1,4 @@
-"""Where values come from: what scenes and recipes say of that in `source`, reported by path, or left out."""
+"""Provenance of values: the texts in `source` of scenes and recipes, by key path; and tables without them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def sources(table: Mapping[str, Any], path: str = "") -> dict[str, str]:
-    """Place -> text of every `source` at and below a table; of the table itself by its path, or by that of its key."""
+    """Return key path -> text of every `source` at and below a table; a text is at the path of its table or key."""
     sources: dict[str, str] = {}
     for where, source in _sources(table, path):
         sources |= {where: source} if isinstance(source, str) else {_below(where, key): t for key, t in source.items()}
@@ -15,7 +15,7 @@ def sources(table: Mapping[str, Any], path: str = "") -> dict[str, str]:
 
 
 def mistaken(table: Mapping[str, Any]) -> str | None:
-    """Place of the first `source` that is neither a text nor a table of texts; where models were read there is none."""
+    """Return the path of the first `source` that is no text and no table of texts; None in validated tables."""
     for where, source in _sources(table, ""):
         texts = source.values() if isinstance(source, dict) else [source]
         if not all(isinstance(text, str) for text in texts):
@@ -24,7 +24,7 @@ def mistaken(table: Mapping[str, Any]) -> str | None:
 
 
 def _sources(node: Any, where: str) -> Iterator[tuple[str, Any]]:
-    """Every `source` that is there, with the path of what it is about."""
+    """Yield every `source`, with the key path of the part that it describes."""
     if isinstance(node, Mapping):
         if node.get("source") is not None:
             yield where, node["source"]
@@ -32,7 +32,7 @@ def _sources(node: Any, where: str) -> Iterator[tuple[str, Any]]:
     else:
         items = ((number, value) for number, value in enumerate(node))
     for key, value in items:
-        if isinstance(value, (dict, list, tuple)):  # most lists are of numbers
+        if isinstance(value, (dict, list, tuple)):  # most entries of lists are numbers
             yield from _sources(value, _below(where, str(key)))
 
 
@@ -41,15 +41,15 @@ def _below(where: str, key: str) -> str:
 
 
 def assumed(sources: dict[str, str]) -> dict[str, str]:
-    """Those that say ``assumed: why``."""
+    """Return the sources of the form ``assumed: why``."""
     return {where: text for where, text in sources.items() if text.startswith("assumed")}
 
 
 def without(node: Any) -> Any:
-    """A table without its sources, and without the names of files that laws were read from, whose numbers are there."""
+    """Return a table without its sources, and without the file names of laws whose numbers have been read."""
     if isinstance(node, dict):
         read = node.get("type") == "table" and "points" in node
         return {k: "" if read and k == "file" else without(v) for k, v in node.items() if k != "source"}
-    # most lists are of numbers
+    # most lists contain only numbers
     nested = isinstance(node, list) and any(isinstance(item, (dict, list)) for item in node)
     return [without(item) for item in node] if nested else node

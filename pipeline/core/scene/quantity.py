@@ -2,12 +2,13 @@
 
 A quantity is ``<owner>.<word>``, as ``platform.position`` or ``A1.peak_force``; ``slider.position.x`` is a component,
 and ``kinetic`` belongs to the whole mechanism. The words are the names of the run's variables over time, as
-``slider.acceleration`` or ``hinge.joint_velocity``; the kind of part in front may be left out (``hinge.velocity``), and
-means the first of `OWNERS` that has such a part. ``force(A1)`` is another way to write ``A1.force``.
-Expressions combine quantities and numbers with units (`pipeline.core.scene.expression`): ``force(A1) - force(A2)``,
+``slider.acceleration`` or ``hinge.joint_velocity``; without the kind of component in front (``hinge.velocity``) the
+first of `OWNERS` with this variable is meant. ``force(A1)`` is another way to write ``A1.force``. Expressions combine
+quantities and numbers with units (`pipeline.core.scene.expression`): ``force(A1) - force(A2)``,
 ``max(0, slider.position.x - 10 mm)``; ``t`` is the time, ``norm(...)`` the magnitude.
-How runs hold quantities is known to `pipeline.core.artifacts.quantities`, which needs NumPy; a command that finds
-everything fresh does not.
+
+`pipeline.core.artifacts.quantities` reads quantities from runs. It needs NumPy; commands with up-to-date results do
+not.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from flexclear.pipeline.core.scene.expression import FUNCTIONS, SEVERAL, measure
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.run_schema import RUN
 
-#: dimension of a run -> what its entries are; a word that several have means the first. Sections are named by bodies
+#: dimension of a run -> its entries; a word of several dimensions means the first. Sections have the names of bodies
 OWNERS = {
     "body": "body",
     "frame": "frame, `body.frame`",
@@ -41,15 +42,15 @@ OWNERS = {
     "gauge": "body whose stresses are recorded, or `body.gauge`",
     "": "the whole mechanism",
 }
-#: front of a variable's name that says the kind of part
+#: prefixes of variables' names that name the kind of component
 _FRONTS = ("frame_", "joint_", "drive_", "controller_", "gear_", "load_", "bushing_", "contact_", "wear_")
 #: variables whose quantity has another name
 _RENAMED = {"quaternion": "orientation", "joint_force": "force", "joint_moment": "moment", "contact_impulse": "impulse"}
 #: other words for a quantity
 _ALSO = {"von_mises_stress": {"von_mises", "peak_von_mises"}}
-#: what says how well the equations are posed, and no quantity
+#: indicators of how well the equations are posed, which are no quantities
 _INDICATORS = ("mobility", "rank", "condition")
-#: what contacts have once per run or event, not over time
+#: quantities that contacts have once per run or event, not over time
 OF_CONTACTS = ("peak_force", "impulse", "impact_times")
 #: owners that a scene without clearance does not have
 OF_CLEARANCE = ("contact", "worn")
@@ -58,8 +59,8 @@ COMPONENTS = ("x", "y", "z")
 
 
 class Kind(NamedTuple):
-    """What owns such a quantity (dimension of the run), its variable, SI units of what slides and turns, the dimension
-    of its components or none, and what it means."""
+    """Dimension of the run that owns a kind of quantity, its variable, SI units of entries that slide and that turn,
+    the dimension of its components or an empty text, and its meaning."""
 
     owner: str
     variable: str
@@ -69,7 +70,7 @@ class Kind(NamedTuple):
 
 
 def as_written(text: str) -> str:
-    """A unit of the contract as scenes write it: ``m s-2`` as ``m/s^2``."""
+    """Return a unit of the datasets in the notation of scenes: ``m s-2`` as ``m/s^2``."""
     over, under = list[str](), list[str]()
     for name, power in re.findall(r"([A-Za-z]+|1)(-?\d*)", text):
         (under if power.startswith("-") else over).append(
@@ -94,7 +95,7 @@ def _kinds() -> dict[str, Kind]:
     return dict(sorted(known.items(), key=lambda item: list(OWNERS).index(item[1].owner)))
 
 
-#: by their full words
+#: kinds of quantities by their full words
 KINDS = _kinds() | {EXPRESSION: Kind("", "", ("", ""), "", "")}
 
 
@@ -114,11 +115,11 @@ WORDS = _words()
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A quantity of one part, of the whole mechanism, or an expression of several.
+    """A quantity of one component, of the whole mechanism, or an expression of several.
 
-    owner: name of the part, else empty.  kind: one of `KINDS`.  component: of a vector, or empty for all of it.  turns:
-    whether it is about an axis.  text: as written, where that is not ``<owner>.<kind>``.  steps: of an expression, in
-    postfix order: quantities, numbers with their SI units, and operators.
+    owner: name of the component, else empty. kind: one of `KINDS`. component: of a vector, or empty for the whole
+    vector. turns: whether it acts about an axis. text: as written, where that is not ``<owner>.<kind>``. steps: of an
+    expression, in postfix order: quantities, numbers with their SI units, and operators.
     """
 
     owner: str
@@ -130,12 +131,12 @@ class Quantity:
 
     @property
     def name(self) -> str:
-        """As the scene writes it."""
+        """Name of the quantity as the scene writes it."""
         return self.text or f"{self.owner}.{self.kind}"
 
     @property
     def unit(self) -> str:
-        """SI unit of its values and errors; an expression's as one of its terms has it, where one does: J or N m."""
+        """SI unit of values and errors; for an expression that of a term with the same dimension, if any: J or N m."""
         if not self.steps:
             return KINDS[self.kind].units[self.turns]
         measured = measure(self.steps)[0]
@@ -143,35 +144,35 @@ class Quantity:
 
     @property
     def dim(self) -> str:
-        """Dimension of its components: axis, quat, or none."""
+        """Dimension of the components: axis, quat, or none."""
         return measure(self.steps)[1] if self.steps else "" if self.component else KINDS[self.kind].dim
 
     @property
     def over_time(self) -> bool:
-        """Whether it has a value at every time."""
+        """True when the quantity has a value at every time."""
         return self.kind not in OF_CONTACTS
 
     @property
     def of_place(self) -> bool:
-        """Whether it says where something is, so that its size is its largest change from the start."""
+        """True when the quantity is a position or angle, so that its size is its largest change from the start."""
         return self.over_time and self.unit in ("m", "rad")
 
     def terms(self) -> list[Quantity]:
-        """The quantities of an expression; the quantity itself where it is none."""
+        """Return the quantities of an expression; for a plain quantity the quantity itself."""
         return [step for step in self.steps if isinstance(step, Quantity)] if self.steps else [self]
 
     def is_there(self, owners: Mapping[str, Collection[str]]) -> bool:
-        """Whether a scene has it; owners as of `parse`."""
+        """Return True when a scene has the quantity; owners as in `parse`."""
         return all((term.owner or term.kind) in owners.get(KINDS[term.kind].owner, ()) for term in self.terms())
 
     def written(self) -> list[Any]:
-        """As JSON, for `read`."""
+        """Return the quantity as JSON, which `read` parses."""
         steps = [step.written() if isinstance(step, Quantity) else step for step in self.steps]
         return [self.owner, self.kind, self.component, self.turns, self.text, steps]
 
     @classmethod
     def read(cls, data: Sequence[Any]) -> Quantity:
-        """The quantity that `written` gave."""
+        """Return the quantity from the JSON that `written` returned."""
         owner, kind, component, turns, text, steps = data
         return cls(owner, kind, component, turns, text, tuple(_step(step) for step in steps))
 
@@ -187,10 +188,10 @@ _PLAIN = re.compile(r"\w[\w.-]*")
 
 
 def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
-    """The quantity called `text`.
+    """Return the quantity called `text`.
 
-    owners: names of the scene's parts by `OWNERS`; of a mapping, whether each is about an axis (`owners.owners`).
-    Raises ValueError that names what could have been meant.
+    owners: names of the scene's components by `OWNERS`; a mapping also states whether each acts about an axis
+    (`owners.owners`). Raises ValueError that names what could have been meant.
     """
     plain = _as_owned(text)
     if _PLAIN.fullmatch(plain):
@@ -204,9 +205,9 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
 
 
 def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
-    """The quantity that is positive where a comparison, as ``force(A1) > 200 N``, is true; vectors by magnitude.
+    """Return the quantity that is positive where a comparison, as ``force(A1) > 200 N``, is true; vectors by magnitude.
 
-    owners: as of `parse`.  Raises ValueError for what is no comparison of quantities.
+    owners: as in `parse`. Raises ValueError for text that is no comparison of quantities.
     """
     sides = re.split("([<>])", text)
     if len(sides) != 3:
@@ -214,14 +215,14 @@ def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     left, right = (_magnitude(side, owners) for side in sides[::2])
     measure([*left, *right, "max"])
     larger, smaller = (left, right) if sides[1] == ">" else (right, left)
-    made = Quantity("", EXPRESSION, text=text, steps=(*larger, *smaller, "-"))
-    if not made.terms():
+    difference = Quantity("", EXPRESSION, text=text, steps=(*larger, *smaller, "-"))
+    if not difference.terms():
         raise ValueError(f"'{text}' compares numbers: name a quantity")
-    return made
+    return difference
 
 
 def _magnitude(text: str, owners: Mapping[str, Collection[str]]) -> list[Any]:
-    """One side of a comparison, in postfix order."""
+    """Return one side of a comparison in postfix order, a vector as its magnitude."""
     steps = read(text, owners)
     return [*steps, "norm"] if measure(steps)[1] else steps
 
@@ -232,16 +233,16 @@ def read(
     constants: Mapping[str, tuple[float, str]] | None = None,
     local: Mapping[str, Any] | None = None,
 ) -> list[Any]:
-    """An expression in postfix order (`pipeline.core.scene.expression`); ValueError as of `parse`.
+    """Return an expression in postfix order (`pipeline.core.scene.expression`); raise ValueError as `parse` does.
 
-    constants: value and SI unit of each.  local: what further names mean.
+    constants: value and SI unit of each. local: meanings of further names.
     """
     known = local or {}
     return postfix(_as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants)
 
 
 def _as_owned(text: str) -> str:
-    """The text with ``force(A1)`` written as ``A1.force``."""
+    """Return the text with ``force(A1)`` written as ``A1.force``."""
     return _CALL.sub(r"\2.\1", text.strip())
 
 
@@ -262,7 +263,7 @@ def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:
 
 
 def _nearest(owner: str, word: str, owners: Mapping[str, Collection[str]]) -> str:
-    """The name that is meant: another owner of the same word, where there is one, else another word of the owner."""
+    """Return a hint: another owner of the same word, if there is one, else another word of the owner."""
     every = [
         (part if KINDS[key].owner else "", w)
         for w, keys in WORDS.items()
@@ -279,9 +280,9 @@ def _nearest(owner: str, word: str, owners: Mapping[str, Collection[str]]) -> st
 
 
 def usual(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> list[Quantity]:
-    """What is asked of a scene that names nothing: motion of the body with most joints, a reaction, the contacts.
+    """Return default quantities of a scene: motion of the body with most joints, a reaction, and the contacts.
 
-    joints: the bodies that each joint connects, in the scene's order; contacts: those with clearance.
+    joints: the bodies that each joint connects, in the scene's order; contacts: the joints with clearance.
     """
     bodies = [body for pair in joints.values() for body in pair]
     if not bodies:
@@ -293,7 +294,7 @@ def usual(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> l
     return chosen + [Quantity(name, kind) for name in contacts for kind in OF_CONTACTS]
 
 
-#: reduction -> what it says of a series
+#: reduction -> its meaning for a series
 SERIES = {
     "largest": "largest magnitude over the run",
     "rms": "root of the mean square magnitude over the time",
@@ -302,7 +303,7 @@ SERIES = {
     "series": "values at the regular output times",
     "sections": "values once in each period of the laws",
 }
-#: the same of what contacts do
+#: reductions of quantities of contacts, with their meanings
 CONTACT_REDUCTIONS = {
     "peak_force": {"largest": "largest normal force of the contact"},
     "impulse": {"final": "impulse of the normal force over the run"},
@@ -319,19 +320,19 @@ THROUGHOUT, MAGNITUDES = ("largest", "rms", "mean", "series"), ("largest", "rms"
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A quantity and the reduction of it that is recorded, as ``platform.velocity.largest``."""
+    """A quantity and its recorded reduction, as ``platform.velocity.largest``."""
 
     quantity: Quantity
     reduction: str
 
     @property
     def name(self) -> str:
-        """As a sweep writes it in full."""
+        """Full name, as in a sweep."""
         return f"{self.quantity.name}.{self.reduction}"
 
     @property
     def meaning(self) -> str:
-        """In words."""
+        """Meaning in words."""
         return f"{self.quantity.name}: {reductions(self.quantity)[self.reduction]}"
 
     @property
@@ -341,19 +342,19 @@ class Recorded:
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Dimensions of its value at one point."""
+        """Dimensions of the value at one point."""
         time = {"series": ("time",), "sections": ("section",)}.get(self.reduction, ())
         inner = "" if self.reduction in MAGNITUDES else self.quantity.dim
         return (*time, inner) if inner else time
 
     @property
     def throughout(self) -> bool:
-        """Whether it needs the regular output times."""
+        """True when the reduction needs the regular output times."""
         return self.quantity.over_time and self.reduction in THROUGHOUT
 
 
 def reductions(quantity: Quantity) -> dict[str, str]:
-    """The reductions that a quantity has, and what they say."""
+    """Return the reductions of a quantity, with their meanings."""
     if quantity.kind == "orientation":
         # a mean of quaternions is no rotation, and their magnitude is one
         return {name: SERIES[name] for name in ("final", "series", "sections")}
@@ -361,9 +362,9 @@ def reductions(quantity: Quantity) -> dict[str, str]:
 
 
 def parse_recorded(text: str, owners: Mapping[str, Collection[str]]) -> Recorded:
-    """What is called `text`; the reduction may be left out where a quantity has one only.
+    """Return the recorded quantity called `text`; a reduction may be omitted where the quantity has only one.
 
-    owners: as of `parse`.  Raises ValueError that names what could have been meant.
+    owners: as in `parse`. Raises ValueError that names what could have been meant.
     """
     head, _, last = text.rpartition(".")
     quantity = parse(head if last in _REDUCTIONS else text, owners)

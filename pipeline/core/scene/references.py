@@ -1,6 +1,6 @@
-"""Names in a scene that lead nowhere: frames, bodies and joints that are not there, reported before the work.
+"""Names in a scene of frames, bodies and joints that do not exist, reported before the work starts.
 
-It looks at the plain table, so that a scene with other mistakes is searched, too.
+The plain table is examined, so that a scene with other errors is checked, too.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from typing import Any
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError
 
-#: names of the frames in the mesh recipe of this path; None where that cannot be determined
+#: returns the names of the frames in the mesh recipe of this path; None where they cannot be determined
 Recipe = Callable[[str], Collection[str] | None]
-#: keys of parts that name frames, and joints, alone or in front of a coordinate
+#: keys of parts that name frames; keys that name joints, alone or in front of a coordinate
 FRAMES = (("joint", "between"), ("load", "between"), ("drive", "frame"), ("load", "frame"))
 JOINTS = (*product(("drive", "load", "stop"), ("joint", "actuators")), ("gear", "first"), ("gear", "second"))
 
 
 def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
-    """Every name in a composed scene table that leads nowhere; `path` opens each location."""
+    """Return an error for every name in a composed scene table that does not exist; `path` opens each location."""
     frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
     joints = [name for name, _ in _tables(table.get("joint"))]
     errors: list[InputError] = []
@@ -47,7 +47,7 @@ def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
-    """Names of a body's frames; None where they cannot be determined, which is another mistake than this module's."""
+    """Return the names of a body's frames; None where another error, reported elsewhere, hides them."""
     if isinstance(body.get("mesh"), str):
         return recipe(body["mesh"])
     frames = body.get("frames", {})
@@ -57,7 +57,7 @@ def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
 def _frame(where: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
     body, _, frame = name.partition(".")
     if not frame:
-        return []  # it is said elsewhere that a frame is named with its body
+        return []  # validation reports a frame without its body
     if body not in frames:
         return [InputError(where, f"'{name}': there is no body '{body}'", suggestion(body, frames))]
     known = frames[body]

@@ -1,9 +1,9 @@
-"""From a name in a scene to the part it names, imported only when it is asked for.
+"""Lookup of the code for a name in a scene; modules are imported only at their use.
 
 A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to the part:
 ``"module"``, or ``"module:object"`` where a module holds more than the part; a module in a folder next to the family's
 begins with a dot. It imports none of its modules. Where a scene's models (`pipeline.core.scene`) name the parts of a
-family already, the table is made from them by `declared`.
+family already, `declared` builds the table from them.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any, get_args
 
 from flexclear.pipeline.core.system.errors import InputError
 
-#: most names that a hint lists
+#: largest number of names in a hint
 LISTED_NAMES = 40
-#: longer names are compared with none
+#: length above which a name is not compared with others
 LONGEST_NAME = 100
 
-#: what books and other programs say, the name here that is meant (the first of them that is known), and what to write
+#: words of books and other programs, the name for them here (the first known one applies), and advice on what to write
 ELSEWHERE = (
     (("hinge", "pin", "rotational"), "revolute", ""),
     (("slider", "slide", "translational"), "prismatic", ""),
@@ -43,11 +43,11 @@ ELSEWHERE = (
 
 
 def listed(package: str, name: str, *, where: str) -> tuple[str, str]:
-    """Full name of the module, and object there or nothing, that a family lists under `name`; neither is imported.
+    """Return full module name, and object there or "", of the part that a family lists as `name`, without importing it.
 
     Raises InputError, placed at `where`, for a name that the family does not have.
     """
-    family = sys.modules.get(package) or import_module(package)  # every command asks thousands of times
+    family = sys.modules.get(package) or import_module(package)  # the fast way: commands call this thousands of times
     names: Mapping[str, str] = family.NAMES
     if name not in names:
         raise InputError(where, f"no {family.KIND} is called '{name}'", suggestion(name, names))
@@ -56,39 +56,39 @@ def listed(package: str, name: str, *, where: str) -> tuple[str, str]:
 
 
 def module_of(package: str, name: str, *, where: str = "") -> str:
-    """Full name of the module that a family lists under `name`, which is not imported; InputError as of `listed`."""
+    """Return the full module name of the part that a family lists as `name`, without importing it; see `listed`."""
     return listed(package, name, where=where)[0]
 
 
 def lookup(package: str, name: str, *, where: str) -> Any:
-    """The module or object that a family lists under `name`, imported now; InputError for others."""
+    """Import and return the module or object that a family lists as `name`; raise InputError for unknown names."""
     module, attribute = listed(package, name, where=where)
     part = import_module(module)
     return getattr(part, attribute) if attribute else part
 
 
 def declared(models: Iterable[Any], key: str = "type", made: str = "") -> dict[str, str]:
-    """The table of a family whose parts a scene's models declare: 'point-force' is the module `point_force`.
+    """Return the table of a family whose parts a scene's models declare: 'point-force' is the module `point_force`.
 
-    made: name of the object there that is the part.  key: field of the models that holds the name.
+    made: name of the part's object in the module. key: field of the models that holds the name.
     """
     names = [name for model in models for name in get_args(model.model_fields[key].annotation)]
     return {name: f"{module_name(name)}:{made}".rstrip(":") for name in names}
 
 
 def module_name(name: str) -> str:
-    """Module of a part that a scene calls `name`."""
+    """Return the module of a part by the part's name in scenes."""
     return name.replace("-", "_")
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
-    """'did you mean ...?' for the name that is meant, or the nearest one, or a list of those there are."""
+    """Return 'did you mean ...?' for a known synonym or the nearest name, or a list of the known names."""
     for words, meant, advice in ELSEWHERE:
         if name in words and meant in known:
             return f"did you mean '{meant}'?" + (f" {advice}" if advice else "")
-    import difflib  # here, since a right name needs none
+    import difflib  # here, since correct names do not need it
 
-    # the comparison takes the product of both lengths
+    # the time of a comparison grows with the product of both lengths
     matches = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
     if matches:
         return f"did you mean '{matches[0]}'?"

@@ -1,4 +1,4 @@
-"""The part of the contract about runs; names of quantities are taken from it, so it needs no NumPy."""
+"""The schema of runs. Names of quantities are derived from it, so it does not import NumPy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A whole scene as one frozen model; `Scene` is what every tower is given."""
+"""A whole scene as one frozen model; all towers receive a `Scene`."""
 
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -40,7 +40,7 @@ from flexclear.pipeline.core.system import file_names
 
 #: types of joints with one freedom: driving it determines the whole relative motion
 SINGLE = ("revolute", "prismatic")
-#: samples of a controller; at each of them a step ends
+#: largest number of samples of a controller; at each of them a step ends
 MOST_SAMPLES = 1e6
 
 
@@ -63,41 +63,41 @@ class Ensemble(Part):
     """Members that start with the ball of every clearance joint offset in a random direction."""
 
     members: Annotated[int, Field(ge=2)] = 16
-    """how many runs"""
+    """number of runs"""
     perturbation: Annotated[Length, Field(gt=0.0)] = 1e-8
-    """by which length the balls are offset"""
+    """length by which the balls are offset"""
     seed: Annotated[int, Field(ge=0)] = 20190310
-    """of the random directions"""
+    """seed of the random directions"""
     bodies: tuple[str, ...] | None = None
-    """whose motion is recorded; default: the bodies that carry the clearance joints"""
+    """bodies whose motion is recorded; default: the bodies that carry the clearance joints"""
 
 
 class Sections(Part):
     """A motion that its laws repeat, sampled once in each period: see ``flexclear sections``."""
 
     period: Annotated[Time, Field(gt=0.0)] | None = None
-    """of the laws of drives and loads, from the run's start on; without it the run is one period"""
+    """period of the laws of drives and loads, from the run's start; default: the length of the run"""
     phase: Annotated[Time, Field(ge=0.0)] = 0.0
-    """when in the period the motion is examined [s]"""
+    """time in the period at which the motion is sampled [s]"""
     transient: Annotated[int, Field(ge=0, le=1_000_000)] = 100
-    """periods that are not recorded, before the `periods` that are"""
+    """number of periods before the recorded ones"""
     periods: Annotated[int, Field(ge=20, le=1_000_000)] = 500
-    """that are recorded"""
+    """number of recorded periods"""
     exponent_periods: Annotated[int, Field(ge=20, le=1_000_000)] = 200
-    """how many of these are followed by a neighbour too, which gives the rate at which motions part"""
+    """number of recorded periods that a neighbouring motion also follows, which gives the rate of separation"""
     bodies: tuple[str, ...] | None = None
-    """whose motion is recorded; default: as of an ensemble, or all without clearance"""
+    """bodies whose motion is recorded; default: as for an ensemble, or all without clearance"""
 
 
 class Request(Part):
     """A requested accuracy: absolute in SI, or relative to the quantity's own size."""
 
     absolute: Annotated[Number, Field(gt=0.0)] | None = None
-    """in SI"""
+    """requested accuracy in SI"""
     unit: str | None = None
-    """SI unit that the number was written with, if it was"""
+    """SI unit that the number was written with, if any"""
     relative: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
-    """fraction of the largest change of the quantity"""
+    """fraction of the quantity's largest change"""
 
 
 class Accuracy(Part):
@@ -109,11 +109,12 @@ class Accuracy(Part):
     """
 
     quantities: dict[str, Request] = Field(default_factory=dict)
-    """a file writes them without this key"""
+    """requests by quantity; a file writes them without this key"""
     allow_missed: bool = False
-    """what is missed is reported either way, and the run is stored; without this the command ends with an error"""
+    """whether a command succeeds although a requested accuracy is missed; the miss is reported and the run is stored in
+    either case"""
     by_need: bool | None = None
-    """whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step"""
+    """whether the integrator is chosen, too; default: if `[solver]` names none and gives no step"""
 
     @model_validator(mode="before")
     @classmethod
@@ -127,35 +128,35 @@ class Accuracy(Part):
 
 
 class View(Part):
-    """What is examined; no effect on the motion."""
+    """Settings of what is examined and drawn; no effect on the motion."""
 
     watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     """quantities that comparisons, tables and films show, as ``platform.position`` or ``A1.force - A2.force``; default:
     those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts"""
     direction: Direction | None = None
-    """from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar mechanism
-    its normal, else from above and in front"""
+    """viewing direction of pictures and films, a vector from the mechanism to the eye; default: normal to a planar
+    mechanism, else from above and in front"""
     up: Direction | None = None
-    """what is up in pictures, world axes; default: against gravity, else z"""
+    """upward direction in pictures, world axes; default: against gravity, else z"""
     zoom: Annotated[Number, Positive] | None = None
-    """how many times larger than usual the mechanism is drawn"""
+    """magnification of the mechanism against the usual size"""
     exaggeration: Annotated[Number, Positive] | None = None
-    """how many times larger than computed deformations are drawn; default: to be seen"""
+    """magnification of drawn deformations against the computed ones; default: large enough to be visible"""
     duration: Annotated[Time, Positive] | None = None
-    """of films; default: some 4 s"""
+    """duration of films; default: some 4 s"""
     impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = None
-    """how many times slower than elsewhere films run around impacts; default: 8; 1 runs evenly"""
+    """factor by which films run slower around impacts; default: 8; 1 runs evenly"""
 
     @model_validator(mode="after")
     def _points(self) -> Self:
-        for asked in (self.direction, self.up):
-            if asked is not None and not any(asked):
+        for direction in (self.direction, self.up):
+            if direction is not None and not any(direction):
                 raise ValueError("a direction must not have the length zero")
         return self
 
 
 def _leaves(table: dict[str, Any], where: str) -> list[tuple[str, Any]]:
-    """Dotted name -> value, of nested tables or quoted names alike."""
+    """Return dotted names and values from nested tables or quoted names alike."""
     leaves = []
     for key, value in table.items():
         name = f"{where}.{key}".lstrip(".")
@@ -177,17 +178,17 @@ def _requested(name: str, value: Any) -> Any:
         raise ValueError(f"{name}: {error}") from None
     if not isinstance(read, str):
         return {"absolute": read}
-    number, _, unit = read.partition(" ")  # whether it fits is known to the scene, which has the quantity
+    number, _, unit = read.partition(" ")  # the scene, which has the quantity, checks the unit
     return {"absolute": float(number), "unit": unit}
 
 
 class Scene(Part):
-    """Everything a scene file says, after composition. Names of parts are keys."""
+    """The content of a scene file after composition. Names of parts are keys."""
 
     title: str
-    """what it is, in a line"""
+    """description in one line"""
     description: str = ""
-    """more words"""
+    """longer description"""
     body: dict[PartName, Body]
     """bodies by name"""
     joint: dict[PartName, Joint] = Field(default_factory=dict)
@@ -201,11 +202,11 @@ class Scene(Part):
     gear: dict[PartName, Gear] = Field(default_factory=dict)
     """coupled joint coordinates by name"""
     event: dict[PartName, Event] = Field(default_factory=dict)
-    """what ceases, stops or changes in the run, by name"""
+    """releases, locks and switches during the run, by name"""
     time: TimeSpan
     """begin and end of the run"""
     start: Start | None = None
-    """how the run begins, beyond poses and velocities of bodies"""
+    """start of the run, beyond poses and velocities of bodies"""
     solver: Solver = Solver()
     """integrator and tolerance"""
     output: Output = Output()
@@ -213,13 +214,13 @@ class Scene(Part):
     ensemble: Ensemble | None = None
     """runs from nearby starts"""
     sections: Sections | None = None
-    """repeated motion, looked at once in each period"""
+    """repeated motion, sampled once in each period"""
     accuracy: Accuracy | None = None
     """requested accuracy by quantity"""
     limits: Limits = Limits()
-    """what the work may take of the machine"""
+    """largest resources that the work may take"""
     view: View | None = None
-    """what pictures and comparisons look at"""
+    """settings of pictures and comparisons"""
 
     def _samples_can_be_made(self) -> None:
         for name, load in self.load.items():
@@ -252,7 +253,7 @@ class Scene(Part):
                 raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
 
     def _bodies_have_files_of_their_own(self) -> None:
-        """Results are sent from one system to another: meshes and modes of bodies are files called by their names."""
+        """Raise ValueError for a body whose name, also that of files, some operating system does not distinguish."""
         names: dict[str, str] = {}
         for name in self.recipes():
             if file_names.is_device(name):
@@ -277,7 +278,7 @@ class Scene(Part):
         if "by_need" not in given:
             table = {**table, "solver": {**(solver or {}), "by_need": not set(NAMING) & given}}
         elif (solver or {})["by_need"]:
-            given -= set(NAMING)  # an edit writes the defaults out
+            given -= set(NAMING)  # a scene that is edited is written out with its defaults
         if not isinstance(accuracy, dict) or "by_need" in accuracy:
             return table
         return {**table, "accuracy": {**accuracy, "by_need": not {"integrator", "step"} & given}}
@@ -288,8 +289,8 @@ class Scene(Part):
         return self
 
     def check(self) -> None:
-        """ValueError where parts and settings that are right by themselves do not go together; ResourceError where they
-        ask for more than `[limits]` allows."""
+        """Raise ValueError where valid parts and settings conflict with each other, and ResourceError where they
+        request more than `[limits]` allows."""
         check_rows((self.time.end - self.time.start) / self.output.interval, self.output.interval, self.limits)
         if self.ensemble is not None:
             check_members(self.ensemble.members, self.limits)
@@ -301,17 +302,17 @@ class Scene(Part):
         require_possible(self)
 
     def by_need(self) -> bool:
-        """Whether the integrator is chosen: for the accuracy that is asked for, or because the scene names none."""
+        """Return True when the program chooses the integrator: for a requested accuracy, or as the scene names none."""
         if self.accuracy is None or not self.accuracy.quantities:
             return bool(self.solver.by_need)
         return bool(self.accuracy.by_need)
 
     def owners(self) -> dict[str, dict[str, bool]]:
-        """Names of the parts that may own a quantity, by what they are; whether what they do is about an axis."""
+        """Return the names of the components that may own a quantity, by kind, and whether each acts about an axis."""
         return owners(self)
 
     def requested(self) -> list[Quantity]:
-        """The quantities that `[accuracy]` names; without it the usual ones."""
+        """Return the quantities that `[accuracy]` names; without it the usual ones."""
         if self.accuracy is not None and self.accuracy.quantities:
             return [parse(name, self.owners()) for name in self.accuracy.quantities]
         moving = {name for name, body in self.body.items() if not isinstance(body, Ground)}
@@ -328,7 +329,7 @@ class Scene(Part):
         return [parse(one.name, self.owners()) for one in chosen]
 
     def _prescribed(self) -> set[str]:
-        """Rigid bodies whose motion drives determine: fixed to the ground, or by driven joints of one freedom."""
+        """Return rigid bodies whose motion drives determine: fixed to ground, or by driven joints of one freedom."""
         driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
         prescribed = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
         known = {name for name, body in self.body.items() if isinstance(body, Ground)}
@@ -341,13 +342,13 @@ class Scene(Part):
         return known_bodies - known
 
     def watched(self) -> list[Quantity]:
-        """The quantities that are examined: those that `[view]` names, else as `requested`."""
+        """Return the quantities that are examined: those that `[view]` names, else those of `requested`."""
         if self.view is not None and self.view.watch is not None:
             return [parse(name, self.owners()) for name in self.view.watch]
         return self.requested()
 
     def _hosts(self) -> dict[str, str]:
-        """For every moving body the body that it is fixed to, or itself."""
+        """Return for every moving body the body that it is fixed to, or itself."""
         moving = [name for name, body in self.body.items() if not isinstance(body, Ground)]
         host = {name: name for name in moving}
         for joint in self.joint.values():
@@ -367,17 +368,17 @@ class Scene(Part):
 
     @property
     def path(self) -> Path | None:
-        """The file it was read from."""
+        """File that the scene was read from."""
         return self._path
 
     def __repr__(self) -> str:
-        """In one line: a whole scene is some pages."""
+        """Return one line, since a whole scene fills pages."""
         return f"<Scene {self.name}: {self.summary()}; {self.time.start:g} to {self.time.end:g} s>"
 
     __str__ = __repr__
 
     def summary(self) -> str:
-        """Which parts there are, in words."""
+        """Return the numbers of parts by kind, in words."""
         planes = sum(isinstance(joint, BallOnPlane) for joint in self.contacts().values())
         counts = {
             ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
@@ -394,48 +395,48 @@ class Scene(Part):
         return ", ".join(f"{n} {one if n == 1 else many}" for (one, many), n in counts.items() if n)
 
     def rigid(self) -> dict[str, RigidBody]:
-        """Rigid bodies by name."""
+        """Return the rigid bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, RigidBody)}
 
     def flexible(self) -> dict[str, FlexibleBody]:
-        """Flexible bodies by name."""
+        """Return the flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
 
     def meshed(self) -> dict[str, MeshedRigidBody]:
-        """Rigid bodies whose mass, inertia and frames are those of a mesh recipe, by name."""
+        """Return the rigid bodies with mass, inertia and frames of a mesh recipe, by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, MeshedRigidBody)}
 
     def recipes(self) -> dict[str, str]:
-        """Mesh recipe of each body that has one, by name: flexible bodies first."""
+        """Return the mesh recipe of each body that has one, by name: flexible bodies first."""
         flexible = {name: body.mesh for name, body in self.flexible().items()}
         return flexible | {name: body.mesh for name, body in self.meshed().items()}
 
     def contacts(self) -> dict[str, Clearance]:
-        """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
+        """Return the joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
 
     def worn(self) -> dict[str, ClearanceRevolute | ClearanceSpherical]:
-        """Joints with clearance whose wear is asked for, by name."""
+        """Return the joints with clearance whose wear is computed, by name."""
         wearing = (ClearanceRevolute, ClearanceSpherical)
         return {n: j for n, j in self.joint.items() if isinstance(j, wearing) and j.wear is not None}
 
     def stop_ends(self) -> list[str]:
-        """Names of all ends of stops, as records have them."""
+        """Return the names of all ends of stops, as in records."""
         return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
 
     def rubbing(self) -> dict[str, IdealJoint]:
-        """Ideal joints with friction, by name."""
+        """Return the ideal joints with friction, by name."""
         return {n: j for n, j in self.joint.items() if isinstance(j, IdealJoint) and j.friction is not None}
 
     def forces(self) -> dict[str, Any]:
-        """Loads other than gravity, which is a field, by name."""
+        """Return the loads other than gravity, which is a field, by name."""
         return {n: load for n, load in self.load.items() if not isinstance(load, Gravity)}
 
     def sources(self) -> dict[str, str]:
-        """Where each value comes from: ``part.key`` (or ``part``) -> text."""
+        """Return the provenance of each value: ``part.key`` (or ``part``) -> text."""
         given = provenance.sources(self.model_dump())
         return {where or "scene": text for where, text in given.items()}
 
     def assumptions(self) -> dict[str, str]:
-        """The sources that say ``assumed: why``."""
+        """Return the sources of the form ``assumed: why``."""
         return provenance.assumed(self.sources())

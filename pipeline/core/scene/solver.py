@@ -1,4 +1,4 @@
-"""How a scene asks for its integration: an integrator, and only the parameters that it has."""
+"""The integration settings of a scene: an integrator, and only the parameters that it has."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
@@ -9,9 +9,9 @@ from flexclear.pipeline.core.scene.fields import Number, Part, Time
 from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS
 from flexclear.pipeline.core.scene.registry import suggestion
 
-#: keys by which a scene says how it is integrated
+#: keys that fix the integration of a scene
 NAMING = ("integrator", "rtol", "step")
-#: keys of the integrators that have parameters of their own: which one, and its default
+#: key of an integrator's own parameter -> the integrator, and the parameter's default
 OWN: Mapping[str, tuple[str, float]] = {"rho_inf": ("generalized-alpha", 0.8)}
 
 
@@ -19,29 +19,29 @@ class Solver(Part):
     """An integrator and its tolerance."""
 
     integrator: Annotated[str, WithJsonSchema({"type": "string", "enum": list(INTEGRATORS)})] = DEFAULT
-    """name, as docs/integrators.md lists them"""
+    """name of the integrator, as docs/integrators.md lists them"""
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
-    """relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations"""
+    """relative tolerance of steps where their length is chosen, and always of loop closures and Newton iterations"""
     ledger_tolerance: Annotated[Number, Field(gt=0.0)] | None = None
     """largest energy error of a run, as a fraction of the energy that it turns over; default 1e5 rtol, but from 1e-4 to
     1e-3, where the error chooses the steps (1e-3 of methods that damp by their order: that of generalized-alpha is
     2), and 0.1 for fixed steps"""
     evaluations: Annotated[int, Field(gt=0, le=10**15)] = 50_000_000
-    """most right-hand sides of one run"""
+    """largest number of right-hand sides of one run"""
     step: Annotated[Time, Field(gt=0.0)] | None = None
-    """present means steps of this length"""
+    """length of fixed steps; default: the integrator chooses steps"""
     events: Literal["located", "at step ends"] = "located"
-    """where contacts begin and end, ``at step ends`` only with fixed steps"""
+    """where contacts begin and end: at located times, or, for fixed steps only, ``at step ends``"""
     by_need: bool | None = None
-    """whether an expensive run gets another integrator and tolerance, where the scene has no `[accuracy]`; by default
-    it does where `[solver]` gives neither of them and no step"""
+    """whether an expensive run gets another integrator and tolerance, where the scene has no `[accuracy]`; default: if
+    `[solver]` gives neither of them and no step"""
     rho_inf: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
-    """of generalized-alpha alone: spectral radius at infinite frequency, 1 damps nothing; default 0.8"""
+    """spectral radius at infinite frequency, for generalized-alpha only; 1 damps nothing; default 0.8"""
 
     @model_validator(mode="before")
     @classmethod
     def _known(cls, table: Any) -> Any:
-        """Refuse a name that no integrator has, and a parameter that belongs to another one."""
+        """Refuse the name of an unknown integrator, and a parameter that belongs to another integrator."""
         if not isinstance(table, Mapping):
             return table
         name = str(table.get("integrator", DEFAULT))
@@ -67,9 +67,9 @@ class Solver(Part):
 
 
 def of_run(solver: Solver, by_need: bool, attributes: Mapping[str, Any]) -> tuple[str, float]:
-    """Integrator and relative tolerance that a finished run began with.
+    """Return integrator and relative tolerance with which a finished run began.
 
-    solver, by_need: of its scene.  attributes: of its dataset, which count where the scene left them open.
+    solver, by_need: of its scene. attributes: of its dataset, which count where the scene left them open.
     """
     rtol = float(attributes.get("accuracy_rtol", solver.rtol))
     named = "switched" in attributes and not by_need

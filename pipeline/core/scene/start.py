@@ -1,4 +1,4 @@
-"""How a run begins, where that is more than the bodies' poses and velocities."""
+"""The start of a run, where it is given by more than the bodies' poses and velocities."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
@@ -9,21 +9,21 @@ from flexclear.pipeline.core.scene.fields import Number, OnCoordinate, Part, Par
 
 #: the keys of one joint coordinate
 KEYS = ("position", "near", "velocity")
-#: where a run may begin, other than where the scene puts its bodies
+#: configurations in which a run may begin, other than the poses of the bodies
 At = Literal["equilibrium", "ideal"]
 Measure = float | str
 
 
 class JointStart(Part):
-    """Start of one joint coordinate; its unit, where text gives one, is that of the coordinate or of its rate."""
+    """Start of one joint coordinate; text has a unit of the coordinate or of its rate."""
 
     position: Measure | None = None
-    """where it starts, exactly"""
+    """exact value at the start"""
     near: Measure | None = None
-    """of several ways to assemble the mechanism, the one in which it is closest to this; without the poses of bodies it
-    is also where the assembly is searched for"""
+    """approximate value at the start, which selects the nearest of several ways to assemble the mechanism; without the
+    poses of bodies the assembly is also searched for from this value"""
     velocity: Measure | None = None
-    """its rate"""
+    """rate at the start"""
 
     @model_validator(mode="after")
     def _something(self) -> Self:
@@ -35,19 +35,19 @@ class JointStart(Part):
 
 
 def _coordinates(value: Any) -> Any:
-    """A joint with one coordinate need not name it; the empty name represents it."""
+    """Return the start of a joint's single coordinate, which need not be named, under the empty name."""
     if isinstance(value, Mapping) and (not value or set(value) & {*KEYS, "source"}):
         return {"": value}
     return value
 
 
 class ModalStart(Part):
-    """Deformation of a flexible body at the start, by its modes in the order of the bundle; those left out are zero."""
+    """Deformation of a flexible body at the start, by its modes in the order of the bundle; omitted ones are zero."""
 
     coordinate: tuple[Number, ...] = ()
     """modal coordinates [m]"""
     velocity: tuple[Number, ...] | None = None
-    """their rates [m/s]; without them, the bodies'"""
+    """modal velocities [m/s]; default: as the joints require"""
 
 
 _ONE_OR_SEVERAL = BeforeValidator(_coordinates, json_schema_input_type=JointStart | dict[str, JointStart])
@@ -55,15 +55,15 @@ JointStarts = Annotated[dict[str, JointStart], _ONE_OR_SEVERAL]
 
 
 class Branch(OnCoordinate):
-    """One way out of a change point: on which this joint coordinate changes most in the direction of `sign`."""
+    """One way out of a change point: that on which this joint coordinate changes most in the direction of `sign`."""
 
     sign: Literal[1, -1]
-    """1 takes the branch on which the coordinate grows most, or falls least; -1 that on which it falls most, or grows
+    """1 for the branch on which the coordinate grows most, or falls least; -1 for that on which it falls most, or grows
     least"""
 
 
 def _several(value: Any) -> Any:
-    """One choice need not be written as a list."""
+    """Return a single choice, written without a list, as a tuple."""
     return (value,) if isinstance(value, (Mapping, Branch)) else value
 
 
@@ -76,14 +76,14 @@ class Start(Part):
     resting in its socket on the side to which the joint's force presses it, flexible bodies deformed as the loads of
     that moment hold them"""
     joint: dict[PartName, JointStarts] = Field(default_factory=dict)
-    """of joints, by name; those with several coordinates by the coordinate's name below"""
+    """starts of joints, by name; for joints with several coordinates by the coordinate's name below"""
     modal: dict[PartName, ModalStart] = Field(default_factory=dict)
-    """of flexible bodies, by name"""
+    """starts of flexible bodies, by name"""
     branch: Annotated[
         tuple[Branch, ...], BeforeValidator(_several, json_schema_input_type=Branch | tuple[Branch, ...])
     ] = ()
-    """in a change point, which of the branches that cross there the motion takes; with several loops a list, each
-    choosing among what those before it have left"""
+    """in a change point, the branch that the motion takes among those that cross there; with several loops a list, each
+    entry chooses among the branches that remain after those before it"""
 
     @model_validator(mode="after")
     def _no_two_deformations(self) -> Self:

@@ -1,4 +1,4 @@
-"""A sweep: one scene, what is varied in it, and what is recorded of every point. See docs/sweeps.md."""
+"""A sweep: one scene, the parameters varied in it, and the quantities recorded of every point. See docs/sweeps.md."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from flexclear.pipeline.core.scene.load import SWEEP, read_toml, require_kind
 from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 
-#: points of one sweep; more are several sweeps
+#: largest number of points of one sweep
 MOST_POINTS = 1_000_000
-#: parameters of one sweep, and values of all of them at all points of a sample
+#: largest number of parameters of one sweep, and of values of all parameters at all points of a sample
 MOST_PARAMETERS, MOST_VALUES = 1000, 10_000_000
 
 Value = float | str
 #: dimensions and variables that results have besides the parameters
 RESERVED = ("point", "time", "section", "axis", "quat", "status", "reason", "evaluations", "key")
-#: ways to say the values of a parameter, each by its keys
+#: ways to give the values of a parameter, each by its keys
 WAYS = (("values",), ("from", "to"), ("mean", "deviation"))
 
 
 class Parameter(Part):
-    """What values a parameter takes: those of a list, a range, or a normal distribution."""
+    """Values of a parameter: a list, a range, or a normal distribution."""
 
     model_config = ConfigDict(populate_by_name=True)
 
     values: Annotated[tuple[Any, ...], Field(min_length=1)] | None = None
-    """one by one"""
+    """the values, one by one"""
     first: Value | None = Field(default=None, alias="from")
-    """begin of a range, of `count` points in a grid; in samples of a uniform distribution"""
+    """begin of a range; in a grid the range has `count` points, in samples it is a uniform distribution"""
     last: Value | None = Field(default=None, alias="to")
     """end of the range"""
     count: Annotated[int, Field(ge=2, le=MOST_POINTS)] | None = None
     """points of a range in a grid"""
     spacing: Literal["linear", "log"] = "linear"
-    """of a range; `log` needs ends of one sign"""
+    """spacing of a range; `log` needs ends of one sign"""
     mean: Value | None = None
-    """of a normal distribution, in samples"""
+    """mean and standard deviation of a normal distribution, in samples"""
     deviation: Value | None = None
-    """of a normal distribution, in samples"""
+    """mean and standard deviation of a normal distribution, in samples"""
     places: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    """the paths in the scene that all take the value; default: the parameter's name"""
+    """the key paths in the scene that all take the value; default: the parameter's name"""
 
     @model_validator(mode="before")
     @classmethod
@@ -75,12 +75,12 @@ class Parameter(Part):
             raise ValueError(f"a logarithmic range needs ends of one sign, not {self.first!r} and {self.last!r}")
 
     def numbers(self, *fields: str) -> tuple[float, ...]:
-        """Fields as numbers in one SI unit, that of `unit`."""
+        """Return fields as numbers in one SI unit, that of `unit`."""
         return tuple(number_and_unit(getattr(self, name))[0] for name in fields)
 
     @property
     def unit(self) -> str:
-        """SI unit of the ends, or of mean and deviation, as they are written; empty for bare numbers."""
+        """SI unit of the ends, or of mean and deviation; empty for bare numbers."""
         fields = ("first", "last") if self.first is not None else ("mean", "deviation")
         units = {number_and_unit(getattr(self, name))[1] for name in fields}
         if len(units) > 1:
@@ -96,7 +96,7 @@ class Parameter(Part):
 
 
 def number_and_unit(value: Any) -> tuple[float, str]:
-    """SI value and SI unit of a number, or of text with a unit; ValueError in words."""
+    """Return SI value and SI unit of a number, or of text with a unit; raise ValueError in words."""
     quantity = any_quantity(value)
     if isinstance(quantity, str):
         number, _, unit = quantity.partition(" ")
@@ -110,34 +110,34 @@ class Sample(Part):
     method: Literal["sobol", "latin-hypercube", "random"]
     """scrambled Sobol sequence (best with a power of two), Latin hypercube, or independent random numbers"""
     points: Annotated[int, Field(ge=1, le=MOST_POINTS)]
-    """how many"""
+    """number of points"""
     seed: Annotated[int, Field(ge=0)] = 1
-    """of the random numbers"""
+    """seed of the random numbers"""
 
 
 class Sweep(Part):
-    """Everything that a sweep file says."""
+    """The content of a sweep file."""
 
     title: str = ""
-    """what it is, in a line"""
+    """description in one line"""
     description: str = ""
-    """more words"""
+    """longer description"""
     scene: str
     """a scene file, or the name of one below scenes/"""
     set: dict[str, Any] = Field(default_factory=dict)
     """changes of the scene that hold at all points"""
     vary: Annotated[dict[str, Parameter], Field(min_length=1, max_length=MOST_PARAMETERS)]
-    """parameters by name; the name is a path in the scene unless `places` says which ones"""
+    """parameters by name; the name is a key path in the scene unless `places` gives others"""
     combine: Literal["grid", "list"] = "grid"
     """every value with every other (grid), or the first values, the second ones and so on (list)"""
     sample: Sample | None = None
     """points spread over all parameters, instead of a grid"""
     keep: Annotated[tuple[str, ...], Field(min_length=1)]
-    """what is recorded of each point, as ``slider.velocity.largest``"""
+    """quantities recorded of each point, as ``slider.velocity.largest``"""
     members: Annotated[int, Field(ge=2)] | None = None
-    """starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are recorded"""
+    """number of starts of each point with tiny offsets (`[ensemble]` of the scene); mean and deviation are recorded"""
     error: bool = False
-    """run each point at a hundredth of its tolerance as well, and keep the differences"""
+    """run each point at a hundredth of its tolerance as well, and record the differences"""
 
     _name: str = PrivateAttr(default="sweep")
 
@@ -171,16 +171,16 @@ class Sweep(Part):
 
     @model_validator(mode="after")
     def _each_place_once(self) -> Sweep:
-        seen: dict[str, str] = {}
+        varied_by: dict[str, str] = {}
         for name in self.vary:
             if name in RESERVED or name.startswith(self.keep):
                 raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
             if not name.strip() or "/" in name or not name.isprintable():
                 raise ValueError(f"vary.{name}: is no name of a dimension; choose one without slashes")
             for where in self.places(name):
-                if where in seen:
-                    raise ValueError(f"vary.{name}: '{where}' is varied by '{seen[where]}' already")
-                seen[where] = name
+                if where in varied_by:
+                    raise ValueError(f"vary.{name}: '{where}' is varied by '{varied_by[where]}' already")
+                varied_by[where] = name
         return self
 
     def _check_sample(self) -> None:
@@ -193,17 +193,17 @@ class Sweep(Part):
                 raise ValueError(f"vary.{name}: in a [sample] write from and to without count, or mean and deviation")
 
     def places(self, name: str) -> tuple[str, ...]:
-        """The paths in the scene that a parameter sets."""
+        """Return the key paths in the scene that a parameter sets."""
         return self.vary[name].places or (name,)
 
     def length(self, name: str) -> int:
-        """Number of values of a parameter in a grid or list."""
+        """Return the number of values of a parameter in a grid or list."""
         parameter = self.vary[name]
         return parameter.count or len(parameter.values or ())
 
 
 def read_sweep(table: Mapping[str, Any], where: str | Path) -> Sweep:
-    """The sweep that a table says; InputErrors with all mistakes, placed at `where`."""
+    """Return the sweep in a table; raise InputErrors with all errors, placed at `where`."""
     try:
         return Sweep.model_validate(dict(table))
     except ValidationError as error:
@@ -211,7 +211,7 @@ def read_sweep(table: Mapping[str, Any], where: str | Path) -> Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """The sweep in a TOML file; InputError for a file that cannot be read, or is a scene."""
+    """Load the sweep in a TOML file; raise InputError for a file that cannot be read, or is a scene."""
     table = read_toml(path)
     require_kind(table, path, SWEEP)
     sweep = read_sweep(table, path)

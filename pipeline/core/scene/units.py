@@ -1,7 +1,7 @@
-"""Quantities as users write them, converted to SI once, at the edge.
+"""Conversion of quantities in users' units to SI, once, when they are read.
 
-Used instead of Pint, for which radians are numbers, so that torques, energies and torsional stiffnesses are one; its
-import and first quantity take 0.3 s of the processor in every command.
+Pint is not used: it treats radians as numbers, so that torques, energies and torsional stiffnesses are the same; its
+import and first quantity take 0.3 s of processor time in every command.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import lru_cache
 
-#: units that a message lists
+#: units that messages list
 COMMON = ("m", "mm", "s", "kg", "N", "N m", "rad", "deg", "rpm", "Hz", "Pa", "J")
 #: a quotient of two numbers
 _FRACTION = re.compile(r"([-+]?[\d.]+) */ *([\d.]+)")
@@ -22,8 +22,8 @@ _COMMA = re.compile(r"\s*[-+]?\d+,\d")
 
 Exponents = tuple[float, float, float, float]
 
-#: exponents of kg, m, s and rad of each physical dimension, which distinguish products of units (`unit`); units of it
-#: that a scene or recipe may use, with their factors to SI
+#: exponents of kg, m, s and rad of each physical dimension, which distinguish products of units (`unit`); its units in
+#: scenes and recipes, with their factors to SI
 _DIMENSIONS: dict[str, tuple[Exponents, dict[str, float]]] = {
     "number": ((0, 0, 0, 0), {"%": 1e-2}),
     "length": (
@@ -87,24 +87,24 @@ _EXPONENTS = {dimension: exponents for dimension, (exponents, _) in _DIMENSIONS.
 #: factor to SI and physical dimension of every unit
 UNITS = {name: (factor, of) for of, (_, known) in _DIMENSIONS.items() for name, factor in known.items()}
 
-#: largest number, and one over the least: squares of products such as m l^2 must stay within floating point
+#: largest number, and reciprocal of the least: squares of products such as m l^2 must not overflow or underflow
 LARGEST_NUMBER = 1e50
-#: what the exponents belong to
+#: units of the exponents
 _BASE = ("kg", "m", "s", "rad")
-#: a unit and its power; powers of more digits measure nothing, and would not be numbers
+#: a unit and its power; powers with more digits have no physical meaning and would overflow
 _FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d(?:\.\d{1,3})?))?")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
 
-#: characters of a quantity; more are none
+#: largest number of characters of a quantity
 LONGEST_QUANTITY = 200
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$")
 
 
 @lru_cache(maxsize=4096)
 def unit(text: str) -> tuple[float, str] | None:
-    """Factor to SI and dimension of a unit, or of a product of units such as ``"N mm/deg"``; None when it is none.
+    """Return the factor to SI and the dimension of a unit, or of a product such as ``"N mm/deg"``; None for other text.
 
-    What follows a stroke divides; powers are written ``^2``, factors parted by spaces, dots or stars.
+    Units after a slash divide; powers are written ``^2``, factors separated by spaces, dots or stars.
     """
     text = _plain(text)
     if text in UNITS:
@@ -119,7 +119,7 @@ def _plain(text: str) -> str:
 
 
 def _product(text: str) -> tuple[float, Exponents] | None:
-    """Factor to SI and exponents of kg, m, s and rad; None when a part of it is no unit."""
+    """Return the factor to SI and the exponents of kg, m, s and rad; None when a factor is no unit."""
     if text in UNITS:
         return UNITS[text][0], _EXPONENTS[UNITS[text][1]]
     factor, total = 1.0, [0.0] * 4
@@ -138,7 +138,7 @@ def _product(text: str) -> tuple[float, Exponents] | None:
 
 
 def udunits(text: str) -> str:
-    """A unit as UDUNITS reads it, ``N m-1 s-1`` for ``N/m s``; empty for broken powers, which it has not."""
+    """Return a unit in the notation of UDUNITS, ``N m-1 s-1`` for ``N/m s``; empty for broken powers, unknown there."""
     if text == "1":
         return text
     factors = []
@@ -153,7 +153,7 @@ def udunits(text: str) -> str:
 
 
 def measured(text: str) -> Exponents:
-    """Exponents of kg, m, s and rad in a product of known units, or of "1"; ValueError for anything else."""
+    """Return the exponents of kg, m, s and rad of a product of known units, or of "1"; raise ValueError for others."""
     product = (1.0, _EXPONENTS["number"]) if text == "1" else _product(_plain(text))
     if product is None:
         raise ValueError(f"'{text}' is no unit")
@@ -161,12 +161,12 @@ def measured(text: str) -> Exponents:
 
 
 def exponents(dimension: str) -> Exponents:
-    """Exponents of kg, m, s and rad of a dimension."""
+    """Return the exponents of kg, m, s and rad of a dimension."""
     return _EXPONENTS[dimension]
 
 
 def si(exponents: Exponents) -> str:
-    """The SI unit with these exponents of kg, m, s and rad: by its name where it has one, "1" of a number."""
+    """Return the SI unit with these exponents of kg, m, s and rad: by its name if it has one, "1" for a number."""
     name = next((name for name, known in _EXPONENTS.items() if known == exponents), "")
     if one := _example(name, factor=1.0):
         return one
@@ -178,7 +178,7 @@ def si(exponents: Exponents) -> str:
 
 
 def coefficient(value: object, dimension: str, order: int) -> float:
-    """SI value of the coefficient of t^order in a law whose values have a dimension; ValueError in words.
+    """Return the SI value of the coefficient of t^order in a law of a dimension; raise ValueError in words.
 
     A bare number is in SI; text must have the unit of the value over seconds to that power.
     """
@@ -196,18 +196,18 @@ def coefficient(value: object, dimension: str, order: int) -> float:
 
 
 def quantity(value: object, dimension: str) -> float:
-    """SI value of a bare number or a string like ``"20.5 mm"``.
+    """Return the SI value of a bare number or a string like ``"20.5 mm"``.
 
-    Raises ValueError, in words, when the text is no quantity, the unit is unknown, the unit
-    belongs to another dimension, or the number is not finite, too large or too small.
+    Raises ValueError, in words, when the text is no quantity, the unit is unknown or belongs to another dimension, or
+    the number is not finite, too large or too small.
     """
     return _computable(_read(value, dimension), value)
 
 
 def components(values: Iterable[object], dimension: str) -> list[float]:
-    """SI values of the entries of one vector or matrix; ValueError as of `quantity`, for the largest of them.
+    """Return the SI values of the entries of one vector or matrix; raise ValueError as `quantity`, for the largest.
 
-    The others may be as small as they are: a rotation leaves 1e-17 of an entry that is zero, two leave 1e-34.
+    The others may be arbitrarily small: a rotation turns an entry that is zero into 1e-17, two turn it into 1e-34.
     """
     given = list(values)
     numbers = [_read(value, dimension) for value in given]
@@ -225,7 +225,7 @@ def _computable(number: float, written: object) -> float:
 
 
 def _read(value: object, dimension: str) -> float:
-    if type(value) is float and math.isfinite(value):  # nearly all of a scene that is read again
+    if type(value) is float and math.isfinite(value):  # nearly all values of a scene that is read again
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"expected {a(dimension)}, a number or text like '1 {_example(dimension)}'")
@@ -251,16 +251,16 @@ def _read(value: object, dimension: str) -> float:
 
 
 def _parts(text: str) -> re.Match[str] | None:
-    """Number and unit; white space at the ends is not left to the expression, which would try it in many ways."""
+    """Match number and unit; white space is stripped first, since the expression would try it in many ways."""
     text = text.strip()
     return _QUANTITY.fullmatch(text) if len(text) <= LONGEST_QUANTITY else None
 
 
 def any_quantity(value: object) -> float | str:
-    """A bare number, or a quantity in words in its SI unit (``"60 mm"`` -> ``"0.06 m"``), whatever it measures.
+    """Return a bare number, or a quantity in its SI unit (``"60 mm"`` -> ``"0.06 m"``), of any dimension.
 
-    For places whose dimension another part of the scene decides; `quantity` reads the result.
-    Raises ValueError as `quantity` does.
+    For keys whose dimension depends on another part of the scene; `quantity` reads the result. Raises ValueError as
+    `quantity` does.
     """
     match = _parts(value) if isinstance(value, str) else None
     written = match[2] if match is not None else None
@@ -275,7 +275,7 @@ def any_quantity(value: object) -> float | str:
 
 
 def unknown(written: str, value: str = "") -> str:
-    """The message about a text that is no unit; value: the quantity that it belongs to."""
+    """Return the message about a text that is no unit; value: the quantity that contains the text."""
     fraction = _FRACTION.fullmatch(value.strip())
     if fraction is not None and float(fraction[2]):
         return f"'{value}' is a fraction; a value is one number: write {float(fraction[1]) / float(fraction[2]):.12g}"
@@ -294,7 +294,7 @@ def _known_unit(written: str, dimension: str, value: str) -> tuple[float, str]:
 
 
 def a(dimension: str) -> str:
-    """The dimension with its article."""
+    """Return the dimension with its article."""
     return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
 
 
@@ -303,5 +303,5 @@ def _known(dimension: str) -> str:
 
 
 def _example(dimension: str, factor: float | None = None) -> str:
-    """A unit of this dimension; with `factor`, the one that is so many SI units."""
+    """Return a unit of this dimension; with `factor`, the one with this factor to SI."""
     return next((u for u, (f, of_unit) in UNITS.items() if of_unit == dimension and factor in (None, f)), "")

@@ -1,4 +1,4 @@
-"""What is wrong with a scene file, in words: pydantic's findings as input errors with location, value, rule and
+"""Validation errors of a scene file in words: pydantic's errors as input errors with location, value, rule and
 remedy."""
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from pydantic import BaseModel, ValidationError
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError, InputErrors
 
-#: findings that are put into words; nobody reads more of them, and each is compared with what could have been meant
+#: largest number of errors that are reported: nobody reads more, and each takes a search for what could have been meant
 MOST_ERRORS = 500
-#: findings that a value is no whole number
+#: types of errors about a value that is no whole number
 WHOLE = ("int_type", "int_parsing", "int_from_float")
-#: kinds of findings -> what was expected
+#: type of error -> what was expected
 EXPECTED = {
     **dict.fromkeys(("tuple_type", "list_type"), "expected a list [...]"),
     **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "expected a table { key = value }"),
@@ -28,23 +28,23 @@ EXPECTED = {
     "union_tag_not_found": "is missing",
     **dict.fromkeys(WHOLE, "expected a whole number"),
 }
-#: findings that a value is of another kind than one alternative of several: another alternative may fit better
+#: types of errors that one alternative of several does not fit the kind of value: another alternative may fit better
 OTHER_KIND = (
     *("literal_error", "model_type", "dict_type", "tuple_type", "list_type", "string_type", "float_type"),
     *WHOLE,
 )
-#: keys by which a part says which of several it is
+#: keys that select a part's model
 CHOOSING = ("type", "law")
 #: bounds of numbers, whose messages hold the bound
 BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 
-#: a message of a whole scene that opens with the path that it is about
+#: a message about a whole scene that opens with the key path of the error
 _NAMED = re.compile(r"([a-z_]+(?:\.[\w-]+)+): ")
 
-#: how pydantic calls, in a path, the alternative of a number or text that a validator reads
+#: prefixes of pydantic's names, in an error's location, for alternatives that a validator reads from number or text
 VALIDATORS = ("function-", "constrained-", "literal[")
 
-#: models that are chosen otherwise than by their type -> how pydantic calls them in a path
+#: models that are not selected by their type -> pydantic's name for them in an error's location
 TAGS = {
     "MeshedRigidBody": ("meshed",),
     "JointDrive": ("joint-drive",),
@@ -55,24 +55,24 @@ TAGS = {
 
 
 def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
-    """All validation errors of a file that should be a `model`."""
+    """Return all validation errors of a file that should be a `model`."""
     places: dict[str, list[tuple[str, InputError]]] = {}
     for e in error.errors(include_url=False)[:MOST_ERRORS]:
         invalid = _input_error(path, e, model)
         places.setdefault(invalid.place, []).append((e["type"], invalid))
-    unique = {str(e): e for there in places.values() for e in _nearest(there)}
+    unique = {str(e): e for candidates in places.values() for e in _nearest(candidates)}
     return InputErrors(list(unique.values()))
 
 
-def _nearest(there: list[tuple[str, InputError]]) -> list[InputError]:
-    """What to describe one place: where there are alternatives, only what is wrong with those of the value's kind."""
-    fitting = [candidate for kind, candidate in there if kind not in OTHER_KIND]
-    others = {candidate.problem: candidate for kind, candidate in there if kind in OTHER_KIND}
+def _nearest(candidates: list[tuple[str, InputError]]) -> list[InputError]:
+    """Return the errors at one location: of several alternatives, only those that fit the value's kind."""
+    fitting = [candidate for kind, candidate in candidates if kind not in OTHER_KIND]
+    others = {candidate.problem: candidate for kind, candidate in candidates if kind in OTHER_KIND}
     if fitting or len(others) < 2:
         return fitting or list(others.values())
     problems = [problem.partition(" (got ") for problem in others]
     rules = list(dict.fromkeys(rule.removeprefix("must be ").removeprefix("expected ") for rule, _, _ in problems))
-    return [InputError(there[0][1].place, f"expected {' or '.join(rules)}{''.join(problems[0][1:])}")]
+    return [InputError(candidates[0][1].place, f"expected {' or '.join(rules)}{''.join(problems[0][1:])}")]
 
 
 def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputError:
@@ -82,7 +82,7 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     if kind == "extra_forbidden":
         candidates = [key for key in known if key != keys[-1]]
         if len(keys) == 1 and isinstance(value, dict):
-            candidates = [key for key in candidates if key not in ("title", "description", "source")]  # no tables
+            candidates = [key for key in candidates if key not in ("title", "description", "source")]  # not tables
         remedy = suggestion(str(keys[-1]), candidates)
     elif not keys and kind == "value_error" and (named := _NAMED.match(message)):
         keys, message = [named[1]], message[named.end() :]
@@ -104,7 +104,7 @@ def _entries(number: int) -> str:
 
 
 def _choosing(context: dict[str, Any]) -> str:
-    """The key by which pydantic searches for the right model; chosen by several keys, a part is given by its type."""
+    """Return the key by which pydantic selects the model; "type" where several keys select it."""
     key = str(context.get("discriminator", "")).strip("'")
     return key if key in CHOOSING else "type"
 
@@ -119,26 +119,26 @@ def _reworded(error: Any) -> str:
 
 
 def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], list[str], list[str]]:
-    """Keys of a path as the file has them, the keys that are known next to its last one, and the types it may have.
+    """Return the keys of a location as in the file, the known keys next to the last one, and its possible types.
 
-    pydantic puts the type by which it chose a part's model into the path; the file has no such key.
+    pydantic inserts the type that selected a part's model into the location; the file has no such key.
     """
-    keys, here, known_keys = list[Any](), [model], list[str]()
+    keys, alternatives, known_keys = list[Any](), [model], list[str]()
     for key in loc:
-        inner = [candidate for a in here for candidate in _inside(a, key)]
+        inner = [candidate for a in alternatives for candidate in _inside(a, key)]
         if inner:
             keys.append(key)
-            known_keys, here = _keys(here), inner
-        elif any(_chosen_by(a, key) for a in here):
-            here = [a for a in here if _chosen_by(a, key)]
-        elif any(_is_model(a) for a in here) and not str(key).startswith(VALIDATORS):
+            known_keys, alternatives = _keys(alternatives), inner
+        elif any(_chosen_by(a, key) for a in alternatives):
+            alternatives = [a for a in alternatives if _chosen_by(a, key)]
+        elif any(_is_model(a) for a in alternatives) and not str(key).startswith(VALIDATORS):
             keys.append(key)
-            known_keys, here = _keys(here), []
-    return keys, known_keys, [kind for a in here for kind in _types(a)]
+            known_keys, alternatives = _keys(alternatives), []
+    return keys, known_keys, [kind for a in alternatives for kind in _types(a)]
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:
-    """What a field may hold, without the wrappings."""
+    """Yield the types that a field may hold, without wrappers."""
     if get_origin(annotation) is Annotated:
         yield from _alternatives(get_args(annotation)[0])
     elif get_origin(annotation) in (Union, UnionType):
@@ -149,9 +149,9 @@ def _alternatives(annotation: Any) -> Iterator[Any]:
 
 
 def _inside(alternative: Any, key: Any) -> list[Any]:
-    """What may be under a key of a table or list."""
+    """Return the types that may be under a key of a table or list."""
     if _is_model(alternative):
-        alternative.model_rebuild()  # laws that are made of laws know what these are only then
+        alternative.model_rebuild()  # resolves the types of laws that contain laws
         info = alternative.model_fields.get(key) if isinstance(key, str) else None
         return [] if info is None else list(_alternatives(info.annotation))
     if get_origin(alternative) is dict and isinstance(key, str):
@@ -171,12 +171,12 @@ def _keys(alternatives: list[Any]) -> list[str]:
 
 
 def _types(alternative: Any) -> tuple[str, ...]:
-    """Names by which a part says that it is this one."""
+    """Return the names that select this model."""
     fields = alternative.model_fields if _is_model(alternative) else {}
     kinds = (fields[key].annotation for key in CHOOSING if key in fields)
     return tuple(name for annotation in kinds if get_origin(annotation) is Literal for name in get_args(annotation))
 
 
 def _chosen_by(alternative: Any, tag: Any) -> bool:
-    """Whether pydantic's tag, or its name of a model, chooses this alternative."""
+    """Return True when pydantic's tag, or its name of a model, selects this alternative."""
     return _is_model(alternative) and (tag in _types(alternative) or tag in TAGS.get(alternative.__name__, ()))

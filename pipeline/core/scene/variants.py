@@ -1,12 +1,12 @@
-"""Variants of a scene: which of its effects can be taken away, the scene without some of them, as the ideal mechanism,
-and that as a file.
+"""Variants of a scene: the removable effects, the scene without some of them, the ideal mechanism, and its file.
 
-Parts that nothing couples to what is asked for can be left out without any error. Joints, drives, loads, stops and
-gears couple the bodies and joints that they name; the fixed world couples nothing, gravity acts on each body by itself.
+Parts that nothing couples to the requested quantities can be removed without any error. Joints, drives, loads, stops
+and gears couple the bodies and joints that they name; the fixed world couples nothing, and gravity acts on each body by
+itself.
 
-An effect is named by the path that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
-``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by parts
-replaced and removed only, so that it can be written as a file that extends the scene's.
+An effect has the name of its key path: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
+``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by
+replaced and removed parts only, so that a file can state it by extending the scene's.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 
-#: loads that are effects of the world on a mechanism, not what moves it
+#: loads that are effects of the environment on a mechanism, and do not drive it
 OF_THE_WORLD = ("gravity", "joint-friction")
-#: kinds of effects, as they are reported
+#: kinds of effects, as in reports
 CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
-#: what an ideal mechanism lacks, by kind of effect, and how a scene without it is called
+#: effects that an ideal mechanism lacks, and the name of a scene without them
 EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
-#: what the parts of such effects own: loosened joints, ends of stops, modes and stresses of flexible bodies
+#: owners of quantities that exist only with these effects: contacts, ends of stops, modes and stresses of bodies
 OWNED = {CLEARANCE: ("contact", "worn"), "stop": ("contact",), FLEXIBILITY: ("mode", "section", "gauge")}
-#: joint with clearance -> the joint that connects the same frames without; slots and planes have none
+#: joint with clearance -> ideal joint that connects the same frames; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
-#: keys of a flexible body that a rigid one from the same recipe has, too
+#: keys of a flexible body that a rigid one from the same recipe also has
 SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
-#: settings that follow the parts: quantities of parts that are gone are no longer asked for or shown
+#: settings that follow the parts: quantities of removed parts are no longer requested or shown
 FOLLOWING = ("accuracy", "view", "ensemble")
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One effect of a scene. name: the path that goes with it.  kind: what it is.  within: the effect without which
-    it is nothing, as friction is without its clearance; else empty."""
+    """One effect of a scene. name: its key path. kind: kind of effect. within: effect that this one depends on, as
+    friction depends on its clearance; else empty."""
 
     name: str
     kind: str
@@ -55,17 +55,17 @@ class Effect:
 
     @property
     def owner(self) -> str:
-        """Name of the part."""
+        """Name of the effect's part."""
         return self.name.split(".")[1]
 
     @property
     def words(self) -> str:
-        """In words."""
+        """Description in words."""
         return self.owner if self.kind == "gravity" else f"{self.kind} of {self.owner}"
 
 
 def effects(scene: Scene) -> tuple[Effect, ...]:
-    """The effects of a scene that can be taken away, flexible bodies first, what lies within one right after it."""
+    """Return the removable effects of a scene, flexible bodies first, each followed by those that depend on it."""
     listed = list[Effect]()
     for name, body in scene.flexible().items():
         whole = Effect(f"body.{name}.modes", FLEXIBILITY)
@@ -74,11 +74,11 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
             if getattr(body, key) is not None:
                 listed.append(Effect(f"body.{name}.{key}", key, whole.name))
     for name, joint in scene.contacts().items():
-        there = name in loose(scene)
-        if there:
+        removable = name in loose(scene)
+        if removable:
             listed.append(Effect(f"joint.{name}.clearance", CLEARANCE))
         if joint.friction is not None:
-            listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
+            listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if removable else ""))
     listed += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
     for name, load in scene.load.items():
         if load.type in OF_THE_WORLD:
@@ -88,7 +88,7 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
 
 
 def named(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
-    """The effects of these names; InputError, with the nearest one, for a name that is none."""
+    """Return the effects with these names; raise InputError, with the nearest name, for an unknown one."""
     known = {effect.name: effect for effect in effects(scene)}
     for name in names:
         if name not in known:
@@ -97,9 +97,9 @@ def named(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
 
 
 def without(scene: Scene, gone: Collection[Effect]) -> Scene:
-    """The scene without some of its effects; quantities that it then no longer has are not asked for.
+    """Return the scene without some of its effects; quantities that the rest does not have are no longer requested.
 
-    Its name says what is missing.  The scene itself when nothing is.
+    The name lists the removed effects. Without any the scene itself is returned.
     """
     if not gone:
         return scene
@@ -109,7 +109,7 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
 
 
 def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene:
-    """The ideal mechanism of a scene: without clearance, flexibility, or both; it is called as the scene is.
+    """Return the ideal mechanism of a scene: without clearance, flexibility, or both, with the scene's name.
 
     Raises InputError when the scene has none of them.
     """
@@ -126,12 +126,12 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
 
 
 def loose(scene: Scene) -> dict[str, Clearance]:
-    """The joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
+    """Return joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
     return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
 
 
 def _owned(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
-    """Edits of what is asked for, where it belongs to what goes."""
+    """Return edits that remove requests for quantities of removed effects."""
     keys: dict[str, Any] = {}
     owners = scene.owners()
     lost = {of: {e.owner for e in gone if of in OWNED.get(e.kind, ())} for of in sum(OWNED.values(), ())}
@@ -166,7 +166,7 @@ def _has(name: str, owners: dict[str, dict[str, bool]]) -> bool:
 
 
 def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
-    """Edits of settings that speak of flexible bodies which are gone: stresses asked for, deformations at the start."""
+    """Return edits of settings for removed flexible bodies: requested stresses, deformations at the start."""
     rigid = {effect.owner for effect in gone if effect.kind == FLEXIBILITY}
     settings: dict[str, Any] = {}
     if scene.output.stress is not None and rigid & set(scene.output.stress):
@@ -178,7 +178,7 @@ def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
 
 
 def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
-    """Place -> what is there instead, or None for what is removed."""
+    """Return key path -> replacement, or None for a removed part."""
     changes: dict[str, Any] = {}
     places = {effect.name for effect in gone}
     for effect in gone:
@@ -201,7 +201,7 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
 
 
 def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
-    """The scene with other numbers of elastic coordinates, by flexible body."""
+    """Return the scene with other numbers of elastic coordinates, by flexible body."""
     changes: dict[str, Any] = {}
     for name, count in counts.items():
         body = scene.flexible()[name]
@@ -211,9 +211,9 @@ def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
 
 
 def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
-    """Places, such as ``body.bob``, of all parts that nothing couples to the parts of the names asked for.
+    """Return paths, such as ``body.bob``, of all parts that nothing couples to the parts with the names `asked`.
 
-    Empty where a name asked for is none of a part, and where a setting speaks of what could be left out.
+    Empty where a name is of no part, and where a setting refers to a part that could be removed.
     """
     table = scene.model_dump(mode="json", exclude_none=True)
     parts = {f"{family}.{name}": part for family in FAMILIES for name, part in table.get(family, {}).items()}
@@ -237,19 +237,19 @@ def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
         ends += new
     uncoupled_parts = [part_name for part_name in parts if part_name in neighbours and part_name not in reached]
     names = {part_name.partition(".")[2] for part_name in uncoupled_parts}
-    spoken = {text.partition(".")[0] for key in SETTINGS if key not in FOLLOWING for text in _texts(table.get(key))}
-    return () if names & spoken else tuple(uncoupled_parts)
+    referenced = {text.partition(".")[0] for key in SETTINGS if key not in FOLLOWING for text in _texts(table.get(key))}
+    return () if names & referenced else tuple(uncoupled_parts)
 
 
-def lessened(scene: Scene, removed: Collection[str]) -> Scene:
-    """The scene without these parts; the scene itself where there are none."""
+def pruned(scene: Scene, removed: Collection[str]) -> Scene:
+    """Return the scene without these parts; the scene itself where none are given."""
     if not removed:
         return scene
     return edited(scene, dict.fromkeys((*removed, *FOLLOWING)))
 
 
 def _texts(value: object) -> Iterator[str]:
-    """All texts in a table, and the names of what it lists."""
+    """Yield all texts in a table, and its keys."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, Mapping):
@@ -262,9 +262,9 @@ def _texts(value: object) -> Iterator[str]:
 
 
 def text(scene: Scene, planned: Scene, extends: str, comments: Iterable[str] = ()) -> str:
-    """The file of a variant: it extends the scene's, and says of parts and settings only what differs.
+    """Return the file of a variant: it extends the scene's file, and contains only parts and settings that differ.
 
-    Parts are replaced or removed; of a setting that differs the whole table is.  comments: lines at its head.
+    Parts are replaced or removed; a setting that differs is written as a whole table. comments: lines at the head.
     """
     lines = [f"# {line}" for line in comments]
     lines += [f"extends = {json.dumps(extends)}", f"title = {json.dumps(planned.title, ensure_ascii=False)}"]
@@ -294,7 +294,7 @@ def _key(name: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """A value as TOML has it, tables inline."""
+    """Return a value in TOML, tables inline."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
     if isinstance(value, (list, tuple)):
@@ -305,7 +305,7 @@ def _value(value: Any) -> str:
 
 
 def relative(target: Path, base: Path) -> str:
-    """How a file names another one that it extends: from its own folder on; in full where that is on another drive."""
+    """Return a path from a file's folder to the scene that it extends; in full where that is on another drive."""
     try:
         return Path(os.path.relpath(base.resolve(), target.resolve().parent)).as_posix()
     except ValueError:

@@ -1,1 +1,1 @@
-"""The machine and the process: errors, files, logs, what systems do differently."""
+"""The machine and the process: errors, files, logs, differences between operating systems."""

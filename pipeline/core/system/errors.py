@@ -1,18 +1,18 @@
-"""The ways in which flexclear says no. Each class fixes the exit code of the command."""
+"""The errors that flexclear raises for expected failures. Each class fixes the exit code of the command."""
 
 from __future__ import annotations
 
 from typing import Any
 
-#: bytes of each piece of an error that are shown, and of all errors of a file together
+#: largest size of each piece of an error message, and of all errors of a file together [bytes]
 LONGEST_SHOWN, LONGEST_MESSAGE = 1000, 3500
-#: exit code of a command that Ctrl-C has ended
+#: exit code of a command that Ctrl-C ended
 INTERRUPTED = 130
 
 
 def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
-    """Text as a terminal may show it: control characters spelt out, the middle of what is long left out."""
-    if len(text) > longest:  # first, since what is left is examined character by character
+    """Return text fit for a terminal: control characters are spelt out, the middle of a long text is left out."""
+    if len(text) > longest:  # first, since the following line examines each character
         text = _short(text, longest)
     text = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
     return _short(text, longest) if len(text.encode(errors="replace")) > longest else text
@@ -25,7 +25,7 @@ def _short(text: str, longest: int) -> str:
 
 
 class FlexclearError(Exception):
-    """Base of all expected failures; `exit_code` is what the command returns."""
+    """Base of all expected failures; the command returns `exit_code`."""
 
     exit_code = 1
 
@@ -39,11 +39,10 @@ def _as_it_was(kind: type[FlexclearError], args: tuple[str, ...]) -> FlexclearEr
 
 
 class InputError(FlexclearError):
-    """The user's input is wrong: names location, value, rule and remedy.
+    """The user's input is wrong: the error names location, value, rule and remedy.
 
-    place: file and key, e.g. ``scenes/a.toml [joint.A1.clearance]``.
-    problem: what is wrong, with the offending value and the rule it breaks.
-    remedy: what to write instead; optional.
+    place: file and key, e.g. ``scenes/a.toml [joint.A1.clearance]``. problem: what is wrong, with the offending value
+    and the rule it breaks. remedy: what to write instead; optional.
     """
 
     exit_code = 2
@@ -55,7 +54,7 @@ class InputError(FlexclearError):
         super().__init__(text if remedy is None else f"{text}\n  hint: {self.remedy}")
 
 
-class InputErrors(InputError):  # noqa: N818 - several of them
+class InputErrors(InputError):  # noqa: N818 - a plural
     """Several input errors, reported together."""
 
     def __init__(self, errors: list[InputError]) -> None:
@@ -70,21 +69,21 @@ class InputErrors(InputError):  # noqa: N818 - several of them
 
 
 class SolverError(FlexclearError):
-    """The solver refused or gave up: names the time, the body or joint, and the reason."""
+    """The solver refused or gave up: the error names the time, the body or joint, and the reason."""
 
     exit_code = 3
 
 
 class ResourceError(FlexclearError):
-    """A limit of the machine (disk, memory) or of `[limits]` stopped the work; nothing half-written is left."""
+    """A limit of the machine (disk, memory) or of `[limits]` stopped the work; no partly written file is left."""
 
     exit_code = 4
 
 
 class StoppedError(FlexclearError):
-    """The work was asked to stop before its end, and left what there is in good order.
+    """The work was asked to stop before its end, and left its partial results in good order.
 
-    interrupted: by Ctrl-C, not by a limit of time.  partial: dataset of what there is, of works that have one.
+    interrupted: by Ctrl-C, not by a time limit. partial: dataset up to the stop, for work that has one.
     """
 
     def __init__(self, why: str, partial: Any = None, *, interrupted: bool = False) -> None:

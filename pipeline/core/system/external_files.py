@@ -1,6 +1,6 @@
-"""Files that others made: what is checked before and after a library reads them, since few libraries check.
+"""Files from other programs: checks before and after a library reads them, since few libraries check.
 
-They are read in this process. A reader that fails, in whatever way of its own, gives an error in words.
+The files are read in this process. Every failure of a reader is reported as an error in words.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from flexclear.pipeline.core.system.errors import FlexclearError, InputError, Re
 if TYPE_CHECKING:
     import meshio
 
-#: what a mesh takes in memory while it is read, over its bytes in the file: text of 20 bytes becomes a number of 8, but
-#: is there several times
+#: memory of a mesh while it is read, over the size of its file: text of 20 bytes becomes a number of 8 bytes, but in
+#: several copies
 COPIES = 5.0
-#: points of a structured grid, which a header of a hundred bytes may promise without end
+#: largest number of points of a structured grid: a header of a hundred bytes can announce any number
 MOST_POINTS = 2_000_000
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
 #: bytes of the header of a VTK file that are examined
 HEADER = 2000
-#: files that one of Abaqus may include, counted as often as they are read
+#: largest number of files that an Abaqus file may include, counted as often as they are read
 MOST_INCLUDES = 1000
-#: what a name of DOLFIN may not have: meshio searches for its parts by a pattern with the name in it
+#: characters forbidden in names of DOLFIN files: meshio searches for their parts by a pattern that contains the name
 PATTERN = set("\\^$*+?{}[]|()")
-#: what meshio puts among the sets of cells of a Gmsh 4 file, but numbers of curves and points
+#: entry that meshio puts among the cell sets of a Gmsh 4 file, although it holds numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -40,15 +40,15 @@ HDF5 = "MED and other formats in HDF5 need h5py: pip install 'flexclear[med]'"
 
 
 def require_file(path: Path, where: str) -> None:
-    """InputError unless a file that will be read is an ordinary one.
+    """Raise InputError unless a file to be read is an ordinary one.
 
-    Reading a device may never end, a pipe waits for a writer.
+    Reading a device may never end; a pipe waits for a writer.
     """
     try:
-        there, ordinary = path.exists(), path.is_file()
+        exists, ordinary = path.exists(), path.is_file()
     except (OSError, ValueError) as error:
         raise InputError(where, f"'{path}' can be no file: {error}") from None
-    if not there:
+    if not exists:
         raise InputError(where, f"there is no file {path}", "paths are relative to the file that names them")
     if not ordinary:
         raise InputError(where, f"'{path}' is no ordinary file")
@@ -56,15 +56,15 @@ def require_file(path: Path, where: str) -> None:
 
 @contextlib.contextmanager
 def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> Any:
-    """Turn whatever a reader of this file raises meanwhile into an InputError: `problem`, and the reader's reason.
+    """Convert any error of a reader of this file to an InputError with `problem` and the reader's reason.
 
-    Damaged files make readers fail in ways of their own.  Too little memory is a ResourceError.
+    Damaged files make readers fail in many ways. Too little memory becomes a ResourceError.
     """
     try:
         yield
     except FlexclearError:
         raise
-    except ImportError as error:  # libraries that few formats need, such as h5py
+    except ImportError as error:  # a library that only few formats need, such as h5py
         raise InputError(where, f"{problem}: {error}", HDF5 if error.name == "h5py" else remedy) from None
     except MemoryError:
         raise ResourceError(f"{where}: '{path.name}' takes more memory than there is, or is damaged") from None
@@ -73,10 +73,10 @@ def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> 
 
 
 def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | None = None) -> meshio.Mesh:
-    """The mesh in a file, as meshio reads it: points of 1 to 3 columns, sets of cells and integer data of cells alone.
+    """Return the mesh in a file as meshio reads it: points of 1 to 3 columns, cell sets and integer cell data only.
 
-    problem, remedy: of the InputError for what cannot be read.  largest: bytes at most; default: as many as there is
-    memory for.  Raises ResourceError for what is too large.
+    problem, remedy: of the InputError for unreadable files. largest: size limit [bytes]; default: the available memory.
+    Raises ResourceError for larger files.
     """
     _require_mesh(path, where, largest)
     with reading(path, where, problem, remedy):
@@ -88,7 +88,7 @@ def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | 
 
 
 def _require_mesh(path: Path, where: str, largest: int | None) -> None:
-    """InputError for what is no ordinary file, or promises a grid without end; ResourceError for what is too large."""
+    """Raise InputError for no ordinary file or an oversized grid, ResourceError where memory does not suffice."""
     require_file(path, where)
     size = path.stat().st_size
     if largest is not None and size > largest:
@@ -103,7 +103,7 @@ def _require_mesh(path: Path, where: str, largest: int | None) -> None:
 
 
 def _require_whole(path: Path, where: str) -> None:
-    """InputError for a file in HDF5 with parts in other files, whose edits would not be seen."""
+    """Raise InputError for an HDF5 file with parts in other files, whose edits would go unnoticed."""
     if not _is_hdf5(path):
         return
     import h5py
@@ -127,7 +127,7 @@ def _require_whole(path: Path, where: str) -> None:
 
 
 def _is_hdf5(path: Path) -> bool:
-    """Whether the signature is there: at the start, or after a block of the user's of 512, 1024, 2048, ... bytes."""
+    """Return True when the HDF5 signature is at the start, or after a user block of 512, 1024, 2048, ... bytes."""
     with path.open("rb") as file:
         for start in (0, *(512 << k for k in range(path.stat().st_size.bit_length()))):
             file.seek(start)
@@ -137,18 +137,18 @@ def _is_hdf5(path: Path) -> bool:
 
 
 def _parsed(path: Path) -> meshio.Mesh:
-    """What `read_mesh` says; any error, in words or not, for what cannot be read."""
+    """Read a mesh for `read_mesh`; raise any error, in words or not, for unreadable content."""
     import meshio  # slow to import, and only meshes from files need it
     import numpy as np
 
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), np.errstate(over="ignore"):
-            # meshio takes text for the length of a binary file, to see that it is none
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), np.errstate(over="ignore"):
+            # to detect binary files, meshio interprets text as the length of one, which may overflow
             mesh = meshio.read(path)
     except SystemExit:
-        # meshio prints its reason and ends the process where the content is not what it knows of that suffix
-        raise ValueError(" ".join(said.getvalue().split()) or "meshio does not know its format") from None
+        # meshio prints its reason and ends the process where the content does not fit the suffix
+        raise ValueError(" ".join(printed.getvalue().split()) or "meshio does not know its format") from None
     points = np.asarray(mesh.points)
     mesh.points = points if points.size else np.empty((0, 3))
     if mesh.points.ndim != 2 or not 1 <= mesh.points.shape[1] <= 3 or points.dtype.kind not in "iuf":
@@ -164,7 +164,7 @@ def _parsed(path: Path) -> meshio.Mesh:
 
 
 def _integers(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data whose values are one integer per cell."""
+    """Return the data with one integer per cell."""
     import numpy as np
 
     arrays = {name: [np.asarray(part) for part in parts] for name, parts in data.items()}
@@ -176,15 +176,15 @@ def _integers(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def companions(path: Path) -> Iterator[Path]:
-    """Files that meshio reads with this one: of TetGen, DOLFIN and XDMF, includes of Abaqus, and what these include.
+    """Yield the files that meshio reads with this one: of TetGen, DOLFIN and XDMF, and nested includes of Abaqus.
 
-    Whoever names a mesh file declares them with it: their content decides the result as well.  A file that cannot be
-    examined has none, since its reader refuses it.  Raises InputError, after those that there are, for what no reader
-    ends with: includes in a circle, or too many; and for a name that DOLFIN's reader takes for a pattern.
+    Callers that depend on a mesh file depend on these, too: their content decides the result as well. A file that
+    cannot be examined has none, since its reader refuses it. Raises InputError, after the existing files, where no
+    reader ends: for circular or too many includes; and for a name that DOLFIN's reader takes for a pattern.
     """
     includes = path.suffix.lower() == ".inp"
     waiting: list[tuple[Path, tuple[str, ...]]] = [(path, ())]
-    for file, above in waiting:  # grows by what these include, as often as it is read
+    for file, above in waiting:  # grows by the includes of each file, as often as it is read
         within = (*above, os.path.realpath(file))
         with contextlib.suppress(OSError, ValueError, SyntaxError):
             if not file.is_file():  # a device has no end
@@ -200,7 +200,7 @@ def companions(path: Path) -> Iterator[Path]:
 
 
 def _included_by(path: Path) -> Iterator[Path]:
-    """Includes of Abaqus by meshio's own rule; few lines have a U, and only these are looked at."""
+    """Yield the includes of an Abaqus file by meshio's own rule; only lines with a U can be includes."""
     with path.open(encoding=io.text_encoding(None)) as file:  # as meshio does
         for line in file:
             if not ("U" in line or "u" in line) or line.startswith("**"):
@@ -211,7 +211,7 @@ def _included_by(path: Path) -> Iterator[Path]:
 
 
 def _named_by(path: Path) -> Iterator[Path]:
-    """Files that meshio opens when it reads this one, where it searches for them."""
+    """Yield the files that meshio opens when it reads this one, at the paths where it searches for them."""
     suffix = path.suffix.lower()
     if path.suffix in (".ele", ".node"):
         yield path.with_suffix(".node" if path.suffix == ".ele" else ".ele")
@@ -226,7 +226,7 @@ def _named_by(path: Path) -> Iterator[Path]:
 
 
 def _numbers_of_xdmf(path: Path) -> Iterator[Path]:
-    """Files with the numbers of an XDMF file, which are searched for next to it or, of plain bytes, where we are."""
+    """Yield the data files of an XDMF file: HDF5 next to it, binary data relative to the current folder."""
     from xml.etree import ElementTree  # 5 ms, and only few meshes need it
 
     folder = path.resolve().parent
@@ -236,4 +236,4 @@ def _numbers_of_xdmf(path: Path) -> Iterator[Path]:
             yield folder / name.partition(":")[0]
         elif node.get("Format") == "Binary":
             yield Path(name)
-        node.clear()  # numbers inside of the file may be many
+        node.clear()  # frees numbers inside the file, which may be many

@@ -1,4 +1,4 @@
-"""Names of files that every system takes and distinguishes: results are sent from one to another."""
+"""File names that every operating system accepts and distinguishes, since results are sent between systems."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import unicodedata
 #: (https://learn.microsoft.com/windows/win32/fileio/naming-a-file)
 DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{k}" for port in ("com", "lpt") for k in "0123456789¹²³")])
 
-#: characters that names on Windows cannot have; paths written with its own separator are refused in other words
+#: characters that names on Windows cannot have; paths with the Windows separator are refused by another check
 FORBIDDEN = '<>:"|?*'
 
 
 def folded(name: str) -> str:
-    """What represents all names that some system takes for the same: capitals and small letters, composed or not."""
+    """Return one form for all names that some system treats as equal: in any case, composed or decomposed."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
 def is_device(name: str) -> bool:
-    """Whether a name, with any suffix, is that of a device on Windows, where no file can have it."""
+    """Return True for the name, with any suffix, of a Windows device, which no file can have."""
     return folded(name.partition(".")[0].rstrip()) in DEVICES
 
 
 def unfit(name: str) -> str:
-    """Return why no file or folder of Windows can have a name; empty where it can."""
+    """Return why a file or folder on Windows cannot have a name; empty where it can."""
     if is_device(name):
         return f"'{name}' is a device on Windows"
     if wrong := sorted(set(name) & set(FORBIDDEN)):

@@ -1,6 +1,6 @@
-"""What systems do differently: Linux, macOS, Windows. Nothing else of this program asks on which one it runs.
+"""Differences between Linux, macOS and Windows. No other module depends on the operating system.
 
-Modules that only some systems have are imported here, where they are used, and their absence is no error.
+Modules that only some systems have are imported here at their use; their absence is no error.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-#: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
+#: ioctl request by which a file shares the blocks of another until one of them is written (linux/fs.h)
 FICLONE = 0x40049409
-#: how long a file is awaited that another program has open, and between two attempts [s]
+#: time to wait for a file that another program has open, and time between two attempts [s]
 WAIT_FOR_FILE, PAUSE = 2.0, 0.05
 
 
 def _module(name: str) -> Any:
-    """A module of some systems; None elsewhere."""
+    """Return a module that only some systems have; None elsewhere."""
     try:
         return __import__(name)
     except ImportError:
@@ -30,13 +30,13 @@ def _module(name: str) -> Any:
 
 
 def cores() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors that this process may use."""
     allowed = getattr(os, "sched_getaffinity", None)
     return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
 
 
 def memory() -> int:
-    """Bytes that this process can still get: of the machine, of its container, of its own limit."""
+    """Return the memory that this process can still get [bytes]: least of machine, container and its own limit."""
     import psutil
 
     bounds = [psutil.virtual_memory().available]
@@ -51,7 +51,7 @@ def memory() -> int:
 
 
 def peak_memory() -> int:
-    """Largest resident memory of this process so far [B]; 0 where the system does not report it."""
+    """Return the largest resident memory of this process so far [B]; 0 where the system does not report it."""
     resource = _module("resource")
     if resource is None:
         return 0
@@ -60,7 +60,7 @@ def peak_memory() -> int:
 
 
 def share_blocks(source: Any, target: Any) -> bool:
-    """Whether an open file could be made to share the bytes of another (Linux, on file systems that can)."""
+    """Let an open file share the blocks of another (Linux, on some file systems); return True on success."""
     fcntl = _module("fcntl")
     if fcntl is None or sys.platform != "linux":
         return False
@@ -71,14 +71,14 @@ def share_blocks(source: Any, target: Any) -> bool:
     return True
 
 
-def replace(made: Path, path: Path) -> None:
-    """Give a file the name of another one, which is gone: Windows keeps what is read-only, and what is open."""
+def replace(scratch: Path, path: Path) -> None:
+    """Rename a file to `path` and replace the file there, also if it is read-only or briefly open on Windows."""
     set_aside(path)
-    _insist(lambda: os.replace(made, path), path)
+    _insist(lambda: os.replace(scratch, path), path)
 
 
 def set_aside(path: Path) -> None:
-    """Rename a folder that has the name of a file: nothing of ours makes one, and what it holds may be somebody's."""
+    """Rename a folder at the path of a file: this program creates no such folder, so its content is the user's."""
     if path.is_dir() and not path.is_symlink():
         number = itertools.count(1)
         while (other := path.with_name(f"{path.name}.folder{next(number)}")).exists():
@@ -87,13 +87,13 @@ def set_aside(path: Path) -> None:
 
 
 def remove(path: Path) -> None:
-    """Remove a file where there is one, under the same conditions."""
+    """Remove a file if it exists, also if it is read-only or briefly open on Windows."""
     with contextlib.suppress(FileNotFoundError):
         _insist(lambda: os.unlink(path), path)
 
 
 def _insist(change: Callable[[], None], path: Path) -> None:
-    """Do what takes a file away; whoever has it open (a viewer, an indexer, a virus scanner) may let it go soon."""
+    """Repeat a change that removes a file: a program with the file open (viewer, virus scanner) may close it soon."""
     end = time.monotonic() + WAIT_FOR_FILE
     while True:
         try:
@@ -111,7 +111,7 @@ def _insist(change: Callable[[], None], path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Force the names in a folder to the disk, where folders can be opened, and the file system knows such a thing."""
+    """Force the names in a folder to the disk, where the system and the file system support that."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -121,10 +121,10 @@ def sync_folder(folder: Path) -> None:
 
 
 def others_can_write(folder: Path, *, inside: bool) -> bool:
-    """Whether anybody but this user and the system's can write to a folder, or it is not theirs.
+    """Return True when other users can write to a folder, or it belongs neither to this user nor to the system.
 
-    inside: whether what lies in it counts, not only its replacement.  Where folders belong to nobody by number
-    (Windows) the user's own folders are closed to others.
+    inside: whether the folder's content must be safe, not only the folder's name. Where folders have no numeric owner
+    (Windows), the user's own folders are closed to others.
     """
     if not hasattr(os, "geteuid"):
         return False
@@ -134,7 +134,7 @@ def others_can_write(folder: Path, *, inside: bool) -> bool:
 
 
 def alive(process: int) -> bool:
-    """Whether a process of this number runs, for all that this user may know."""
+    """Return True when a process with this number runs, as far as this user can see."""
     import psutil
 
     try:
@@ -144,14 +144,14 @@ def alive(process: int) -> bool:
 
 
 def plain_output() -> None:
-    """Let consoles of old code pages show what they cannot show as escapes, instead of ending the command."""
+    """Let consoles with old code pages print unknown characters as escapes instead of ending the command."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
 
 
 def reader_has_gone() -> bool:
-    """Return whether nobody reads the output any more, as after `| head`; True where the system does not say."""
+    """Return True when nobody reads the output any more, as after `| head`, or the system does not say."""
     try:
         import select
 

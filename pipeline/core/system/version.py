@@ -1,4 +1,4 @@
-"""The version of the program, as its distribution says it."""
+"""The version of the program, from its distribution."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ DISTRIBUTION = "flexclear"
 
 @cache
 def version() -> str:
-    """Such as ``0.1.0``; ``not installed`` where only the sources are there."""
-    from importlib.metadata import PackageNotFoundError  # here, since it brings readers of e-mail
+    """Return the version, such as ``0.1.0``; ``not installed`` where only the sources exist."""
+    from importlib.metadata import PackageNotFoundError  # here, since it imports the e-mail package
     from importlib.metadata import version as installed
 
     try:

@@ -1,1 +1,1 @@
-"""Content-keyed workflow: what a task is, when it is fresh, and how stale ones are run."""
+"""Content-keyed workflow: tasks, the check that they are up to date, and the execution of stale tasks."""

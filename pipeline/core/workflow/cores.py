@@ -1,4 +1,4 @@
-"""The processors of this machine, and whether one of them is free."""
+"""The processors of this machine, and threads of compiled code on those that are free."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ from flexclear.pipeline.core.system.progress import Progress, silent
 __all__ = ["cores", "free", "meanwhile", "set_idle", "side_by_side", "width"]
 
 Result = TypeVar("Result")
-#: how long a thread is awaited before this one listens to the keyboard [s]: some systems interrupt no wait
+#: time of one wait for a thread, after which Ctrl-C is checked [s]: some systems do not interrupt a wait
 TICK = 0.1
-#: threads while other tasks run, which will end and leave their cores: so many, where there are as many cores
+#: number of threads while other tasks run, at most the number of cores: these tasks will end and free theirs
 THREADS_WHILE_BUSY = 4
 
 _others_idle: bool | None = None
 
 
 def set_idle(others_idle: bool) -> None:
-    """In a worker, with each task: whether nothing else can run while it does."""
+    """Note in a worker, at the start of each task, whether no other task can run at the same time."""
     global _others_idle
     _others_idle = others_idle
 
 
 def free() -> bool:
-    """Whether a processor is free, for all that this program knows; in workers of another program none is."""
-    known = sys.modules.get("multiprocessing.process")  # its workers have imported it; others need not, for 4 ms
+    """Return True when a processor is free, as far as this program knows; never in another program's workers."""
+    known = sys.modules.get("multiprocessing.process")  # loaded in its workers; elsewhere the import would take 4 ms
     idle = (known is None or known.parent_process() is None) if _others_idle is None else _others_idle
     return idle and cores() > 1
 
 
 def width() -> int:
-    """How many threads of compiled code to run side by side."""
+    """Return the number of threads of compiled code to run concurrently."""
     return cores() if free() else min(cores(), THREADS_WHILE_BUSY)
 
 
 def side_by_side(
     work: Callable[[int, Progress], Result], count: int, done: Callable[[int], None], threads: int = 0
 ) -> list[Result]:
-    """Results of work(0) .. work(count - 1), made in threads: for what is mostly compiled code, which lets others run.
+    """Return the results of work(0) .. work(count - 1) from threads; for compiled code, which runs concurrently.
 
-    work: is given a progress to call now and then, which ends it when another one has failed or Ctrl-C was pressed.
-    done: receives the number of finished ones.  threads: how many; `width` by default.  Raises the error of the first
-    one that failed.
+    work: must call its progress callback from time to time; the call ends it when another thread has failed or Ctrl-C
+    was pressed. done: receives the number of finished results. threads: their number; default: `width`. Raises the
+    error of the first failure.
     """
     from concurrent.futures import CancelledError, ThreadPoolExecutor
 
@@ -67,7 +67,7 @@ def side_by_side(
                 results.append(future.result())
                 done(len(results))
         except BaseException as error:
-            if not isinstance(error, StoppedError):  # of that all hear, and leave their work in good order
+            if not isinstance(error, StoppedError):  # a stop reaches all threads, which end in good order themselves
                 given_up.set()
             pool.shutdown(cancel_futures=True)
             raise
@@ -75,16 +75,15 @@ def side_by_side(
 
 
 class _GivenUpError(Exception):
-    """Nobody waits for this work any more."""
+    """The result of this work is no longer needed."""
 
 
 @contextmanager
 def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
-    """Meanwhile a thread does some work that is mostly compiled code; gives what waits for its result.
+    """Run work (mostly compiled code) in a thread inside this context; yield the function that waits for its result.
 
-    work: is given a progress to call now and then, and while it waits, which ends it when what continues next to it has
-    failed.  Where no processor is free, or no thread is to be had, it is done when its result is asked for.  What waits
-    raises what the work raised.
+    work: must call its progress callback from time to time, also while it waits; the call ends it when the context has
+    failed. Without a free processor or thread, it runs when its result is requested. That function raises its errors.
     """
     from concurrent.futures import ThreadPoolExecutor
 
@@ -97,11 +96,11 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
     result: Callable[[], Result] = partial(work, silent)
     with ThreadPoolExecutor(1) as pool:
         if free():
-            with suppress(RuntimeError):  # no thread: a limit of a container, or the process is about to end
+            with suppress(RuntimeError):  # no new thread: limit of a container, or the process is about to end
                 result = pool.submit(copy_context().run, work, alive).result
         try:
             yield result
         except BaseException as error:
-            if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves all in good order
+            if not isinstance(error, StoppedError):  # a stop reaches the work itself, which ends in good order
                 given_up.set()
             raise

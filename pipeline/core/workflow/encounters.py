@@ -1,7 +1,7 @@
-"""What few runs meet, and which code they need only then: a result's key holds that code if its run has met it.
+"""Code that only few runs need, for events that they meet: a result's key includes it only if its run met the event.
 
-Which code is run decides what is met, not the code that is for it, so a result whose run has met nothing of the kind
-stays valid when that code is edited.
+The code that always runs decides what is met, not the code for the event. So a result whose run met no such event stays
+valid when that code is edited.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _noting = Lock()
 
 
 def meet(what: str) -> None:
-    """To be said before code is imported or compiled for something that a run has met."""
+    """Note an event that a run has met; call it before code for that event is imported or compiled."""
     with _noting:
         for met in _noted:
             met.add(what)
@@ -23,7 +23,7 @@ def meet(what: str) -> None:
 
 @contextmanager
 def noted() -> Iterator[set[str]]:
-    """What this process meets from here on; more than that of one task where several run in it."""
+    """Yield the set of events that this process meets from here on; tasks that run concurrently share them."""
     met = set[str]()
     with _noting:
         _noted.append(met)

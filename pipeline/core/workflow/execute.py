@@ -1,4 +1,4 @@
-"""One task in this process: fresh, or run and stored. And the state of a task, in words."""
+"""Execution of one task in this process, unless its artifact is up to date; and the state of tasks, in words."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from flexclear.pipeline.core.workflow.task import ARRAYS, Task, contents, facts,
 
 @dataclass(frozen=True)
 class State:
-    """Where a task is. record: its artifact, when it is fresh. why: else the reasons, in words."""
+    """State of a task. record: its artifact when up to date. why: otherwise the reasons to run it, in words."""
 
     task: Task
     record: Record | None
@@ -26,27 +26,27 @@ class State:
 
 
 def key_of(task: Task, inputs: Mapping[str, Record], sources: Sources) -> str:
-    """Key of the artifact that a task makes from these inputs and from its files as they are now."""
+    """Return the key of the artifact that a task produces from these inputs and from its current files."""
     return key(_facts(task, inputs, sources))
 
 
 def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
-    """The fresh artifact of a task whose inputs are fresh, now also shown in its folder; or None."""
-    record = _found(task, inputs, store, sources)
+    """Show an up-to-date artifact in its task's folder and return its record; None when there is none."""
+    record = _stored(task, inputs, store, sources)
     if record is not None:
         store.show(record, task.folder, task.names, task.label)
     return record
 
 
 def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress) -> Record:
-    """The artifact of a task whose inputs are fresh, run if need be (once, over all processes).
+    """Return the artifact of a task with up-to-date inputs, and run the task if necessary (once over all processes).
 
-    Raises ResourceError when one of its files changes meanwhile.
+    Raises ResourceError when a file of the task changes during the run.
     """
     known = _facts(task, inputs, sources)
     name = key(known)
     with store.lock(task.stage, name, lambda: progress(None, "waiting for another process that makes the same")):
-        record = _found(task, inputs, Store(store.root), sources)  # whoever requested it has reported its faults
+        record = _stored(task, inputs, Store(store.root), sources)  # silent store: `find` has reported faults already
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
@@ -66,7 +66,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
 
 
 def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
-    """State of each task and all its inputs, inputs first; nothing is run."""
+    """Return the state of each task and of all inputs, inputs first; run nothing."""
     states_of: dict[Task, State] = {}
     for task in in_order(tasks):
         above = {name: states_of[t].record for name, t in task.inputs.items()}
@@ -78,20 +78,20 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
     last = store.last(task.folder, task.label)
-    # of what the last run has not met no code counts
-    always, seen = set(task.roots(())), last.facts if last is not None else {}
-    names = [name for name, those in task.met.items() if any(f"module {m}" in seen for m in {*those} - always)]
+    # code for events that the last run did not meet is not compared
+    always, last_facts = set(task.roots(())), last.facts if last is not None else {}
+    names = [name for name, code in task.met.items() if any(f"module {m}" in last_facts for m in {*code} - always)]
     now = _facts(task, fresh, sources, names)
     if last is None and stale:
         return State(task, None, ("never run",))
     above = [f"its input {name} would be made again" for name in sorted(stale)]
     if not stale:
-        record = _found(task, fresh, store, sources)
+        record = _stored(task, fresh, store, sources)
         if record is not None:
             return State(task, record, ())
     why = reasons(now, None if last is None else last.facts, stale) + above
     if not why and last is not None:
-        # nothing changed, so the artifact itself must be broken; `find` has said so if it is corrupt
+        # nothing changed, so the artifact itself must be damaged; `find` has reported this if it is corrupt
         why = [store.fault(last) or "its record in the cache is missing"]
     failure = store.why_outdated(task.folder, task.label)
     if failure is not None:
@@ -99,8 +99,8 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
     return State(task, None, tuple(why))
 
 
-def _found(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
-    """The artifact of a task, whatever it has met of what it may."""
+def _stored(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
+    """Return the artifact of a task, whichever of its possible events the run has met."""
     for count in range(len(task.met) + 1):
         for met in combinations(task.met, count):
             record = store.find(task.stage, key(_facts(task, inputs, sources, met)))

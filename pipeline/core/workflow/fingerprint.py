@@ -1,9 +1,9 @@
-"""Which source a result depends on: the static import closure of modules, and their digests.
+"""Sources that a result depends on: the static import closure of modules, and their digests.
 
 A module counts by its syntax tree without comments, docstrings and the words of the errors that it raises: wording
-changes no result.  Only names below `OWN` are followed; other top-level imports are libraries, which count by their
-version. Parts that are looked up by name at run time are not seen here: whoever builds a task
-names their modules as further roots.
+changes no result. Only names below `OWN` are followed; other top-level imports are libraries, which count by their
+version. Parts looked up by name at run time are not visible here: code that builds a task names their modules as
+further roots.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ OWN = ("flexclear", "benchmarks")
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
 WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
-#: what the code of a package reads next to its modules
+#: suffixes of the files that the code of a package reads next to its modules
 ASSETS = (".css", ".js")
-#: how often a source is parsed at most, where threads of libraries come between
+#: attempts to parse a source, which concurrent threads of libraries may disturb
 ATTEMPTS = 10
 _PARSING = Lock()
-#: libraries that decide on no result: locks, folders, and what the machine has left
+#: libraries that affect no result: locks, folders, remaining resources of the machine
 MACHINE = {"filelock", "platformdirs", "psutil"}
 #: distributions whose name differs from that of their import package
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
@@ -43,7 +43,7 @@ DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtk
 class Module:
     """One source file. text, digest: digests of its bytes and of its code.
 
-    own, libraries: modules and libraries that it imports.  package: whether others may lie below.
+    own, libraries: modules and libraries that it imports. package: whether other modules may be below it.
     """
 
     text: str
@@ -53,17 +53,16 @@ class Module:
     package: bool
 
     def written(self) -> list[Any]:
-        """As the memo of a `Sources` has it."""
+        """Return the entry of this module in the memo of a `Sources`."""
         return [self.text, self.digest, list(self.own), list(self.libraries)]
 
 
 @dataclass(frozen=True)
 class Sources:
-    """The source tree under `root`, each file read at most once.
+    """The source tree under `root`; each file is read at most once.
 
-    memo: file that remembers what each module imports, and the digest of the text that says so;
-    only edited files are parsed then.  None parses all of them.
-    A source is assumed not to change while one process looks at it.
+    memo: file with the imports of each module and the digest of the text they were read from, so that only edited files
+    are parsed. None parses all files. Sources are assumed not to change while one process reads them.
     """
 
     root: Path
@@ -74,9 +73,9 @@ class Sources:
     closures: dict[frozenset[str], dict[str, Module]] = field(default_factory=dict, repr=False, compare=False)
 
     def closure(self, roots: Iterable[str]) -> dict[str, Module]:
-        """Every own module that `roots` reach by imports, packages on the way included.
+        """Return every own module that `roots` reach by imports, including the packages above.
 
-        Raises LookupError for a root that is no module of the tree.
+        Raises LookupError for a root that is not a module of the tree.
         """
         requested = frozenset(roots)
         if requested not in self.closures:
@@ -91,7 +90,7 @@ class Sources:
         return self.closures[requested]
 
     def code(self, roots: Iterable[str]) -> dict[str, str]:
-        """Facts of the code that `roots` reach, by kind and name: digests of modules and of the assets of packages,
+        """Return facts of the code that `roots` reach, by kind and name: digests of modules and of assets of packages,
         versions of libraries."""
         closure = self.closure(roots)
         libraries = frozenset().union(*(module.libraries for module in closure.values())) - MACHINE
@@ -101,17 +100,17 @@ class Sources:
         }
 
     def _assets(self, closure: Mapping[str, Module]) -> Iterator[Path]:
-        """Files next to the modules of packages that their code reads."""
+        """Yield the files next to the modules of packages that their code reads."""
         for name, module in closure.items():
             source = source_file(self.root, name) if module.package else None
             if source is not None:
                 yield from (source.parent / entry for entry in os.listdir(source.parent) if entry.endswith(ASSETS))
 
     def module(self, name: str) -> Module | None:
-        """The module called `name`, or None when there is no such file (an attribute, say)."""
+        """Return the module called `name`, or None when it has no file (an attribute, say)."""
         if name not in self.read:
             above = self.read.get(name.rpartition(".")[0])
-            # most names are of what modules hold: four files less to look for
+            # most names are attributes of modules: this saves the search for four files
             path = source_file(self.root, name) if above is None or above.package else None
             self.read[name] = None if path is None else self._parse(path, name)
         return self.read[name]
@@ -131,9 +130,9 @@ class Sources:
         return modules
 
     def _next(self, name: str, module: Module) -> tuple[str, ...]:
-        """The modules that one reaches at once: what it imports may be an attribute of a module, and no module."""
+        """Return the modules that a module reaches directly; imported names that are attributes are dropped."""
         if name not in self.next:
-            reached = sorted({*module.own, *parents(name)})  # a module before the names that it holds
+            reached = sorted({*module.own, *parents(name)})  # a module comes before its attributes
             self.next[name] = tuple(other for other in reached if self.module(other) is not None)
         return self.next[name]
 
@@ -154,36 +153,36 @@ def _examined(source: bytes, name: str, package: bool) -> Module:
     return Module(hashlib.sha256(source).hexdigest(), code, own, libraries, package)
 
 
-#: this program's own modules, as this process has read them
+#: this program's own modules, in the state in which this process read them
 _OWN_MODULES: dict[str, Module | None] = {}
 
 
 def sources_of(root: Path, memo: Path | None = None) -> Sources:
-    """The source tree under `root`; this program's own is read once by a process, which runs what it was then."""
+    """Return the source tree under `root`; this program's own is read once per process, which runs that state."""
     return Sources(root, memo, _OWN_MODULES if root == TREE else {})
 
 
 def source_file(root: Path, name: str) -> Path | None:
-    """The file of the module called `name` in the source tree under `root`, or None when there is none."""
+    """Return the file of the module called `name` in the source tree under `root`; None without such a file."""
     first, _, rest = name.partition(".")
-    # in a checkout whose links are not followed the packages below `flexclear` are next to it
+    # in a checkout without symbolic links the packages below `flexclear` are next to it
     places = [name, *([rest] if first == "flexclear" and rest else [])]
-    # hundreds of modules are searched for by every command: paths as texts take a fifth of the time
+    # every command searches for hundreds of modules: text paths take a fifth of the time of Path objects
     bases = [f"{root}{os.sep}{place.replace('.', os.sep)}" for place in places]
     files = (path for base in bases for path in (f"{base}.py", f"{base}{os.sep}__init__.py"))
     return next((Path(path) for path in files if os.path.isfile(path)), None)
 
 
 def parents(name: str) -> list[str]:
-    """Packages above a module: ``a.b.c`` -> ``a.b``, ``a``."""
+    """Return the packages above a module: ``a.b.c`` -> ``a.b``, ``a``."""
     parts = name.split(".")
     return [".".join(parts[:n]) for n in range(1, len(parts))]
 
 
 def imported(source: bytes, name: str, package: bool, *, deep: bool = True) -> tuple[set[str], set[str]]:
-    """Own names and libraries that one source text imports; imports for type checkers do not count.
+    """Return own names and libraries that one source text imports; imports for type checkers do not count.
 
-    deep: also in functions, which import what only some need.
+    deep: also imports inside functions.
     """
     return _imported(_parsed(source), name, package, deep)
 
@@ -201,7 +200,7 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
 
 
 def code_digest(tree: ast.Module) -> str:
-    """Digest of what a module does: its syntax tree without docstrings, also of attributes, and words of errors."""
+    """Return the digest of a module's syntax tree without docstrings, also of attributes, and words of errors."""
     for node in ast.walk(tree):
         if isinstance(node, _DOCUMENTED):
             node.body = [one for one in node.body if not _is_text(one)]
@@ -215,13 +214,13 @@ def code_digest(tree: ast.Module) -> str:
 
 
 def _is_text(statement: ast.stmt) -> bool:
-    """Whether a statement is a text alone, which does nothing."""
+    """Return True for a statement that is only a text, which has no effect."""
     value = statement.value if isinstance(statement, ast.Expr) else None
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def _dumped(tree: ast.Module) -> str:
-    """The text of a syntax tree, the same from all releases of Python: some leave out what is empty, or lack it."""
+    """Return a syntax tree as text, equal in all releases of Python: some omit empty fields, some lack them."""
     whole: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13) else {}
     return ast.dump(tree, **whole).replace(", type_params=[]", "")
 
@@ -230,18 +229,18 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def _parsed(source: bytes) -> ast.Module:
-    """The syntax tree. CPython has one counter of how deep all threads are in theirs, and may find that it is wrong.
+    """Return the syntax tree. CPython counts the nesting depth of all threads together and may find the count wrong.
 
-    That is so in 3.11 and 3.12 at least (its issue 106905); runs, perturbed runs and members of ensembles are threads.
+    This occurs at least in 3.11 and 3.12 (its issue 106905); runs, perturbed runs and ensemble members are threads.
     """
     for _ in range(ATTEMPTS):
-        with contextlib.suppress(SystemError), _PARSING:  # libraries parse as well, and wait for nobody
+        with contextlib.suppress(SystemError), _PARSING:  # libraries parse as well, without this lock
             return ast.parse(source)
     return ast.parse(source)
 
 
 def _imports(statements: Iterable[ast.stmt], package: str, deep: bool) -> Iterable[str]:
-    """Dotted names that statements import, those of functions only if `deep`; ``from a import b`` gives a and a.b."""
+    """Yield dotted names that statements import, in functions only if `deep`; ``from a import b`` gives a and a.b."""
     for node in statements:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -267,7 +266,7 @@ def _is_type_checking(test: ast.expr) -> bool:
 
 @cache
 def library_versions(packages: frozenset[str]) -> dict[str, str]:
-    """Versions of the libraries that hold these import packages, and of all that those require in turn."""
+    """Return the versions of the libraries of these import packages, and of all libraries that they require."""
     versions = {name: library_version(name) for name in packages}
     waiting = sorted(packages)
     while waiting:
@@ -280,8 +279,8 @@ def library_versions(packages: frozenset[str]) -> dict[str, str]:
 
 @cache
 def library_version(package: str) -> str:
-    """Version of the distribution that holds an import package; 'absent' when it is not installed."""
-    from importlib.metadata import PackageNotFoundError, version  # here, since it brings readers of e-mail
+    """Return the version of the distribution of an import package; 'absent' when it is not installed."""
+    from importlib.metadata import PackageNotFoundError, version  # here, since it imports the e-mail package
 
     try:
         return version(DISTRIBUTIONS.get(package, package))
@@ -291,7 +290,7 @@ def library_version(package: str) -> str:
 
 @cache
 def _required(package: str) -> tuple[str, ...]:
-    """Distributions that a library requires whatever is asked of it; some only on other machines."""
+    """Return the distributions that a library requires without extras; some only on other machines."""
     from importlib.metadata import PackageNotFoundError, requires
 
     try:

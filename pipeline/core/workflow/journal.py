@@ -1,9 +1,9 @@
-"""Unfinished work of ensembles and sections on disk, so that what was killed continues where it was, to the last bit.
+"""Unfinished work of ensembles and sections on disk: a killed task continues with results equal to the last bit.
 
-Such a task does its work in pieces: members, or periods that continue from each other. A piece is named by all that
-decides it, so that a later attempt at the same task asks for the same pieces; those on disk are not computed again.
-They lie next to the later artifact, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only its user
-can make, and hold arrays only, no code. They are removed when the artifact is stored.
+Such a task does its work in pieces: members, or periods that continue from each other. The name of a piece covers all
+that decides its content, so that a later attempt at the same task requests the same pieces; those on disk are not
+computed again. They lie next to the later artifact, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only
+its user can compute, and hold arrays only, no code. They are removed when the artifact is stored.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from flexclear.pipeline.core.artifacts.disk import publish, read_whole, temporar
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.system.platforms import replace
 
-#: how often unfinished work is written [s], and the fraction of the time that writing may take where it is slow
+#: interval at which unfinished work is written [s], and the largest fraction of the time spent on slow writing
 WRITING_INTERVAL, WRITING_FRACTION = 20.0, 0.05
-#: a piece's file begins with a digest of so many characters, and a line's end
+#: number of characters of the digest at the beginning of a piece's file, before a line end
 DIGEST = 64
-#: bytes of the secret with which digests are made
+#: bytes of the secret from which digests are computed
 SECRET = 32
 
 
 @dataclass
 class Journal:
-    """The pieces of one task, whose threads may all store some.
+    """The pieces of one task, which any of its threads may store.
 
-    folder, key: where they lie, and what their names begin with.
+    folder, key: folder of the files and beginning of their names.
     """
 
     folder: Path
@@ -49,7 +49,7 @@ class Journal:
     _lock: Lock = field(default_factory=Lock)
 
     def find(self, name: str) -> dict[str, Any] | None:
-        """Arrays of a piece that an earlier attempt stored; None where there is none, or it is damaged."""
+        """Return the arrays of a piece stored by an earlier attempt; None when it is absent or damaged."""
         import numpy as np
 
         try:
@@ -63,7 +63,7 @@ class Journal:
             return {key: file[key] for key in file.files}
 
     def store(self, name: str, arrays: Callable[[], Mapping[str, Any]]) -> None:
-        """Store a piece, instead of an earlier one of its name; `arrays` is called when it is written."""
+        """Store a piece, replacing an earlier one of its name; `arrays` is called when the piece is written."""
         with self._lock:
             self._waiting[name] = arrays
             due = self.clock() - self._written > max(WRITING_INTERVAL, self._took / WRITING_FRACTION)
@@ -71,7 +71,7 @@ class Journal:
             self.write()
 
     def write(self) -> None:
-        """Write what waits; where the disk is full, nothing is lost but that."""
+        """Write the waiting pieces; on a full disk only they are lost."""
         import numpy as np
 
         with self._lock:
@@ -87,7 +87,7 @@ class Journal:
             self._written, self._took = self.clock(), self.clock() - begun
 
     def remove(self) -> None:
-        """The task is done."""
+        """Remove the pieces of a finished task."""
         for path in self.folder.glob(f"{self.key}.*.part"):
             path.unlink(missing_ok=True)
 
@@ -95,41 +95,41 @@ class Journal:
         return self.folder / f"{self.key}.{name}.part"
 
 
-#: of each thread what it was when the thread was given its work, unless it works on a task of its own
+#: threads inherit the journal of the task that gave them their work, unless they work on a task of their own
 _current: ContextVar[Journal | None] = ContextVar("journal", default=None)
 
 
 def current() -> Journal | None:
-    """The journal of the task that is worked on; None where nothing is stored."""
+    """Return the journal of the current task; None where nothing is stored."""
     return _current.get()
 
 
 @contextlib.contextmanager
 def storage(folder: Path, key: str) -> Iterator[Journal]:
-    """Meanwhile unfinished work is written, at last where the work fails or is stopped; its caller removes it."""
-    made = Journal(folder, key)
-    before = _current.set(made)
+    """Yield the journal of a task, and write its pieces when the work fails or is stopped; the caller removes them."""
+    journal = Journal(folder, key)
+    before = _current.set(journal)
     try:
-        yield made
+        yield journal
     except BaseException:
-        made.write()
+        journal.write()
         raise
     finally:
         _current.reset(before)
 
 
 def signature(content: bytes) -> str:
-    """Hexadecimal digest that only this user can make, of as many characters as that of `disk.sha256`.
+    """Return a hexadecimal digest that only this user can compute, with as many characters as that of `disk.sha256`.
 
-    What a work space holds decides where compiled code reads and writes, so work that somebody else put into a folder
-    of results must not be continued. The secret lies next to the compiled kernels, in the user's own folder.
+    The content of a work array decides where compiled code reads and writes, so work that somebody else put into a
+    folder of results must not be continued. The secret lies next to the compiled kernels, in the user's own folder.
     """
     return hmac.new(_secret(), content, "sha256").hexdigest()
 
 
 @cache
 def _secret() -> bytes:
-    """The user's; where none can be stored, one of this process, whose work no other one continues with."""
+    """Return the user's secret; where none can be stored, one of this process, whose work no other continues."""
     path = kernel_root() / "seal"
     try:
         if not path.is_file() or path.stat().st_size != SECRET:
@@ -138,6 +138,6 @@ def _secret() -> bytes:
                 with open(os.open(made, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
                     file.write(os.urandom(SECRET))
                 replace(made, path)
-        return path.read_bytes()  # of processes that make one at once, the last one's
+        return path.read_bytes()  # when processes write one concurrently, the last secret is valid for all
     except OSError:
         return os.urandom(SECRET)

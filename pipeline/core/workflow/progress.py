@@ -1,8 +1,8 @@
-"""Progress on stderr: which scene and stage is running and how long it still takes.
+"""Progress on stderr: the running scene and stage, and the estimated remaining time.
 
-Lines that stay are records of the logger (`core.system.log`); the line that a terminal or a notebook rewrites is none.
-A library would replace the rewritten line alone: neither Rich, whose import takes 0.1 s of the processor, nor tqdm
-writes sparse lines where the output is a file.
+Permanent lines are records of the logger (`core.system.log`); the line that a terminal or a notebook rewrites is not. A
+library would replace only the rewritten line: neither Rich, whose import takes 0.1 s of processor time, nor tqdm writes
+sparse lines where the output is a file.
 """
 
 from __future__ import annotations
@@ -16,38 +16,38 @@ from typing import TextIO
 
 from flexclear.pipeline.core.system.log import LOG, write_to
 
-#: least time between two lines of one task where lines stay on the screen [s]
+#: least time between two permanent lines of one task [s]
 SPARSE = 10.0
 #: least time between two redraws of the line on a terminal [s]
 REDRAW = 0.1
-#: the rest is estimated from so many samples at least, each of a fraction of the work or more
+#: least number of samples for an estimate of the remaining time, and least fraction of the work in each
 SAMPLES, ENOUGH = 3, 0.01
-#: the last samples counts most: of each earlier one by this factor less
+#: weight of each sample relative to the next, so that the last one counts most
 FADING = 0.8
-#: what a task says with this begin stays on the screen
+#: reports of a task that begin with this text become permanent lines
 WARNING = "warning: "
 
 
 @dataclass
 class Job:
-    """A running task as the screen knows it."""
+    """A running task on the screen."""
 
     name: str
-    begun: float
+    started: float
     since: tuple[float, float] | None = None  #: time and finished fraction where the last sample began
     samples: int = 0
-    spent: float = 0.0  #: seconds of all samples, and the fractions done in them, the later ones counting more
+    spent: float = 0.0  #: weighted sums over all samples: time [s], and fraction of the work in `advanced`
     advanced: float = 0.0
     fraction: float | None = None
     text: str = ""
-    said: float = 0.0
+    last_line: float = 0.0  #: time of the last permanent line
 
 
 @dataclass
 class Monitor:
-    """Shows running tasks: on a terminal and in a notebook as one line that is rewritten, else as sparse lines.
+    """Displays running tasks: on a terminal or in a notebook as one line that is rewritten, else as sparse lines.
 
-    The logger's level says how much: from WARNING on no progress; at DEBUG a line for everything that tasks say.
+    The logger's level decides the amount: from WARNING on no progress; at DEBUG a line for every report.
     """
 
     out: TextIO = field(default_factory=lambda: sys.stderr)
@@ -62,77 +62,77 @@ class Monitor:
 
     @property
     def quiet(self) -> bool:
-        """Whether there are warnings only."""
+        """True when only warnings are printed."""
         return not LOG.isEnabledFor(logging.INFO)
 
     @property
     def verbose(self) -> bool:
-        """Whether everything stays that tasks say."""
+        """True when every report of a task becomes a permanent line."""
         return LOG.isEnabledFor(logging.DEBUG)
 
     @property
     def rewrites(self) -> bool:
-        """Whether one line is rewritten, as on a terminal."""
+        """True when one line is rewritten, as on a terminal."""
         return (self.out.isatty() or _in_notebook(self.out)) and not self.verbose
 
     def start(self, total: int) -> None:
-        """`total` tasks are to be run."""
+        """Set the number of tasks to run."""
         self.total, self.done = total, 0
 
     def begin(self, scene: str, label: str) -> str:
-        """A task starts; returns the name to report under, which no other running task has."""
+        """Note the start of a task; return the name to report under, which no other running task has."""
         plain = name = f"{scene}: {label}"
         others = 1
         while name in self.jobs:  # an edited copy of a scene has tasks of the same label
             others += 1
             name = f"{plain} ({others})"
-        self.jobs[name] = Job(name, self.clock(), said=self.clock())
+        self.jobs[name] = Job(name, self.clock(), last_line=self.clock())
         self._show(f"{self._count()}{name}")
         return name
 
     def update(self, name: str, fraction: float | None, text: str) -> None:
-        """A task is `fraction` done (None: unknown) and doing `text`."""
+        """Note that a task is `fraction` done (None: unknown) and doing `text`."""
         job = self.jobs.get(name)
         if job is None:
             return
         news = fraction is None and text != job.text
         if text.startswith(WARNING) and (self.rewrites or self.quiet):
-            self.say(f"{job.name}: {text}")  # stays, where the line of progress is rewritten
-        # what has no fraction (compiling, waiting) says nothing about the rest
-        if fraction is None or job.since is None or fraction < job.since[1]:  # begun anew, at another tolerance, say
+            self.say(f"{job.name}: {text}")  # a permanent line, since the line of progress is rewritten or absent
+        # work without a fraction (compiling, waiting) does not enter the estimate of the remaining time
+        if fraction is None or job.since is None or fraction < job.since[1]:  # restarted, e.g. at another tolerance
             job.since = None if fraction is None else (self.clock(), fraction)
         elif fraction - job.since[1] >= ENOUGH:
             job.spent = FADING * job.spent + self.clock() - job.since[0]
             job.advanced = FADING * job.advanced + fraction - job.since[1]
             job.since, job.samples = (self.clock(), fraction), job.samples + 1
         job.fraction, job.text = fraction, text
-        if self.rewrites or self.verbose or news or self.clock() - job.said >= SPARSE:
-            job.said = self.clock()
+        if self.rewrites or self.verbose or news or self.clock() - job.last_line >= SPARSE:
+            job.last_line = self.clock()
             self._show(f"{self._count()}{self._line(job)}")
 
     def finish(self, name: str, *, failed: bool) -> None:
-        """A task has ended."""
+        """Note the end of a task."""
         job = self.jobs.pop(name)
         self.done += 1
-        seconds = self.clock() - job.begun
+        seconds = self.clock() - job.started
         if not self.rewrites and (failed or seconds >= 1.0):
             self._show(f"{self._count()}{name} {'failed' if failed else 'done'} after {duration(seconds)}")
         elif self.rewrites:
             self._show("")
 
     def end(self) -> None:
-        """All tasks have ended; clears the line."""
+        """Clear the line after all tasks have ended."""
         if self.rewrites and not self.quiet:
             self._write(_clear(self.out))
 
     def say(self, text: str) -> None:
-        """One line that stays, of a warning."""
+        """Print a warning as a permanent line."""
         if self.rewrites and not self.quiet:
             self._write(_clear(self.out))
         LOG.warning("%s", text)
 
     def _count(self) -> str:
-        """How many tasks are done, where there are several."""
+        """Return the number of finished tasks as a prefix; empty for a single task."""
         return f"[{self.done}/{self.total}] " if self.total > 1 else ""
 
     def _line(self, job: Job) -> str:
@@ -144,7 +144,7 @@ class Monitor:
         return " ".join([*parts, *([job.text] if job.text else [])])
 
     def _seconds_per_fraction(self, job: Job) -> float:
-        """Seconds per fraction; what continues counts as soon as it is slower than what was before."""
+        """Return the time per fraction [s]; the current sample counts as soon as it is slower than earlier ones."""
         known = job.spent / job.advanced
         if job.since is None or job.fraction is None:
             return known
@@ -167,7 +167,7 @@ class Monitor:
 
 
 def duration(seconds: float) -> str:
-    """``4.2 s``, ``3 min 10 s``."""
+    """Return a time in words: ``4.2 s``, ``3 min 10 s``."""
     if round(seconds, 1) < 60.0:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(round(seconds), 60)
@@ -175,12 +175,12 @@ def duration(seconds: float) -> str:
 
 
 def _in_notebook(out: TextIO) -> bool:
-    """Whether a stream is a cell's output, which knows carriage returns but no other control."""
+    """Return True for the output of a notebook cell, which interprets carriage returns but no other control."""
     return type(out).__module__.partition(".")[0] == "ipykernel"
 
 
 def _clear(out: TextIO) -> str:
-    """What empties the present line."""
+    """Return the control characters that clear the current line."""
     return f"\r{' ' * _columns(out)}\r" if _in_notebook(out) else "\r\033[K"
 
 

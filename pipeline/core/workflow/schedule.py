@@ -1,5 +1,5 @@
-"""Brings tasks up to date over the cores there are: fresh ones are recognised, stale ones run as soon as
-their inputs are there."""
+"""The scheduler: brings tasks up to date on the available cores. Fresh tasks are recognised; stale ones run as soon as
+their inputs are available."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from flexclear.pipeline.core.workflow.task import Task, in_order
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
 
-#: noted next to what is shown until it has been brought up to date
+#: note next to shown results until they are up to date
 UNFINISHED = "making it again was begun and not finished"
-#: how often the progress of workers is examined [s]
+#: interval at which the progress of workers is examined [s]
 TICK = 0.2
-#: workers that are asked to stop have so long for it [s]; a step of 20 000 evaluations, and writing what there is
+#: time for workers to stop [s]: enough for a step of 20 000 evaluations and for writing the partial results
 GRACE = 60.0
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A task that could not be done: the exit code and what the user reads."""
+    """A failed task: the exit code and the message to the user."""
 
     task: Task
     exit_code: int
@@ -42,7 +42,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of the tasks asked for: the records of those that are up to date, and the failures."""
+    """Outcome of the requested tasks: the records of those that are up to date, and the failures."""
 
     records: Mapping[Task, Record]
     failures: tuple[Failure, ...]
@@ -50,7 +50,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Running:
-    """A task in a worker: its key, since the same artifact is not asked for twice, and its name on the screen."""
+    """A task in a worker: its key, so that the same artifact is not requested twice, and its name on the screen."""
 
     task: Task
     key: str
@@ -59,7 +59,7 @@ class _Running:
 
 @dataclass
 class _Plan:
-    """Book-keeping of one call: what is done, what failed, what still waits."""
+    """State of one call of `bring`: finished, failed and waiting tasks."""
 
     waiting: list[Task]
     tasks: tuple[Task, ...]
@@ -73,7 +73,7 @@ class _Plan:
         return [t for t in self.waiting if all(above in self.done for above in t.inputs.values())]
 
     def give_up_below_failures(self) -> None:
-        """Tasks whose inputs failed are left out silently; the failure itself is reported."""
+        """Drop tasks whose inputs failed, without a report of their own; the failure itself is reported."""
         for task in list(self.waiting):
             broken = next((self.failed[a] for a in task.inputs.values() if a in self.failed), None)
             if broken is not None:
@@ -82,10 +82,10 @@ class _Plan:
 
 
 def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, jobs: int | None = None) -> Outcome:
-    """Bring tasks and all their inputs up to date; a failure stops only what depends on it.
+    """Bring tasks and all their inputs up to date; a failure stops only the tasks that depend on it.
 
-    jobs: processes at most; default: the cores this process may use.  When it is asked to stop (`stopping`), works
-    that can leave what there is do so, and are among the failures; after Ctrl-C it then raises KeyboardInterrupt.
+    jobs: largest number of processes; default: the cores this process may use. On a request to stop (`stopping`), tasks
+    that can leave partial results do so, and count as failures; after Ctrl-C, KeyboardInterrupt follows.
     """
     store.sweep()
     plan = _Plan(in_order(tasks), tuple(in_order(tasks)))
@@ -98,9 +98,9 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
         width = min(jobs or cores.cores(), _width(plan.waiting))
         with stopping.gently(monitor.say):
             if width == 1:
-                _alone(plan, store, sources, monitor)
+                _run_here(plan, store, sources, monitor)
             else:
-                _together(plan, store, sources, monitor, width)
+                _run_in_workers(plan, store, sources, monitor, width)
         monitor.end()
         for task in plan.tasks:
             if task in plan.failed:
@@ -114,12 +114,12 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
 
 
 def _width(tasks: list[Task]) -> int:
-    """How many tasks can run side by side at most: chains, counted by what nothing waits for."""
+    """Return how many tasks can run concurrently at most: one per scene and part, exclusive tasks excluded."""
     return max(1, len({(t.scene, t.part) for t in tasks if not t.exclusive}))
 
 
 def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
-    """Tasks are in order, so one pass finds all that is fresh."""
+    """Mark all fresh tasks as done; tasks are in order of dependence, so one pass suffices."""
     for task in list(plan.waiting):
         if all(above in plan.done for above in task.inputs.values()):
             record = find(task, plan.inputs(task), store, sources)
@@ -128,8 +128,8 @@ def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
                 plan.waiting.remove(task)
 
 
-def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
-    """One after the other in this process."""
+def _run_here(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
+    """Run the tasks one after the other in this process."""
     while ready := plan.ready():
         why = stopping.requested()
         if why:
@@ -144,8 +144,8 @@ def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> Non
         plan.give_up_below_failures()
 
 
-def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
-    """In worker processes."""
+def _run_in_workers(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
+    """Run the tasks in worker processes."""
     running: dict[Future[Record | Failure], _Running] = {}
     with workers.team(width) as team, stopping.heeded():
         while (plan.waiting or running) and not stopping.requested():
@@ -159,14 +159,14 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
 def _end_in_good_order(
     plan: _Plan, running: dict[Future[Record | Failure], _Running], channel: workers.Channel, monitor: Monitor
 ) -> None:
-    """Ask the workers to stop, and wait for what they leave: not for those that cannot leave anything, nor for ever."""
+    """Ask the workers to stop, and wait up to GRACE for their partial results, without those that cannot leave any."""
     from concurrent.futures import wait
 
     why, end = stopping.requested(), time.monotonic() + GRACE
     channel.request_stop(why)
     while time.monotonic() < end:
         _, late = wait(running, timeout=TICK)
-        if len(late) <= channel.deaf.value:
+        if len(late) <= channel.unstoppable.value:
             break
         _relay(channel, monitor)
     for future, job in running.items():
@@ -181,7 +181,7 @@ def _end_in_good_order(
 
 
 def _leave_waiting(plan: _Plan, why: str) -> None:
-    """Abandon all unfinished tasks when the command must stop; that is reported once."""
+    """Abandon all unfinished tasks when the command must stop, and report this once."""
     if plan.waiting:
         code = StoppedError(why, interrupted=why == stopping.INTERRUPTED).exit_code
         rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks are left undone: {why}")
@@ -198,15 +198,15 @@ def _submit(
     sources: Sources,
     monitor: Monitor,
 ) -> None:
-    """Hand out ready tasks while workers are free; an exclusive one only to an idle pool.
+    """Submit ready tasks while workers are free; an exclusive task only to an idle pool.
 
-    Tasks whose artifact is being made already wait for it; those whose artifact is there by now,
-    made for another scene, are done.
+    A task whose artifact is being produced by another task waits for it; a task whose artifact exists by now, produced
+    for another scene, is done.
     """
     others_idle = not running and len(plan.ready()) == 1
     for task in sorted(plan.ready(), key=lambda t: t.exclusive):
-        alone = any(other.task.exclusive for other in running.values())
-        if len(running) >= width or alone or (task.exclusive and running):
+        exclusive_running = any(other.task.exclusive for other in running.values())
+        if len(running) >= width or exclusive_running or (task.exclusive and running):
             return
         inputs = plan.inputs(task)
         key = key_of(task, inputs, sources)
@@ -220,7 +220,7 @@ def _submit(
             monitor.finish(name, failed=False)
             continue
         where = (store.root, sources.root, sources.memo)
-        with workers.lost(), workers.without_main():  # an idle one; a script without a guard is not run again
+        with workers.lost(), workers.without_main():  # an idle worker may die; a script without guard must not rerun
             future = pool.submit(_work, task, inputs, name, where, others_idle)
         running[future] = _Running(task, key, name)
 
@@ -236,7 +236,7 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
         try:
             result = future.result()
         except BrokenProcessPool:
-            if stopping.requested():  # one that had just been started is not deaf to Ctrl-C yet
+            if stopping.requested():  # Ctrl-C ends a worker that has just started and does not ignore it yet
                 plan.waiting.append(task)
                 continue
             text = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
@@ -253,7 +253,7 @@ def _relay(channel: workers.Channel, monitor: Monitor) -> None:
 
 def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:
     if isinstance(result, Failure):
-        plan.failed[task] = replace(result, task=task)  # a worker has a copy of it
+        plan.failed[task] = replace(result, task=task)  # the worker's result holds a copy of the task
     else:
         plan.done[task] = result
 
@@ -265,7 +265,7 @@ def _work(
     where: tuple[Path, Path, Path | None],
     others_idle: bool,
 ) -> Record | Failure:
-    """In a worker: the same as in `_alone`, with progress sent home, as often as it is read there."""
+    """Run a task in a worker as `_run_here` does; report progress to the parent as often as the parent reads it."""
     root, source, memo = where
     cores.set_idle(others_idle)
     last = 0.0
@@ -283,12 +283,12 @@ def _work(
 def attempt(
     task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress
 ) -> Record | Failure:
-    """The record, or the failure with what the user sees. A mistake of this program is reported with
-    its traceback, since only that helps then."""
+    """Return the record, or the failure with its message to the user. Unexpected errors are reported with their
+    traceback, since only that helps to find their cause."""
     try:
         return execute(task, inputs, store, sources, progress)
     except StoppedError as stopped:
-        code, text = stopped.exit_code, _left(task, stopped, store)
+        code, text = stopped.exit_code, _stopped_message(task, stopped, store)
     except FlexclearError as error:
         code, text = error.exit_code, str(error)
     except MemoryError:
@@ -298,13 +298,13 @@ def attempt(
     return Failure(task, code, f"{task.scene} {task.label}: {text}")
 
 
-def _left(task: Task, stopped: StoppedError, store: Store) -> str:
-    """Message about a task that was stopped, and what there is of it."""
+def _stopped_message(task: Task, stopped: StoppedError, store: Store) -> str:
+    """Return the message about a stopped task, and write its partial result, if any, next to the shown files."""
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
-    if time is None:  # it is of a part of the work, such as a member of an ensemble, and no dataset
+    if time is None:  # the partial result is of a piece of the work, such as an ensemble member, and no dataset
         return f"{stopped}; run it again, and what is finished of it is not computed again"
     path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
-    there = (
+    partial = (
         f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)" if path is not None else ""
     )
-    return f"{stopped}; run it again{there}"
+    return f"{stopped}; run it again{partial}"

@@ -1,7 +1,7 @@
-"""Work that is asked to stop: by Ctrl-C, by a limit of time, by the process that started it.
+"""Requests to stop work: by Ctrl-C, by a time limit, by the process that started it.
 
-What can leave its work half done in good order heeds requests and searches for them now and then; all else is ended at
-once.
+Work that can leave partial results in good order heeds requests: it checks for them from time to time. All other work
+is ended at once.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any
 
 from flexclear.pipeline.core.system.errors import StoppedError
 
-#: why work stops
+#: reason of a stop by Ctrl-C
 INTERRUPTED = "interrupted"
 
 _why = ""
 _heeded = 0
-_counting = threading.Lock()
+_heeded_lock = threading.Lock()
 _busy = False
 _deadlines: list[tuple[float, str]] = []
 
@@ -32,39 +32,39 @@ def request(why: str) -> None:
 
 
 def requested() -> str:
-    """Why the work is to stop; empty when it is not."""
+    """Return the reason why the work must stop; empty while it may go on."""
     now = time.monotonic()
     return _why or next((why for end, why in _deadlines if now > end), "")
 
 
 def check() -> None:
-    """Raise StoppedError when the work is to stop."""
+    """Raise StoppedError when the work must stop."""
     why = requested()
     if why:
         raise StoppedError(why, interrupted=why == INTERRUPTED)
 
 
 def heeds() -> bool:
-    """Whether what runs now searches for requests."""
+    """Return True when the running work checks for requests."""
     return _heeded > 0
 
 
 @contextmanager
 def heeded() -> Iterator[None]:
-    """Meanwhile requests are searched for."""
+    """Declare that the work inside this context checks for requests."""
     global _heeded
-    with _counting:  # threads of one task may all integrate
+    with _heeded_lock:  # several threads of a task may integrate at the same time
         _heeded += 1
     try:
         yield
     finally:
-        with _counting:
+        with _heeded_lock:
             _heeded -= 1
 
 
 @contextmanager
 def busy() -> Iterator[None]:
-    """Meanwhile this worker has a task."""
+    """Declare that this worker has a task inside this context."""
     global _busy
     _busy = True
     try:
@@ -75,7 +75,7 @@ def busy() -> Iterator[None]:
 
 @contextmanager
 def until(seconds: float | None, why: str) -> Iterator[None]:
-    """Meanwhile work is to stop when that time is over."""
+    """Request a stop inside this context after `seconds`; None sets no limit."""
     if seconds is None:
         yield
         return
@@ -89,7 +89,7 @@ def until(seconds: float | None, why: str) -> Iterator[None]:
 
 @contextmanager
 def gently(say: Callable[[str], None]) -> Iterator[None]:
-    """Meanwhile the first Ctrl-C is a request, where requests are heeded; else, and the second time, it ends all."""
+    """Treat the first Ctrl-C inside this context as a request to work that heeds requests; otherwise interrupt."""
     global _why
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -111,13 +111,13 @@ def gently(say: Callable[[str], None]) -> Iterator[None]:
             signal.signal(signal.SIGINT, before)
 
 
-def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], deaf: Callable[[], None]) -> None:
-    """In a worker: stop when the parent says so; `deaf` informs it of a task that does not heed requests."""
+def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], unstoppable: Callable[[], None]) -> None:
+    """Let a worker stop when its parent requests it; `unstoppable` reports a task that does not heed requests."""
 
     def wait() -> None:
         wait_for_signal()
         request(why())
         if _busy and not heeds():
-            deaf()
+            unstoppable()
 
     threading.Thread(target=wait, daemon=True).start()

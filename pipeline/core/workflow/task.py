@@ -1,4 +1,4 @@
-"""A task: one artifact to be brought up to date. Its facts, its key, and why it would run again."""
+"""A task: one artifact to be brought up to date; its facts, its key, and the reasons to run it again."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 from flexclear.pipeline.core.artifacts.disk import digest_of
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 
-#: libraries that every artifact passes through on its way to disk
+#: module that every artifact passes through on its way to disk, so that its libraries count for every key
 STORE = "flexclear.pipeline.core.artifacts.store"
 #: attribute of functions that `given_arrays` marks
 ARRAYS = "given_arrays"
-#: made once: `json.dumps` with options makes one for every value
+#: created once: `json.dumps` with options creates an encoder for every value
 _JSON = json.JSONEncoder(ensure_ascii=False, default=str)
 
 
@@ -24,27 +24,27 @@ Stage = TypeVar("Stage", bound=Callable[..., Any])
 
 
 def given_arrays(run: Stage) -> Stage:
-    """Marks the function of a stage that is given its inputs as `LabelledArrays`, not as datasets of xarray."""
+    """Mark the function of a stage that receives its inputs as `LabelledArrays`, not as xarray datasets."""
     setattr(run, ARRAYS, True)
     return run
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What to run, with what, and where its files are shown.
+    """The function to run, its inputs, and the folder where its files are shown.
 
     stage: name of the stage and of its folder in the cache.
-    part: the body (or figure) it is about; empty when the stage has one artifact per scene.
+    part: body (or figure) of the task; empty when the stage has one artifact per scene.
     run: ``"module:function"``, called as ``run(params, inputs, progress)``; see `execute`.
-    params: all that its result may depend on, as JSON, next to `inputs` and `files`.
-    files: every file that it opens, by the name that users know it by: its content counts, its path does not.
-    context: what the function is given as well, and its result must not show: where files lie, names for messages.
-    inputs: tasks whose artifact ``nc`` it is given, by name.
-    modules: modules that it reaches by a name in `params`, next to those it imports.
-    met: modules that it reaches only if it meets what they are for (`encounters`), by the name of that.
-    folder: where its files are shown, below the results folder; empty: nowhere.
+    params: all that the result may depend on, as JSON, besides `inputs` and `files`.
+    files: every file that the function opens, by its name for users: its content counts, its path does not.
+    context: further arguments that must not affect the result: paths of files, names for messages.
+    inputs: tasks whose artifact ``nc`` the function receives, by name.
+    modules: modules that it reaches by a name in `params`, besides its imports.
+    met: modules that it reaches only if it meets an event (`encounters`), by the name of the event.
+    folder: folder where its files are shown, below the results folder; empty: nowhere.
     names: file of the artifact -> name shown there; a file that is not listed keeps its name.
-    exclusive: whether nothing else may run next to it (measurements of time).
+    exclusive: whether no other task may run at the same time (measurements of time).
     """
 
     stage: str
@@ -62,7 +62,7 @@ class Task:
     files: Mapping[str, Path] = field(default_factory=dict)
 
     def roots(self, met: Iterable[str] | None = None) -> tuple[str, ...]:
-        """Modules by which it reaches all others, if it meets what is named, or by default all that it may."""
+        """Return the modules from which it reaches all others if it meets the named events, by default all."""
         names = self.met if met is None else met
         return (self.run.partition(":")[0], *self.modules, *(module for name in names for module in self.met[name]))
 
@@ -73,7 +73,7 @@ class Task:
 
 
 def in_order(tasks: list[Task]) -> list[Task]:
-    """`tasks` and all their inputs, each once, inputs first."""
+    """Return `tasks` and all their inputs, each once, inputs first."""
     ordered: dict[Task, None] = {}
 
     def visit(task: Task) -> None:
@@ -87,10 +87,10 @@ def in_order(tasks: list[Task]) -> list[Task]:
 
 
 def facts(task: Task, digests: Mapping[str, str], sources: Sources, met: Iterable[str] | None = None) -> dict[str, str]:
-    """Everything that decides the artifact, in words: kind and name -> value.
+    """Return everything that decides the artifact, in words: kind and name -> value.
 
-    digests: digest of each input that is known; leave one out to compare the rest.  met: names in `Task.met` of what
-    was met; all by default.
+    digests: digest of each known input; leave one out to compare the rest. met: names in `Task.met` of the events that
+    were met; default: all.
     """
     result = {f"parameter {name}": value for name, value in flatten(task.params)}
     result |= {f"input {name}": digest for name, digest in digests.items()}
@@ -100,12 +100,12 @@ def facts(task: Task, digests: Mapping[str, str], sources: Sources, met: Iterabl
 
 
 def contents(task: Task) -> dict[str, str]:
-    """The facts of the files that a task opens, as they are now."""
+    """Return the facts of the files that a task opens, in their current state."""
     return {f"file {name}": _digest(path) for name, path in sorted(task.files.items())}
 
 
 def _digest(path: Path) -> str:
-    """The sha256 of a file; of what is not there, or no file, a word instead: its reader refuses it."""
+    """Return the SHA-256 digest of a file; "absent" for a missing or special file, which its reader refuses."""
     try:
         return digest_of(path)
     except (OSError, ValueError):
@@ -113,16 +113,16 @@ def _digest(path: Path) -> str:
 
 
 def key(task_facts: Mapping[str, str]) -> str:
-    """Name of the artifact in the cache: sha256 of the facts, 32 hexadecimal digits."""
+    """Return the name of the artifact in the cache: SHA-256 digest of the facts, 32 hexadecimal digits."""
     text = json.dumps(task_facts, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
-    """Dotted path -> canonical text of every leaf of a JSON tree; floats by repr.
+    """Return key path and canonical text of every leaf of a JSON tree; floats by repr.
 
-    Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
-    date or a nan that somebody wrote into a recipe) is stored as text; the stage will refuse it.
+    Empty tables and lists are leaves, so that adding an empty one is noticed. Values that JSON does not have (a date or
+    a nan in a recipe) are stored as text; the stage will refuse them.
     """
     if isinstance(node, Mapping) and node:
         below = [(str(name), value) for name, value in node.items()]
@@ -134,10 +134,10 @@ def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
 
 
 def reasons(new: Mapping[str, str], last: Mapping[str, str] | None, unknown: frozenset[str] = frozenset()) -> list[str]:
-    """Why to run again, in words; empty when nothing changed.
+    """Return the reasons to run again, in words; empty when nothing changed.
 
-    last: facts of the artifact made last, None when there is none.
-    unknown: inputs (by name) that will themselves be made again; they are not compared.
+    last: facts of the last artifact, None when there is none. unknown: names of inputs that will themselves be made
+    again; they are not compared.
     """
     if last is None:
         return ["never run"]

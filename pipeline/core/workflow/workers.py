@@ -1,7 +1,7 @@
-"""Worker processes of this machine: spawned, ended with their parent, deaf to Ctrl-C, which is left to the parent.
+"""Worker processes of this machine: spawned, ended with their parent; Ctrl-C is left to the parent.
 
-`concurrent.futures` starts them and hands out the work. Own is what asks them to stop in good order: without it each
-would lose what it has computed since it was last written, up to `journal.WRITING_INTERVAL`.
+`concurrent.futures` starts them and distributes the work. This module adds the request to stop in good order: without
+it each worker would lose all results since its last writing, up to `journal.WRITING_INTERVAL`.
 """
 
 from __future__ import annotations
@@ -23,41 +23,41 @@ if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
 
-#: what is said of a helper that somebody has killed
+#: message about a worker process that was killed
 LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
 
 
 @dataclass(frozen=True)
 class Channel:
-    """What the workers of a pool share with their parent: the request to stop and its reason, and their progress.
+    """Data shared by the workers of a pool and their parent: the request to stop with its reason, and progress.
 
-    deaf: how many have a task that cannot leave anything in good order.  reports: arguments of `Monitor.update`; a
-    queue without a process or a thread of its own, whose writers wait while it is full.
+    unstoppable: number of workers whose task cannot stop in good order. reports: arguments of `Monitor.update`; a queue
+    without a process or thread of its own, whose writers wait while it is full.
     """
 
     stop: Any
     why: Any
-    deaf: Any
+    unstoppable: Any
     reports: Any
 
     @staticmethod
     def made() -> Channel:
-        """A channel for the workers of one pool."""
+        """Create a channel for the workers of one pool."""
         context = _context()
         return Channel(context.Event(), context.Array("c", 1000), context.Value("i", 0), context.SimpleQueue())
 
     def request_stop(self, why: str) -> None:
-        """Ask all workers."""
+        """Ask all workers to stop."""
         self.why.value = why.encode()[:999]
         self.stop.set()
 
-    def count_deaf(self) -> None:
-        """In a worker: one more."""
-        with self.deaf.get_lock():
-            self.deaf.value += 1
+    def count_unstoppable(self) -> None:
+        """Count this worker as one whose task does not heed requests."""
+        with self.unstoppable.get_lock():
+            self.unstoppable.value += 1
 
     def received(self) -> list[Any]:
-        """In the parent: what workers have reported since it was last asked."""
+        """Return, in the parent, the reports of workers since the last call."""
         news = []
         while not self.reports.empty():
             news.append(self.reports.get())
@@ -65,29 +65,29 @@ class Channel:
 
 
 def pool(width: int, channel: Channel | None = None) -> ProcessPoolExecutor:
-    """That many workers at most; spawned, because compiled kernels and forks do not mix."""
-    # imported here, because a run that finds everything fresh must start quickly
+    """Return a pool of at most `width` workers; spawned, because compiled kernels and forks do not mix."""
+    # imported here, because a command whose results are all up to date must start quickly
     from concurrent.futures import ProcessPoolExecutor
 
     return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(channel,))
 
 
-#: in a worker: that of its pool
+#: in a worker: the channel of its pool
 _channel: Channel | None = None
 
 
 def _begin(channel: Channel | None) -> None:
-    """In a worker: end when its parent does; Ctrl-C is left to that."""
+    """Prepare a worker: it ends with its parent, and ignores Ctrl-C, which the parent handles."""
     global _channel
     _channel = channel
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch, daemon=True).start()
     if channel is not None:
-        stopping.obey(channel.stop.wait, lambda: channel.why.value.decode(errors="replace"), channel.count_deaf)
+        stopping.obey(channel.stop.wait, lambda: channel.why.value.decode(errors="replace"), channel.count_unstoppable)
 
 
 def report(name: str, fraction: float | None, text: str) -> None:
-    """In a worker: how far the task of this name is, for its parent."""
+    """Report from a worker to its parent how far the task of this name is."""
     if _channel is not None:
         _channel.reports.put((name, fraction, text))
 
@@ -108,7 +108,7 @@ def _context() -> Any:
 
 
 def kill(workers: ProcessPoolExecutor) -> None:
-    """End the workers at once; a compiled kernel does not listen to interrupts."""
+    """End the workers at once; a compiled kernel does not react to interrupts."""
     for process in list((workers._processes or {}).values()):
         process.kill()
     workers.shutdown(wait=False, cancel_futures=True)
@@ -116,7 +116,7 @@ def kill(workers: ProcessPoolExecutor) -> None:
 
 @contextmanager
 def lost() -> Iterator[None]:
-    """Meanwhile a helper process that somebody kills, as the system does where memory is full, is a limit in words."""
+    """Convert the loss of a worker process, which the system may kill when memory is full, to a ResourceError."""
     from concurrent.futures.process import BrokenProcessPool
 
     try:
@@ -127,51 +127,51 @@ def lost() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Team:
-    """Workers, each started when there is something for it to do, and what they share with their parent."""
+    """Workers, each started when it is first needed, and the channel that they share with their parent."""
 
     width: int
     pool: ProcessPoolExecutor
     channel: Channel
 
 
-#: the idle team, stored for the next call
+#: the idle team, held for the next call
 _idle: list[Team] = []
-_keeping = 0
+_reusing = 0
 
 
 @contextmanager
 def reused() -> Iterator[None]:
-    """Meanwhile workers are not let go between one call of `team` and the next: starting and importing take a second.
+    """Keep workers alive between calls of `team` inside this context: starting and importing take a second.
 
-    They have the environment of when they were started, so this is for one command.
+    Workers have the environment of their start, so a context is for one command.
     """
-    global _keeping
-    _keeping += 1
+    global _reusing
+    _reusing += 1
     try:
         yield
     finally:
-        _keeping -= 1
-        while _idle and not _keeping:
+        _reusing -= 1
+        while _idle and not _reusing:
             _idle.pop().pool.shutdown()
 
 
 @contextmanager
 def team(width: int) -> Iterator[Team]:
-    """Workers, that many at least; killed where the block fails, or ends because all is to stop."""
+    """Yield at least `width` workers; they are killed where the block fails or the work must stop."""
     with ExitStack() as stack:
         while _idle and _idle[-1].width < width:
             _idle.pop().pool.shutdown()
-        # a reused one may serve a wider call next; who is never needed is never started
-        mine = _idle.pop() if _idle else _team(max(width, cores.cores()) if _keeping else width)
-        stack.callback(kill, mine.pool)
-        mine.channel.received()  # of the last call
-        yield mine
+        # a team for reuse may serve a wider call later; workers that are never needed are never started
+        current = _idle.pop() if _idle else _team(max(width, cores.cores()) if _reusing else width)
+        stack.callback(kill, current.pool)
+        current.channel.received()  # discards reports of the last call
+        yield current
         if not stopping.requested():
             stack.pop_all()
-            if _keeping:
-                _idle.append(mine)
+            if _reusing:
+                _idle.append(current)
             else:
-                mine.pool.shutdown()
+                current.pool.shutdown()
 
 
 def _team(width: int) -> Team:
@@ -181,7 +181,7 @@ def _team(width: int) -> Team:
 
 @contextmanager
 def without_main() -> Iterator[None]:
-    """Workers that are started meanwhile do not run the caller's script again from its top, as they would else."""
+    """Prevent workers started inside this context from running the caller's script again."""
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     try:

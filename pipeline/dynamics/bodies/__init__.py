@@ -1,1 +1,1 @@
-"""Inertia of the bodies: rigid ones in `rigid`, modally reduced ones in `flexible`."""
+"""Inertia of the bodies: rigid bodies in `rigid`, modally reduced bodies in `flexible`."""

@@ -1,6 +1,6 @@
-r"""A modally reduced body in the floating frame of reference, no coupling term dropped.
+r"""A modally reduced body in the floating frame of reference, without neglected coupling terms.
 
-A point is at ``r = X + S q`` in the body frame. Everything the equations need follows from two
+A point is at ``r = X + S q`` in the body frame. All terms of the equations follow from two
 families of vectors that are linear in the state, with the invariants of the bundle,
 
 .. math:: P_{kl} = \int\rho\, r_k S_l = E_{kl} + F_{kl} q, \qquad V_{kl} = \int\rho\, \dot r_k S_l = F_{kl}\dot q
@@ -48,7 +48,7 @@ from flexclear.pipeline.dynamics.vectors import (
 
 @kernel
 def straight(d, k, j, vector, first):
-    """Bending shortens nothing: linear shapes."""
+    """Return 0: shapes are linear, bending does not shorten the body."""
     return 0.0
 
 
@@ -56,7 +56,7 @@ LINEAR = SimpleNamespace(first_moment=straight, second_moment=straight, at_port=
 
 
 def of_each(body: Callable) -> Callable:
-    """The kernel that applies body(d, k) to every flexible body k."""
+    """Return the kernel that applies body(d, k) to every flexible body k."""
 
     @kernel
     def bodies(d):
@@ -67,8 +67,8 @@ def of_each(body: Callable) -> Callable:
 
 
 def flexible_bodies(shortening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]:
-    """What makes the kernels of bodies with linear shapes, or with those that bending shortens
-    (`effects.stiffening.bodies`): of what factors the mass matrix, the module `articulated` or `composite`."""
+    """Return the factory of the kernels of flexible bodies; its argument is the mass matrix module, `articulated` or
+    `composite`. `shortening`: linear shapes, or those that bending shortens (`effects.stiffening.bodies`)."""
     return partial(_flexible_bodies, shortening)
 
 
@@ -80,7 +80,7 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
 
     @kernel
     def invariants(d, k):
-        """Fill MODAL with P (first 9 n) and V (next 9 n), row (3k + l) holding n values."""
+        """Fill MODAL with P (first 9 n) and V (next 9 n); row (3k + l) holds n values."""
         body = d.flexes[k]
         n, e = body.n_modes, body.moment0
         for row in range(9 * n):
@@ -100,14 +100,14 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
 
     @kernel
     def shape(d, k, j):
-        """First moment of mode j's displacement per unit rate: int rho S_j, and what shortening adds."""
+        """Return the first moment of mode j's displacement per unit rate: int rho S_j, plus the part of shortening."""
         body = d.flexes[k]
         C = of_mode(d.flex_data, body.data0, body.n_modes, j)
         return (C[0] + first_moment(d, k, j, d.x, body.q0), C[1], C[2])
 
     @kernel
     def sums(d, k):
-        """First moment and its rate; into SCRATCH the second moment and D (after `invariants`)."""
+        """Return the first moment and its rate; store the second moment and D in SCRATCH (after `invariants`)."""
         body, numbers = d.flexes[k], d.flex_numbers[k]
         n = body.n_modes
         c, v = numbers.first_moment, ZERO
@@ -129,7 +129,7 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
 
     @kernel
     def modes(d, k, a, alpha, omega):
-        """Inertial forces on the modes, and int rho r x S_j of each, into MODAL, as eigenmodes.
+        """Store the inertial forces on the modes, and int rho r x S_j of each, in MODAL, for eigenmodes.
 
         Source: Wang & Wang (2019), eqs. (9), (14), (15).
         """
@@ -148,9 +148,9 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
 
     @kernel
     def shapes(d, k, R, p, moment, force):
-        """Forces on the shapes of the interface basis, and the momentum that each one's rate carries.
+        """Store the forces on the shapes of the interface basis, and the momentum per rate of each shape.
 
-        moment, force: that the body needs without modal accelerations, about what it is p from.
+        moment, force: wrench that the body needs without modal accelerations, about its reference point; p: from there.
         """
         body = d.flexes[k]
         n, c0, bias = body.n_modes, body.c0, 18 * body.n_modes
@@ -169,9 +169,9 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
 
     @kernel
     def body_inertia(d, k):
-        """Spatial inertia, wrench, modal forces and modal momenta of flexible body k.
+        """Store spatial inertia, wrench, modal forces and modal momenta of flexible body k.
 
-        As `rigid.inertia`, with the modal accelerations taken as zero; `modal_inertia` adds theirs.
+        Like `rigid.inertia`, with zero modal accelerations; `modal_inertia` adds their part.
         Source: Wang & Wang (2019), eqs. (9), (14), (15).
         """
         body, mass = d.flexes[k], d.flex_numbers[k].mass
@@ -184,7 +184,7 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
         force = add(scale(mass, a), cross(alpha, first))
         force = add(force, cross(omega, add(cross(omega, first), scale(2.0, first_rate))))
         for j in range(body.n_modes):
-            # a point that bending draws in is accelerated also at constant modal rates
+            # shortening accelerates points along x also at constant modal rates
             force = add(force, (d.u[body.c0 + j] * first_moment(d, k, j, d.u, body.c0), 0.0, 0.0))
         moment = add(cross(first, a), turn_symmetric(J, alpha))
         moment = add(moment, cross(omega, turn_symmetric(J, omega)))
@@ -200,17 +200,17 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
 
     @kernel
     def body_modal_inertia(d, k):
-        """Add what the modal accelerations in DU demand to the wrench on the body's link (right after `inertia`)."""
+        """Add the effect of the modal accelerations in DU to the wrench on the body's link (right after `inertia`)."""
         body = d.flexes[k]
         for j in range(body.c0, body.c0 + body.n_modes):
-            # not that of the body frame, which such shapes move: it is in the frame's own acceleration
+            # the part of the body frame, which such shapes move, is in the frame's own acceleration
             angular = d.deformation[j].angular if body.inboard else d.momenta[j].angular
             linear = d.deformation[j].linear if body.inboard else d.momenta[j].linear
             add_wrench(d.wrench[body.link], scale(d.du[j], angular), scale(d.du[j], linear))
 
     @kernel
     def body_energies(d, k):
-        """Kinetic and elastic energy [J] of flexible body k."""
+        """Return kinetic and elastic energy [J] of flexible body k."""
         body = d.flexes[k]
         n, frame = body.n_modes, d.link_frames[body.link]
         invariants(d, k)

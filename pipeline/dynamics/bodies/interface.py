@@ -1,13 +1,13 @@
-r"""The interface basis of a flexible body: where the equations have its modes, while the state has eigenmodes.
+r"""The interface basis of a flexible body, in which the equations use its modes; the state keeps eigenmodes.
 
-Most combinations of many modes move none of the frames by which a body is held and loaded. With an orthogonal T,
+Most combinations of many modes move none of the frames where a body is held and loaded. With an orthogonal T,
 :math:`q = T\,p`, the coordinates p come in two kinds: first those of held shapes, which leave every such frame at rest,
-then those of the few moving shapes. Modal masses are one, so that T leaves them so, and held shapes share no entry of
-the mass matrix with each other nor with what the body carries: eliminated first, they cost as much as there are of
-them. An orthogonal change of coordinates loses no digits, however heavy what is carried.
+then those of the few moving shapes. T keeps the modal masses at one. The mass matrix does not couple held shapes
+with each other nor with the bodies that the body carries: eliminated first, they cost in proportion to their
+number. An orthogonal change of coordinates loses no digits, however heavy the carried bodies.
 
 The state keeps eigenmodes, whose stiffness and damping are diagonal. Forces and momenta are taken to the interface
-basis after they have been found, accelerations back from there.
+basis after their evaluation, accelerations back to eigenmodes.
 
 Source: Craig & Bampton (1968), AIAA Journal 6, 1313-1319 (held shapes are fixed-interface modes).
 """
@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, scale
 
 @kernel
 def in_interface(d, k, source, out):
-    """T^T of body k: what w holds of each mode from `source` on, of each shape from `out` on."""
+    """Apply T^T of body k: values of its modes in w, from `source` on, give values of its shapes, from `out` on."""
     body = d.flexes[k]
     e, end = body.basis0, body.basis0 + body.n_basis
     for j in range(body.n_modes):
@@ -35,7 +35,7 @@ def in_interface(d, k, source, out):
 
 @kernel
 def all_in_interface(d, k, source, out, more):
-    """The same of four times as much: what is from `source` on goes to `out`, the three after it from `more` on."""
+    """Apply `in_interface` to four arrays: the first from `source` to `out`, the next three from there to `more`."""
     body = d.flexes[k]
     n, e, end = body.n_modes, body.basis0, body.basis0 + body.n_basis
     for j in range(n):
@@ -50,7 +50,7 @@ def all_in_interface(d, k, source, out, more):
 
 @kernel
 def in_modes(d, k, source, out):
-    """T of body k: what w holds of each shape from `source` on, of each mode from `out` on."""
+    """Apply T of body k: values of its shapes in w, from `source` on, give values of its modes, from `out` on."""
     body = d.flexes[k]
     for i in range(body.n_modes):
         d.w[out + i] = 0.0
@@ -61,7 +61,7 @@ def in_modes(d, k, source, out):
 
 @kernel
 def deform(d):
-    """Coordinates of the moving shapes and their rates, INTERFACE_X and INTERFACE_U, from X and U."""
+    """Compute INTERFACE_X and INTERFACE_U, coordinates and rates of the moving shapes, from X and U."""
     for k in range(d.n_flex):
         body = d.flexes[k]
         e, end = body.moving0, body.basis0 + body.n_basis
@@ -76,7 +76,7 @@ def deform(d):
 
 
 def _in_place(changed: Callable) -> Callable:
-    """Return the kernel that applies another one, which changes the basis, to what w holds of each coordinate."""
+    """Return the kernel that applies the change of basis `changed` in place, to the values of all modes in w."""
 
     @kernel
     def change(d, b):
@@ -89,13 +89,13 @@ def _in_place(changed: Callable) -> Callable:
     return change
 
 
-#: kernels (d, b): what w holds of each coordinate from place b on, from one basis of the modes to the other
+#: kernels (d, b) that change the values of all coordinates in w, from index b on, to the other basis of the modes
 to_interface, to_modes = _in_place(in_interface), _in_place(in_modes)
 
 
 @kernel
 def modal_rates(d, dy):
-    """Accelerations of the eigenmodes into the rates dy of the state, from DU."""
+    """Store the accelerations of the eigenmodes, from DU, in the rates dy of the state."""
     for k in range(d.n_flex):
         c0 = d.flexes[k].c0
         in_modes(d, k, d.at_du + c0, dy + d.nq + c0)

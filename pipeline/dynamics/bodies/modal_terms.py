@@ -1,4 +1,4 @@
-"""Parts of the equations of a flexible body that are the same whether bending shortens it or not."""
+"""Terms of the equations of a flexible body that do not depend on shortening by bending."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ RATE = 9  #: SCRATCH: second moment int rho r r^T (9), then D = int rho r rdot^T
 
 @kernel
 def of_mode(numbers, first, n, j):
-    """Column j of a 3 x n matrix, the values of a table from row `first` on."""
+    """Return column j of a 3 x n matrix, the values of a table from row `first` on."""
     return (numbers[first + j].value, numbers[first + n + j].value, numbers[first + 2 * n + j].value)
 
 
 @kernel
 def tensor(Q):
-    """Inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment at the start of a stretch."""
+    """Return the inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment at the start of Q."""
     return (Q[4] + Q[8], Q[0] + Q[8], Q[0] + Q[4], -Q[1], -Q[2], -Q[5])
 
 
 @kernel
 def spin(P, first, n, j):
-    """Antisymmetric part of column j of P (or V), from `first` on: int rho r x S_j (or rdot x S_j)."""
+    """Return the antisymmetric part of column j of P (or V), from `first` on: int rho r x S_j (or rdot x S_j)."""
     return (
         P[first + 5 * n + j] - P[first + 7 * n + j],
         P[first + 6 * n + j] - P[first + 2 * n + j],
@@ -57,7 +57,7 @@ def spatial(own, mass, p, c, J):
 
 @kernel
 def stiffness(d, k):
-    """Elastic and damping forces join those on the modes; the power lost to damping joins the ledger."""
+    """Add elastic and damping forces to those on the modes, and the power lost to damping to the ledger."""
     body = d.flexes[k]
     n = body.n_modes
     K, bias = body.data0 + 12 * n + n * n, 18 * n
@@ -70,18 +70,18 @@ def stiffness(d, k):
 
 
 def make_carrying(tree: Any) -> tuple[Callable, Callable]:
-    """The kernels carried(d, k, moment, force) and body_mass_matrix(d, k), about what `tree` refers inertia to."""
+    """Build carried(d, k, moment, force) and body_mass_matrix(d, k), about the reference point of `tree`."""
     column = tree.column
 
     @kernel
     def carried(d, k, moment, force):
-        """Shapes that also move the body frame: their columns carry the body's own wrench and inertia."""
+        """Add the body's own wrench and inertia to the columns of shapes that also move the body frame."""
         body = d.flexes[k]
         own = d.own[body.link]
         c, J, mass = own.moment, at6(own.inertia, 0), own.mass
         for j in range(body.c0, body.c0 + body.n_modes):
             momentum, deformation = d.momenta[j], d.deformation[j]
-            # momentum of the deformation alone stays for the mass matrix
+            # the mass matrix needs the momentum of the deformation alone
             deformation.angular, deformation.linear = momentum.angular, momentum.linear
             if j < body.c0 + body.n_held:
                 continue
@@ -91,7 +91,7 @@ def make_carrying(tree: Any) -> tuple[Callable, Callable]:
 
     @kernel
     def body_mass_matrix(d, k):
-        """Own part of the modal block of the mass matrix, into the envelope; right after `inertia`."""
+        """Add the body's own part of the modal block of the mass matrix to the envelope; right after `inertia`."""
         body = d.flexes[k]
         n, c0, held = body.n_modes, body.c0, body.n_held
         mass = body.interface0 + 3 * n
@@ -112,7 +112,7 @@ def make_carrying(tree: Any) -> tuple[Callable, Callable]:
 
 @kernel
 def port_load(d, i):
-    """A link on a flexible parent also loads the parent's moving shapes, through its port."""
+    """Add the load of link i on the moving shapes of its flexible parent, through the port."""
     p = d.links[i].carried_by
     if p < 0:
         return
@@ -127,7 +127,7 @@ def port_load(d, i):
 
 @kernel
 def modal_forces(d):
-    """Generalised forces of the modes."""
+    """Store the generalised forces of the modes."""
     for b in range(d.n_flex):
         body = d.flexes[b]
         for j in range(body.c0, body.c0 + body.n_modes):

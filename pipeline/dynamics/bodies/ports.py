@@ -1,7 +1,7 @@
-"""Frames on flexible bodies: deformation, its rates, and the twists that the moving shapes give them.
+"""Frames on flexible bodies: deformation, its rates, and the twist per rate of each moving shape.
 
-A frame turns by the rotation vector theta = Psi q and moves by Phi q; its rotation is exp(theta)
-in full, so that angular velocity and energy agree to rounding.
+A frame turns by the rotation vector theta = Psi q and moves by Phi q; its rotation is the full exp(theta),
+so that angular velocity and energy agree to rounding.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ from flexclear.pipeline.dynamics.vectors import (
 
 @kernel
 def moving(body):
-    """Number of moving shapes of a body, and the first of their coordinates."""
+    """Return the number of moving shapes of a body, and the index of the first of their coordinates."""
     return body.n_modes - body.n_held, body.c0 + body.n_held
 
 
 def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
-    """The kernels `site` and `inboard`; shortening(d, p, j, vector, first) is what bending adds along x, or zero.
+    """Build the kernels `site` and `inboard`; shortening(d, p, j, vector, first): shortening along x, or zero.
 
-    tree: what factors the mass matrix, and may need columns about the origin of their link.
+    tree: module that factors the mass matrix, and may need columns about the origin of their link.
     """
     localise_shape, shift = tree.localise_shape, tree.shift
 
     @kernel
     def relative_motion(d, p):
-        """Pose, twist and acceleration of port p's frame in the body frame, and its rotation vector theta.
+        """Return pose, twist and acceleration of port p's frame in the body frame, and its rotation vector theta.
 
+        All are in axes of the body frame.  The accelerations include the part of the known modal accelerations.
         Source: Wang & Wang (2019), eqs. (2), (7), (8).
-        Body components.  The accelerations hold what the known modal accelerations give.
         """
         port, undeformed = d.ports[p], d.port_numbers[p]
         n, c = moving(d.flexes[port.flex])
@@ -69,10 +69,10 @@ def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
 
     @kernel
     def modal_columns(d, p, R, origin, arm, theta, sign, first, base):
-        """Twist of port p's frame relative to the body, per rate of a moving shape, about the kernels' origin.
+        """Add the twist of port p's frame relative to the body, per rate of each moving shape, to columns.
 
-        Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port, which arm
-        leads to from the link's origin.  base: first of the columns to which they are added about that, or -1.
+        It is about the kernels' origin, times `sign`, from column `first` on.  R, origin: body axes, position of the
+        port; arm: to it from the link's origin.  base: first column about that origin to add them to, or -1.
         """
         port = d.ports[p]
         n, c = moving(d.flexes[port.flex])
@@ -87,7 +87,7 @@ def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
 
     @kernel
     def site(d, s):
-        """Motion of a site on a flexible link, and the columns of its port; the way to it from the link's origin."""
+        """Store motion and port columns of a site on a flexible link; return its arm from the link's origin."""
         p = d.sites[s].port
         port = d.ports[p]
         body = d.flexes[port.flex]
@@ -111,11 +111,11 @@ def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
 
     @kernel
     def inboard(d, i, origin, R, omega, v, alpha, a):
-        """From the inboard joint frame G, which the modes may move in the body, to the body frame."""
+        """Return the body frame's motion from that of the inboard joint frame G, which modes may move in the body."""
         p = d.links[i].inboard_port
         body = d.flexes[d.ports[p].flex]
         if body.inboard == 0:
-            # the reference condition holds this frame still in the body: a rigid step
+            # the reference condition holds this frame fixed in the body: a rigid step
             R_WB = product(R, transpose(d.port_numbers[p].axes))
             arm = turn(R_WB, d.port_numbers[p].origin)
             swing = cross(omega, arm)

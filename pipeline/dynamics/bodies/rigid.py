@@ -1,4 +1,4 @@
-"""Spatial inertia and inertial wrench of a rigid link, about the kernels' origin; what bodies without modes do."""
+"""Spatial inertia and inertial wrench of a rigid link; default kernels for scenes without flexible bodies."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ def _no_energy(d, component):
 
 @dataclass(frozen=True)
 class FlexibleBodies:
-    """Kernels of all flexible bodies; by default of none.
+    """Kernels of all flexible bodies; the defaults are for scenes without any.
 
-    deform(d): X and U in the interface basis, before all else.  site(d, s): of a frame on one; the way to it from the
+    deform(d): X and U to the interface basis, before all else.  site(d, s): motion of a frame, returns its arm from the
     link's origin.  inboard(d, i, ...): from the frame of a link's inboard joint to the link's own (see `ports`).
-    inertia(d): spatial inertias, wrenches and modal forces, modal accelerations taken as zero.
-    mass_matrix(d): modal blocks, right after it.  modal_inertia(d): what these add to the wrenches.  port_load(d, i): a
-    link on a flexible parent loads its moving shapes, too.  modal_forces(d): generalised forces of the modes.
-    modal_rates(d, dy): their accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
+    inertia(d): spatial inertias, wrenches and modal forces, for zero modal accelerations. mass_matrix(d): modal blocks,
+    right after `inertia`.  modal_inertia(d): part of the modal accelerations in the wrenches. port_load(d, i): load of
+    a link on moving shapes of its parent.  modal_forces(d): generalised forces of the modes. modal_rates(d, dy): modal
+    accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
     """
 
     deform: Callable = nothing
@@ -62,13 +62,13 @@ class FlexibleBodies:
 
 
 def all_rigid(tree: Any) -> FlexibleBodies:
-    """What makes the kernels of flexible bodies where there are none."""
+    """Return the kernels for scenes without flexible bodies."""
     return FlexibleBodies()
 
 
 @kernel
 def spatial(own, mass, c, J):
-    """Store the spatial inertia (a row of OWN) of a mass at c with inertia J about it, world axes."""
+    """Store the spatial inertia (a row of OWN) of a mass at c with inertia J about c, world axes."""
     x, y, z = c
     own.mass, own.moment = mass, scale(mass, c)
     own.inertia[0] = J[0] + mass * (y * y + z * z)
@@ -80,10 +80,10 @@ def spatial(own, mass, c, J):
 
 
 def make_inertia(tree: Any) -> Callable:
-    """The kernel inertia(d, i): spatial inertia of link i (OWN), and the wrench that its frame's accelerations need.
+    """Build inertia(d, i): spatial inertia of link i (OWN), and the wrench that its frame's accelerations need.
 
-    Both are about what `tree` refers them to: the kernels' origin, or the link's own, far from which they lose digits.
-    Gravity is an acceleration of the ground.
+    Both are about the reference point of `tree`: the kernels' origin, or the link's own, near which they keep digits.
+    Gravity enters as an acceleration of the ground.
     """
     origin, demand_of = tree.origin, tree.demand_of
 
@@ -104,7 +104,7 @@ def make_inertia(tree: Any) -> Callable:
 
 @kernel
 def kinetic_energy(d, i):
-    """Kinetic energy [J] of a rigid link."""
+    """Return the kinetic energy [J] of a rigid link."""
     frame, link = d.link_frames[i], d.link_numbers[i]
     R, omega = frame.axes, frame.omega
     v = add(frame.velocity, cross(omega, turn(R, link.com)))
@@ -114,7 +114,7 @@ def kinetic_energy(d, i):
 
 @kernel
 def carry(d, i, k):
-    """Store the momentum of the subtree of link i moving with column k."""
+    """Store the momentum of the subtree of link i that moves with column k."""
     tree, column, momentum = d.inertia[i], d.columns[k], d.momenta[k]
     omega, v, c = column.angular, column.linear, tree.moment
     momentum.angular = add(turn_symmetric(at6(tree.inertia, 0), omega), cross(c, v))
@@ -123,7 +123,7 @@ def carry(d, i, k):
 
 @kernel
 def apply_wrench(d, s, moment, force):
-    """Apply a wrench (moment about the kernels' origin, force; world) on the link, and its modes, of site s."""
+    """Apply a wrench (moment about the kernels' origin, force; world) to the link of site s, and to its modes."""
     site = d.sites[s]
     add_wrench(d.wrench[site.link], scale(-1.0, moment), scale(-1.0, force))
     if site.port >= 0:
@@ -136,6 +136,6 @@ def apply_wrench(d, s, moment, force):
 
 @kernel
 def apply_between(d, a, b, moment, force):
-    """Apply a wrench as above on site b, and against it on site a."""
+    """Apply a wrench (as in `apply_wrench`) to site b, and the opposite wrench to site a."""
     apply_wrench(d, b, moment, force)
     apply_wrench(d, a, scale(-1.0, moment), scale(-1.0, force))

@@ -1,1 +1,1 @@
-"""The compiled functions of a mechanism, composed of the kernels of the parts present."""
+"""Compiled functions of a mechanism, composed of the kernels of its parts."""

@@ -1,8 +1,8 @@
-"""Calls between functions that are compiled separately, each once, through addresses in the header of h.
+"""Calls between separately compiled functions through addresses in the header of h.
 
-A right-hand side that is composed into its integrator is optimised again in every function between
-the two, and every mechanism needs an integrator of its own. Called by its address it is compiled
-once, and so is the integrator, for all mechanisms. A call costs some nanoseconds.
+A right-hand side composed into its integrator is optimised again in every function between the two, and every mechanism
+needs an integrator of its own. Called by its address it is compiled once, and so is the integrator, for all mechanisms.
+A call costs some nanoseconds.
 """
 
 from __future__ import annotations
@@ -20,14 +20,13 @@ from flexclear.pipeline.dynamics.compile.files import SIGNATURES, compiles, inte
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, lowering
 
-#: of arguments, as Numba has them (`files.SIGNATURES`)
+#: Numba's types of the arguments in `files.SIGNATURES`
 TYPES = {"I": types.CPointer(types.int64), "F": types.CPointer(types.float64), "i": types.int64, "f": types.float64}
 
 
 @intrinsic
 def call(typingctx: Any, address: Any, arguments: Any) -> Any:
-    """Integer that the C function at `address` returns for a tuple; of its arrays it gets the addresses of the first
-    entries."""
+    """Return the integer that the C function at `address` returns for a tuple; arrays are passed by address."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, arrays = values
@@ -44,7 +43,7 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 
 
 def exported(name: str) -> Callable[[Callable], int]:
-    """Decorator: compiles a C function; its address."""
+    """Return the decorator that compiles a C function and returns its address."""
     options: dict[str, Any] = {"error_model": "numpy"}
     if not INTERPRETED and lowering():
         options["pipeline_class"] = lowering().WholeCompiler
@@ -55,60 +54,60 @@ def exported(name: str) -> Callable[[Callable], int]:
 if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for addresses
 
     def call(address, arguments):
-        """What the function known by this number returns."""
+        """Return the result of the Python function with this number."""
         return interpreted[int(address)](*arguments)
 
     def carray(array, shape):
-        """Itself."""
+        """Return the array."""
         return array
 
 
 @kernel
 def evaluate(h, f, w, n, t, y, dy):
-    """The right-hand side: `equations.right_hand_side`."""
+    """Evaluate the right-hand side: `equations.right_hand_side`."""
     call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
 
 
 @kernel
 def laws(h, f, w, n, t):
-    """The laws of time: `equations.prescribed_motion`."""
+    """Evaluate the laws of time: `equations.prescribed_motion`."""
     call(h[m.PRESCRIBE], (h, f, w, n, float(t)))
 
 
 @kernel
 def describe(h, f, w, n):
-    """What is recorded of an evaluation: `equations.observation`."""
+    """Evaluate the recorded quantities: `equations.observation`."""
     call(h[m.DESCRIBE], (h, f, w, n))
 
 
 @kernel
 def rates(d, t, y, dy):
-    """The right-hand side of which steps need only the rates."""
+    """Evaluate the right-hand side for steps, which need only the rates."""
     call(d.h[m.RATES], (d.h, d.f, d.w, d.n, float(t), y, dy))
 
 
 @kernel
 def awaited(h, f, w, n):
-    """The rates that an attempt waits for: `integrate.method.await_rates`."""
+    """Evaluate the rates that an attempt waits for: `integrate.method.await_rates`."""
     d = data(h, f, w, n)
     rates(d, d.awaited_time, d.awaited, d.rates_in)
 
 
 @kernel
 def project(h, f, w, n, t, y, dy, tolerance):
-    """Back onto the closures: `equations.projection`."""
+    """Project a state onto the closures: `equations.projection`."""
     return call(h[m.PROJECT], (h, f, w, n, float(t), y, dy, tolerance))
 
 
 @kernel
 def retract(d, y, retractment, out, total):
-    """Positions after a retractment: `equations.retraction`."""
+    """Store the positions after a retractment: `equations.retraction`."""
     call(d.h[m.RETRACT], (d.h, d.f, d.w, d.n, y, retractment, out, total))
 
 
 @kernel
 def resolve(d, step, t_new, rows, events):
-    """The events of a step: `integrate.stepper.make_resolution`."""
+    """Locate the events of a step: `integrate.stepper.make_resolution`."""
     (count, width), (event_count, event_width) = rows.shape, events.shape
     record = (rows, count, width, events, event_count, event_width)
     happened = call(d.h[m.RESOLVE], (d.h, d.f, d.w, d.n, float(step), float(t_new), *record))

@@ -1,7 +1,7 @@
-"""A second process that compiles next to this one, into the same folder.
+"""A second process that compiles concurrently with this one, into the same folder.
 
-It is no worker: it takes files that nobody is compiling, and leaves their code on disk. Whatever becomes of it, this
-process compiles what is not there, and reports what cannot be compiled.
+It takes files that no process is compiling and writes their code to disk. If it fails, this process compiles the
+missing files, and reports files that cannot be compiled.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.workflow.cores import free
-from flexclear.pipeline.dynamics.compile.files import claimed, take
+from flexclear.pipeline.dynamics.compile.files import file_lock, load_file
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
 if TYPE_CHECKING:
@@ -32,30 +32,30 @@ work(sys.argv[2:])
 
 @contextmanager
 def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None]:
-    """Meanwhile a second process compiles the files, in this order; None where there is to be none.
+    """Run a second process that compiles the files, in this order; yield None where none is started.
 
-    There is at most one for a folder of kernels, whoever started it.
+    At most one runs per folder of kernels, whichever process started it.
     """
     with ExitStack() as stack:
         process = None
         if len(paths) > 1 and requested():
-            alone = stack.enter_context(claimed(paths[0].with_name("compiler"), wait=False))
+            alone = stack.enter_context(file_lock(paths[0].with_name("compiler"), wait=False))
             process = _start(paths) if alone else None
         if process is not None:
             stack.enter_context(process)  # waits for it, so that it is no zombie
-            stack.callback(process.kill)  # first: nothing is left to do, or this process was interrupted
+            stack.callback(process.kill)  # first: all is compiled, or this process was interrupted
         yield process
 
 
 def requested() -> bool:
-    """Whether a second process is of use, and can be started."""
+    """Return True when a second process is useful and can be started."""
     # a program packed into one file would start itself again
     startable = bool(sys.executable) and not getattr(sys, "frozen", False)
     return startable and not INTERPRETED and free()
 
 
 def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:
-    import subprocess  # here, since what finds all code on disk compiles nothing
+    import subprocess  # here: not needed when all code is on disk
 
     folders = json.dumps([str(folder) for folder in sys.path])
     try:
@@ -70,10 +70,10 @@ def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:
 
 
 def work(paths: list[str]) -> None:
-    """What the second process does."""
+    """Compile files as the second process."""
     threading.Thread(target=_follow_parent, daemon=True).start()
     for path in paths:
-        take(Path(path), lambda _: None)
+        load_file(Path(path), lambda _: None)
 
 
 def _follow_parent() -> None:

@@ -1,9 +1,8 @@
-"""Generated files, brought: the function of each is compiled, or its code is fetched from disk.
+"""Loading of generated files: the function of each is compiled, or its code is read from disk.
 
-To load what was compiled is to run it, so it is loaded only if source and code have the digests that were noted when
-it was made. What is damaged, half written or cannot be loaded is set aside and compiled again. A file belongs to
-whoever holds its lock, so that no two processes compile the same. The second process (`compiler_process`) imports this
-module and little else.
+Loading compiled code means running it, so code is loaded only if source and code have the digests noted when the code
+was compiled. Damaged, incomplete or unloadable code is removed and compiled again. A lock per file ensures that no two
+processes compile the same file. The second process (`compiler_process`) imports this module and little else.
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ from flexclear.pipeline.dynamics.compile import machine_code
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 
-#: receives the file that has to be compiled, or waited for
-Tell = Callable[[Path], None]
-#: functions of this process by the name of their file
+#: receives the file that has to be compiled, or that another process compiles
+Report = Callable[[Path], None]
+#: functions loaded in this process, by the name of their file
 loaded: dict[str, machine_code.Code] = {}
-#: functions of Python by their numbers, where nothing is compiled
+#: Python functions by their numbers, where nothing is compiled
 interpreted: dict[int, Callable] = {}
-CODE = ".code"  #: what was compiled of a file
+CODE = ".code"  #: suffix of the compiled code of a file
 #: arguments of compiled functions, which return an integer: pointers to integers (I) and floats (F), an integer (i), a
 #: float (f).  After h, f, w, n: t, y, dy, and a tolerance; y, retractment, out, total; t; nothing; rows and pieces with
 #: their shapes, tolerance, out with its length; t, repeat, outputs with their number, rows, events; step, t_new, rows,
@@ -47,78 +46,77 @@ SIGNATURES = {
 }
 
 
-def bring(paths: list[Path], tell: Tell) -> None:
-    """Load files, compiling them in this order; those that another process is compiling come last."""
+def load_files(paths: list[Path], report: Report) -> None:
+    """Load files, compiling them in this order; files that another process is compiling come last."""
     left = list(paths)
     while left:
-        path = next((path for path in left if take(path, tell)), None)
+        path = next((path for path in left if load_file(path, report)), None)
         if path is None:
             path = left[0]
-            tell(path)
-            take(path, lambda _: None, wait=True)
+            report(path)
+            load_file(path, lambda _: None, wait=True)
         left.remove(path)
 
 
-def take(path: Path, tell: Tell, *, wait: bool = False) -> bool:
-    """Load a file; False, and nothing done, when another process has its lock and it is not to be waited for."""
-    if _fetched(path):
+def load_file(path: Path, report: Report, *, wait: bool = False) -> bool:
+    """Load a file and return True; return False when another process has its lock and `wait` is False."""
+    if _load_stored(path):
         return True
-    with claimed(path, wait=wait) as mine:
-        if mine and not _fetched(path):
-            tell(path)
-            set_aside(path)
+    with file_lock(path, wait=wait) as mine:
+        if mine and not _load_stored(path):
+            report(path)
+            remove_code(path)
             _compile(path)
     return mine
 
 
 def compiled(path: Path) -> bool:
-    """Whether the code of a file is on disk, every byte as it was written."""
+    """Return True when the code of a file is on disk and undamaged."""
     noted = read_checked(path.with_suffix(".sum"))
     return noted is not None and noted == _digests(path)
 
 
-def set_aside(path: Path) -> None:
-    """Remove what was compiled of a file."""
+def remove_code(path: Path) -> None:
+    """Remove the compiled code of a file."""
     for suffix in (".sum", CODE):
         path.with_suffix(suffix).unlink(missing_ok=True)
 
 
-def _fetched(path: Path) -> bool:
-    """Load a file whose code is on disk; False when it is not, or cannot be loaded for whatever reason."""
+def _load_stored(path: Path) -> bool:
+    """Load a file whose code is on disk; return False when the code is missing or cannot be loaded."""
     if INTERPRETED or not compiled(path):
         return False
     try:
-        # another thread may have loaded it meanwhile, and be in it
+        # another thread may have loaded the same code and be running it
         loaded.setdefault(path.stem, machine_code.load(path.with_suffix(CODE).read_bytes()))
     except Exception:
         return False
     with contextlib.suppress(OSError):
-        os.utime(path.with_suffix(".sum"))  # used: not to be pruned
+        os.utime(path.with_suffix(".sum"))  # marks it as used, against pruning
     return True
 
 
-def of_another_build(path: Path) -> bool:
-    """Whether what was compiled of a file is kept as another build of the program does: it is whole, and not used."""
+def stored_by_another_build(path: Path) -> bool:
+    """Return True when a file's code is undamaged but stored as by another build of the program, and so unused."""
     noted = read_checked(path.with_suffix(".sum"))
     return noted is not None and set(noted) != {path.name, path.with_suffix(CODE).name}
 
 
 def _digests(path: Path) -> dict[str, str]:
-    """Of the source and of the code that was made of it, by name."""
+    """Return the digests of source and compiled code, those that exist, by file name."""
     there = (file for file in (path, path.with_suffix(CODE)) if file.is_file())
     return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in there}
 
 
-def claimed(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
-    """Whether this process has the lock next to a file, which ends with it; of two the second waits, or goes
-    without."""
+def file_lock(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
+    """Return a context: True when this process has the lock next to a file, which ends with it; wait: for another's."""
     return locked(path.with_suffix(".lock"), wait=wait)
 
 
 def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
-    """Decorator of the function of a generated file: it is compiled at once; its address.
+    """Return the decorator of a generated file's function, which compiles it at once and returns the address.
 
-    compiler: what makes a C function of it (`numba.cfunc`).
+    compiler: returns a C function (`numba.cfunc`).
     """
 
     def compiled_function(function: Callable) -> int:
@@ -135,9 +133,9 @@ def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
 
 
 def assembles(name: str, function: str, code: Callable[[], str], level: int) -> None:
-    """Make the function of a generated file of LLVM's text for it; there is none where that is not suited.
+    """Load the function of a generated file from LLVM code; without code (UnsuitedError) the address is 0.
 
-    name: of the file.  level: as of `machine_code.assembled`.
+    name: of the file.  code: returns the LLVM code.  level: as in `machine_code.assembled`.
     """
     try:
         image = machine_code.stored(function, *machine_code.assembled(code(), level, optimised=False))
@@ -147,25 +145,25 @@ def assembles(name: str, function: str, code: Callable[[], str], level: int) -> 
 
 
 def _compile(path: Path) -> None:
-    """Compile a file and leave its code on disk."""
+    """Compile a file and write its code to disk."""
     try:
         with _without_collector():
-            # the source itself: Python would keep bytecode of it, and take that without looking
+            # compile the source itself: Python would cache bytecode and load that without checking
             exec(compile(path.read_bytes(), str(path), "exec"), {"__name__": path.stem, "__file__": str(path)})
         if not INTERPRETED:
             made = loaded[path.stem]
             publish(path.with_suffix(CODE), made.image or machine_code.image(made.keeper))
             publish(path.with_suffix(".sum"), checked(_digests(path)))
-    except BaseException:  # interrupted, or no room on the disk: not to be taken for whole later
+    except BaseException:  # interrupted, or disk full: the code is incomplete
         loaded.pop(path.stem, None)
         raise
 
 
 @contextlib.contextmanager
 def _without_collector() -> Iterator[None]:
-    """Meanwhile no cycles are collected: all that a compiler makes is in use to its end.
+    """Switch off garbage collection: the compiler uses all its objects to the end.
 
-    It saves a seventh of the time and takes some 120 MiB more at the most.
+    This saves a seventh of the time and takes at most some 120 MiB more memory.
     """
     collects = gc.isenabled()
     gc.disable()
@@ -173,8 +171,8 @@ def _without_collector() -> Iterator[None]:
         yield
     finally:
         if collects:
-            if not gc.get_freeze_count():  # what somebody else has put aside stays there
-                # old at once: to look through what was made took a third of a second after each file
+            if not gc.get_freeze_count():  # objects that another caller froze stay frozen
+                # makes new objects old: a collection that examines them took a third of a second after each file
                 gc.freeze()
                 gc.unfreeze()
             gc.enable()

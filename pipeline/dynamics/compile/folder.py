@@ -1,6 +1,6 @@
-"""The folder of compiled kernels: whose it is, for which processor, and how its size is limited.
+"""Folder of compiled kernels: its owner, its processor, and the limit of its size.
 
-To load a kernel is to run code, so a folder in which anybody else could write is refused.
+Loading a kernel runs code, so a folder in which other users could write is refused.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from tempfile import TemporaryDirectory
 from flexclear.pipeline.core.artifacts.disk import sweep
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.platforms import others_can_write
-from flexclear.pipeline.dynamics.compile.files import CODE, claimed, set_aside
+from flexclear.pipeline.dynamics.compile.files import CODE, file_lock, remove_code
 
-#: kernels that nobody fetched for so long are removed [s], and the oldest ones beyond so many bytes
+#: kernels unused for this time [s] are removed, and the least recently used ones beyond this many bytes
 UNUSED, LARGEST = 90 * 86400.0, 2 << 30
 
 
-def writable(root: Path, tell: Callable[[str], None]) -> Path:
-    """The folder for this processor below `root`; where it cannot be written, one that lasts as long as this process.
+def writable(root: Path, report: Callable[[str], None]) -> Path:
+    """Return the folder for this processor below `root`; if it cannot be written, a temporary one of this process.
 
-    Raises InputError when others could write there.
+    Raises InputError when other users could write there.
     """
     folder = root / processor()
     try:
@@ -34,14 +34,14 @@ def writable(root: Path, tell: Callable[[str], None]) -> Path:
     except OSError as error:
         problem = error.strerror or str(error)
     if problem:
-        tell(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
+        report(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
         return Path(_temporary().name)
     refuse_shared(folder)
     return folder
 
 
 def refuse_shared(folder: Path) -> None:
-    """InputError when anybody but this user (and the system's) can write to a folder of kernels, or replace it."""
+    """Raise InputError when anyone but this user and the system's can write to a folder of kernels, or replace it."""
     for part in (folder, *folder.parents):
         if others_can_write(part, inside=part == folder):
             raise InputError(
@@ -53,7 +53,7 @@ def refuse_shared(folder: Path) -> None:
 
 @cache
 def processor() -> str:
-    """A name for what code is compiled for: processor, its features and the compiler's settings for them."""
+    """Return a name for the target of compiled code: processor, its features and the compiler's settings for them."""
     import llvmlite.binding as llvm
 
     settings = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
@@ -62,7 +62,7 @@ def processor() -> str:
 
 
 def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
-    """Remove kernels that nobody has fetched for `unused` seconds, then the oldest beyond `largest` bytes; how many."""
+    """Remove kernels unused for `unused` seconds, then the oldest beyond `largest` bytes; return their number."""
     sweep(folder)
     kernels = [(_used(path), path) for path in folder.glob("flexclear_*.py")]
     total, removed = 0, 0
@@ -74,21 +74,21 @@ def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
 
 
 def size(path: Path) -> int:
-    """Bytes of a generated file and of what was compiled of it."""
+    """Return the bytes of a generated file and its compiled code."""
     return sum(file.stat().st_size for file in (path, path.with_suffix(CODE)) if file.is_file())
 
 
 def _used(path: Path) -> float:
-    """When a kernel was fetched last; one that is being made has no sum yet."""
+    """Return the time of a kernel's last use, or of its source while it is being compiled (no checksum yet)."""
     noted = path.with_suffix(".sum")
     return (noted if noted.is_file() else path).stat().st_mtime
 
 
 def _removed(path: Path) -> bool:
-    """Remove a kernel, unless another process is compiling it."""
-    with claimed(path, wait=False) as mine:
+    """Remove a kernel, unless another process is compiling it; return True if removed."""
+    with file_lock(path, wait=False) as mine:
         if mine:
-            set_aside(path)
+            remove_code(path)
             path.unlink(missing_ok=True)
     return mine
 

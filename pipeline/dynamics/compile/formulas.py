@@ -1,40 +1,40 @@
-"""Kernels of expressions (`core.scene.formulas`): a line for each operation, none of which holds a number."""
+"""Kernels of expressions (`core.scene.formulas`): one line per operation, without numbers in the code."""
 
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.expression import BENT, fold
 from flexclear.pipeline.core.scene.formulas import VECTORS, operands
 
-#: operations on numbers as code
+#: code of operations on numbers
 FORMS = {"+": "{} + {}", "-": "{} - {}", "*": "{} * {}", "/": "{} / {}", "^": "{} ** {}", "minus": "-{}"}
 FORMS |= {name: f"looks.np.{name}({{}})" for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")}
 #: kernel of `loads.looks` that reads a leaf of this letter
 READERS = {"c": "constant", "p": "position", "v": "velocity", "o": "omega", "q": "coordinate", "r": "coordinate_rate"}
-#: leaves that are the only ones of their kind
-ALONE = {"t": "looks.law(d, k, 0)", "l": "looks.line(d, k)[0]", "s": "looks.line(d, k)[1]"}
+#: code of leaves without an index
+UNINDEXED = {"t": "looks.law(d, k, 0)", "l": "looks.line(d, k)[0]", "s": "looks.line(d, k)[1]"}
 
 
 class Lines:
-    """Lines of a kernel, each of which gives a value a name; equal values have one."""
+    """Lines of a kernel, each of which assigns a value to a name; equal values have one name."""
 
     def __init__(self) -> None:
         self.lines: dict[str, str] = {}
         self.bends = 0
 
     def name(self, text: str) -> str:
-        """Name of a value."""
+        """Return the name of a value."""
         return self.lines.setdefault(text, f"x{len(self.lines)}")
 
     def leaf(self, token: str) -> tuple[str, bool]:
-        """Name of what a leaf reads, and whether it is a vector."""
-        if token in ALONE:
-            return self.name(ALONE[token]), False
+        """Return the name of a leaf's value, and True for a vector."""
+        if token in UNINDEXED:
+            return self.name(UNINDEXED[token]), False
         read, _, component = token.partition(".")
         one = self.name(f"looks.{READERS[read[0]]}(d, k, {read[1:]})")
         return (self.name(f"{one}[{'xyz'.index(component)}]"), False) if component else (one, read[0] in VECTORS)
 
     def apply(self, token: str, values: list[tuple[str, bool]]) -> tuple[str, bool]:
-        """Name of the result of an operation, and whether it is a vector."""
+        """Return the name of an operation's result, and True for a vector."""
         names, vectors = [name for name, _ in values], [vector for _, vector in values]
         if token == "norm":
             return self.name(
@@ -63,7 +63,7 @@ def _vector(token: str, names: list[str], vectors: list[bool]) -> str:
 
 
 def source(name: str, code: str) -> str:
-    """Source of the kernel name(d, k): the number, or the vector of three, that load k computes."""
+    """Return the source of the kernel name(d, k): the number, or the vector of three, that load k computes."""
     lines = Lines()
     values = [fold(part.split(), lines.leaf, lines.apply, operands)[0] for part in code.split(" ; ")]
     result = values[0] if len(values) == 1 else f"({', '.join(values)})"

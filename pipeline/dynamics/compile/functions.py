@@ -1,8 +1,7 @@
-"""The compiled functions of a mechanism, cached on disk across processes.
+"""Compiled functions of a mechanism, cached on disk across processes.
 
-Each is a generated file (`sources`) whose name is a digest of the sources of all kernels it can
-reach and of the versions of the compiler. The functions call each other by address (`calls`), so
-that mechanisms use common ones.
+Each is a generated file (`sources`) whose name is a digest of the sources of all kernels that it can reach and of the
+compiler's versions. The functions call each other by address (`calls`), so that mechanisms share them.
 """
 
 from __future__ import annotations
@@ -27,35 +26,34 @@ from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import reach, sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
-from flexclear.pipeline.dynamics.compile.files import SIGNATURES, bring, compiled, interpreted, loaded
+from flexclear.pipeline.dynamics.compile.files import SIGNATURES, compiled, interpreted, load_files, loaded
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
 from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
 from flexclear.pipeline.dynamics.effects import DEEP, METHOD, Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
-#: of each function in words, and where the header keeps its address, if others call it; of straight code that depends
-#: on the rows solved for. In this order this process compiles, in the opposite one the second, so that they meet in the
-#: middle; what replaces straight code has most kernels in common, which each process compiles once
+#: of each function: description for progress, and the header's index of its address if others call it (specialised code
+#: has one per selection of closure rows). This process compiles in this order, the second one in the opposite order;
+#: the generic kernels that replace specialised code have most code in common, which each process compiles once
 FUNCTIONS: dict[str, tuple[str, int | None]] = {
     "advance": ("integrator", None),
     "prescribe": ("laws of time", m.PRESCRIBE),
-    "project": ("closing of the loops", m.PROJECT),
-    "retract": ("retractions", m.RETRACT),
-    "observe": ("recorded quantities", None),
+    "project": ("projection onto loop closures", m.PROJECT),
+    "retract": ("retraction of positions", m.RETRACT),
+    "observe": ("outputs", None),
     "evaluate": ("equations of motion", m.EVALUATE),
-    "describe": ("recorded quantities", m.DESCRIBE),
-    DESCRIBED: ("recorded quantities of this mechanism alone", None),
-    WHOLE: ("equations of motion of this mechanism alone", None),
-    SPECIALISED: ("equations of motion of this mechanism alone", None),
-    "resolve": ("integrator's events", m.RESOLVE),
+    "describe": ("outputs", m.DESCRIBE),
+    DESCRIBED: ("specialised outputs", None),
+    WHOLE: ("specialised equations of motion", None),
+    SPECIALISED: ("specialised equations of motion", None),
+    "resolve": ("location of events", m.RESOLVE),
 }
-_FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
 
 
 @cache
 def function(name: str, address: int) -> Callable:
-    """A compiled function that Python calls, by its name and where it is; calls let other threads run."""
+    """Return the compiled function at an address for calls from Python; calls let other threads run."""
     if INTERPRETED:
         return interpreted[address]
     types = (_TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
@@ -64,7 +62,7 @@ def function(name: str, address: int) -> Callable:
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
-    """Where the entries of an array are, as C functions take it; TypeError for one that is not as they read it."""
+    """Return the address of an array's entries for C functions; raise TypeError for another type or memory layout."""
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"an array of {array.dtype}, {array.strides} bytes apart, instead of {kind.__name__} in a row")
     return array if INTERPRETED else array.ctypes.data
@@ -72,119 +70,69 @@ def place(array: np.ndarray, kind: type = np.float64) -> Any:
 
 @dataclass(frozen=True)
 class Entry:
-    """The compiled functions of a mechanism, by their addresses; h must have been given those."""
+    """Compiled functions of a mechanism, by their addresses, which `connect` must have written into h."""
 
     addresses: Mapping[str, int]
 
     def connect(self, h: np.ndarray) -> None:
-        """Write into the header where this process has put the functions that others call."""
+        """Write into the header the addresses of the functions that other compiled functions call."""
         for name, (_, where) in FUNCTIONS.items():
             if where is not None:
                 h[where] = self.addresses.get(name, 0)
 
-    def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
-        """Slope of the state in Y at time t, into the first row of SLOPES."""
-        self._function("advance")(*_tables(h, f, w, n), t, repeat, *_record(_FLOATS, _TABLE, _TABLE))
-
-    def advance(
-        self,
-        h: np.ndarray,
-        f: np.ndarray,
-        w: np.ndarray,
-        n: np.ndarray,
-        outputs: np.ndarray,
-        rows: np.ndarray,
-        events: np.ndarray,
-        by: Callable[[int, list[int]], None] | None = None,
-    ) -> None:
-        """Step to the end of the segment or of the budget.
-
-        by: what is to call the compiled function, given its address, and a word for each of its arguments but t and
-        repeat.
-        """
-        tables, record = _tables(h, f, w, n), _record(outputs, rows, events)
-        if by is None:
-            self._function("advance")(*tables, 0, -1, *record)
-        else:
-            by(self.addresses["advance"], [*tables, *record])
-
-    def observe(
-        self,
-        h: np.ndarray,
-        f: np.ndarray,
-        w: np.ndarray,
-        n: np.ndarray,
-        rows: np.ndarray,
-        pieces: np.ndarray,
-        tolerance: float,
-        out: np.ndarray,
-    ) -> None:
-        """Evaluate what is recorded of every row."""
-        given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
-        self._function("observe")(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
-
-    def _function(self, name: str) -> Callable:
-        return function(name, self.addresses[name])
-
-
-def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
-    return place(h, np.int64), place(f), place(w), place(n, np.int64)
-
-
-def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple:
-    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
-
 
 def entry(
-    parts: Parts, scheme: Scheme, tell: Callable[[str], None], equations: Mapping[str, str] = MappingProxyType({})
+    parts: Parts, scheme: Scheme, report: Callable[[str], None], equations: Mapping[str, str] = MappingProxyType({})
 ) -> Entry:
-    """The compiled functions for these parts; `tell` receives what has to be compiled.
+    """Return the compiled functions for these parts; `report` receives a message for each function to compile.
 
-    equations: sources by name of straight code, or of kernels; these are compiled instead where there is none.
+    equations: sources by name of specialised code, or of generic kernels, which are compiled where the former has none.
     """
     meet(METHOD.format(scheme.integrator))
     if parts.articulated:
         meet(DEEP)
-    folder, began = writable(kernel_root(), tell), time.monotonic()
+    folder, began = writable(kernel_root(), report), time.monotonic()
     texts = {**sources.sources(parts, scheme), **equations}
     files = {name: _file(folder, name, source) for name, source in texts.items()}
-    _bring(folder, files, tell, began)
+    _load(folder, files, report, began)
     if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
         kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
-        _bring(folder, kernels, tell, began)
+        _load(folder, kernels, report, began)
         files |= kernels
     return Entry({name: loaded[path.stem].address for name, path in files.items()})
 
 
-def straight(name: str, source: str, tell: Callable[[str], None]) -> int:
-    """Address of code for one wiring, whose name and source are of `sources`; 0 when there is none, UnsuitedError when
-    there is none of several lanes or with changes."""
-    folder, began = writable(kernel_root(), tell), time.monotonic()
+def straight(name: str, source: str, report: Callable[[str], None]) -> int:
+    """Return the address of specialised code for one topology; name and source: of `sources`; 0 when LLVM yields none.
+
+    Raises UnsuitedError when code for several lanes, or with tangents, is impossible.
+    """
+    folder, began = writable(kernel_root(), report), time.monotonic()
     path = _file(folder, name, source)
-    _bring(folder, {name: path}, tell, began)
+    _load(folder, {name: path}, report, began)
     return loaded[path.stem].address
 
 
-def _bring(folder: Path, files: Mapping[str, Path], tell: Callable[[str], None], began: float) -> None:
-    """Load files by the names of their functions, from disk or compiled there."""
+def _load(folder: Path, files: Mapping[str, Path], report: Callable[[str], None], began: float) -> None:
+    """Load the functions of files, from disk or after compiling them; files: by function name."""
     names = {path: name for name, path in files.items() if path.stem not in loaded}
     requested = sorted(names, key=lambda path: [*FUNCTIONS].index(names[path]))
     with disk_limits(folder):
         missing = [path for path in requested if not compiled(path)]
         with second_process(missing[::-1]):
-            bring(requested, lambda path: _announce(tell, FUNCTIONS[names[path]][0], began))
+            load_files(requested, lambda path: _announce(report, FUNCTIONS[names[path]][0], began))
         if missing:
             prune(folder)
 
 
-def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
+def _announce(report: Callable[[str], None], what: str, began: float) -> None:
     seconds = time.monotonic() - began
     so_far = f", {seconds:.0f} s so far" if seconds >= 1.0 else ""
-    tell(f"compiling for this kind of mechanism (once; later runs fetch it from disk): {what}{so_far}")
+    report(f"compiling {what} (first run of a mechanism of this kind only){so_far}")
 
 
 def _file(folder: Path, name: str, source: str) -> Path:
-    """The generated file, there with exactly this text."""
+    """Return the path of the generated file, written unless it exists with exactly this text."""
     path = folder / f"flexclear_{name}_{digest(source)}.py"
     try:
         same = path.read_bytes() == source.encode()
@@ -197,7 +145,7 @@ def _file(folder: Path, name: str, source: str) -> Path:
 
 @cache
 def digest(source: str) -> str:
-    """Digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
+    """Return the digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
     total = hashlib.sha256(source.encode())
     total.update(f"{library_version('numba')} {library_version('llvmlite')} {sys.version_info[:2]}".encode())
     for name, source_digest in sorted(reach.reached(source).items()):

@@ -1,8 +1,8 @@
-"""Attempts of several steppers made together, one in each lane of the processor's vectors.
+"""Steppers that advance together, one in each lane of the processor's vectors.
 
 Each stepper proceeds alone until an attempt waits for the rates of a state (`integrate.method.await_rates`): the next
-stage, or the end of the step. All those are then evaluated at once. First steps, searches for events and projections a
-stepper evaluates by itself, while the others wait. None knows of the others, and they may be at different stages.
+stage, or the end of the step. The rates of all waiting steppers are then evaluated at once. First steps, event searches
+and projections are evaluated by each stepper alone. Steppers are independent and may be at different stages.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.specialise.batched import exactly
 
-#: all lanes at once take as long as this fraction of them does one by one
+#: evaluating all lanes at once takes as long as this fraction of them one by one
 LANE_COST = 4
 
 
 def _pointer(kind: Any) -> Any:
-    """What makes of an address [integer] an address in an array."""
+    """Return an intrinsic that converts an address [integer] into a pointer to array entries."""
 
     @intrinsic
     def pointer(typingctx: Any, address: Any) -> Any:
@@ -40,22 +40,22 @@ integers, floats = _pointer(types.int64), _pointer(types.float64)
 
 
 def make_lanes(note: Callable, evaluate: Callable, lanes: int) -> Callable:
-    """The kernel run(table, places, numbers), which comes back when a stepper has, or when it is called back.
+    """Build the kernel run(table, places, numbers), which returns when a stepper has finished or the caller interrupts.
 
-    table: see `memory.LANE_WORDS`. places: room for 6 lanes words, then for whose numbers are in which lane, 0 where
-    they are to be put there again. numbers: as of `specialise.batched`.
+    table: see `memory.LANE_WORDS`. places: room for 6 lanes words, then a word per lane that names the stepper whose
+    numbers the lane has; 0: they must be copied again. numbers: see `specialise.batched`.
     """
     few = lanes // LANE_COST
 
     @kernel
     def engine(table, own):
-        """The arrays of a lane's stepper."""
+        """Return the arrays of a lane's stepper."""
         o = own + m.LANE_ARGUMENTS
         return data(integers(table[o]), floats(table[o + 1]), floats(table[o + 2]), integers(table[o + 3]))
 
     @kernel
     def proceed(table):
-        """Each stepper on to its next rates: how many have come to their end and how many wait, the lane of one."""
+        """Advance each stepper to its next rates; return numbers of finished and waiting ones, and the lane of one."""
         done, waiting, last = 0, 0, 0
         for k in range(lanes):
             own = m.LANES_HEAD + m.LANE_WORDS * k
@@ -76,7 +76,7 @@ def make_lanes(note: Callable, evaluate: Callable, lanes: int) -> Callable:
 
     @kernel
     def one_by_one(table):
-        """All rates that are awaited, each alone."""
+        """Evaluate all awaited rates, one after the other."""
         for k in range(lanes):
             own = m.LANES_HEAD + m.LANE_WORDS * k
             if table[own] == m.LANE_WAITING:
@@ -86,7 +86,7 @@ def make_lanes(note: Callable, evaluate: Callable, lanes: int) -> Callable:
 
     @kernel
     def together(table, places, numbers, spare):
-        """All rates that are awaited; lanes without a stepper repeat another's, to the same places."""
+        """Evaluate all awaited rates at once; lanes without a waiting stepper repeat another's, to its addresses."""
         for k in range(lanes):
             own = m.LANES_HEAD + m.LANE_WORDS * k
             waits = table[own] == m.LANE_WAITING

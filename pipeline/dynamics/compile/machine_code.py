@@ -1,9 +1,9 @@
-"""Machine code of one compiled function as bytes, and as something that can be called: without the compiler.
+"""Machine code of one compiled function as bytes, which is loaded and called without the compiler.
 
-Numba's own cache needs Numba, which takes longer to import than many a run takes. What is stored here is the object
-file that it makes of a function, with the name of the function in it and those of what it refers to; LLVM alone loads
-that. Each has an engine of its own, so that names in it, which count functions of the process that compiled it, may be
-those of others.
+Numba's own cache needs Numba, whose import takes longer than many runs. Stored here is the object file that Numba makes
+of a function, with the function's name in it and the names that it refers to; LLVM alone loads it. Each function has an
+execution engine of its own: names in the object file number functions of the process that compiled them, and those of
+two processes may be equal.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-#: what only the ways out of functions refer to that raise exceptions of Python, which no kernel does; whoever goes
-#: there all the same ends the process
+#: names that only the exits of functions refer to which raise Python exceptions; no kernel does, and reaching one ends
+#: the process
 NEVER_REACHED = {
     "NRT_Free",
     "NRT_MemInfo_call_dtor",
@@ -30,9 +30,9 @@ NEVER_REACHED = {
 
 @dataclass(frozen=True)
 class Code:
-    """A C function: where it is [address], 0 where there is none, and whatever keeps it there.
+    """A C function: its address, 0 where none exists, and the object that keeps it in memory.
 
-    image: of one that Numba has not compiled.
+    image: of a function that Numba has not compiled.
     """
 
     address: int
@@ -40,13 +40,13 @@ class Code:
     image: bytes = b""
 
 
-#: image of a function that there is not
+#: image that stands for no function
 NOTHING = b"{}\n"
 
 
 def image(function: Any) -> bytes:
-    """The code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
-    try:  # what Numba has made, where it keeps that in the release that this was written with
+    """Return the code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
+    try:  # private attributes of Numba, which another release may not have
         module, binary = function._library._final_module, bytes(function._library._get_compiled_object())
     except (AttributeError, TypeError, ValueError, RuntimeError):
         module, binary = assembled(function.inspect_llvm())
@@ -54,7 +54,7 @@ def image(function: Any) -> bytes:
 
 
 def stored(name: str, module: Any, binary: bytes) -> bytes:
-    """The image of a function, given by its name, LLVM's module and its object file."""
+    """Return the image of a function, given by its name, LLVM's module and its object file."""
     foreign = [used.name for used in (*module.functions, *module.global_variables) if used.is_declaration]
     facts = {
         "name": name,
@@ -65,9 +65,9 @@ def stored(name: str, module: Any, binary: bytes) -> bytes:
 
 
 def assembled(code: str, level: int = 3, *, optimised: bool = True) -> tuple[Any, bytes]:
-    """LLVM's module of a text, and its object file for this processor.
+    """Return LLVM's module of a text, and its object file for this processor.
 
-    level: of what is done for speed, 0 to 3.  optimised: whether the text is already.
+    level: of optimisation for speed, 0 to 3.  optimised: True when the text is optimised already.
     """
     import llvmlite.binding as llvm
 
@@ -83,18 +83,18 @@ def assembled(code: str, level: int = 3, *, optimised: bool = True) -> tuple[Any
 
 
 def load(stored: bytes) -> Code:
-    """The function of such an image; ValueError where it cannot be loaded."""
+    """Return the function of an image from `stored`; raise ValueError where it cannot be loaded."""
     import llvmlite.binding as llvm
 
     line, _, binary = stored.partition(b"\n")
     facts = json.loads(line)
     if not facts:
         return Code(0, None)
-    if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
+    if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM ends the process over a damaged object file
         raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))
     for name in facts["foreign"]:
-        _provide(llvm, name)
+        _register(llvm, name)
     engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
     engine.finalize_object()
     address = engine.get_function_address(facts["name"])
@@ -105,18 +105,18 @@ def load(stored: bytes) -> Code:
 
 @cache
 def _target() -> Any:
-    """What code is made for: this processor."""
+    """Return LLVM's target: this processor."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    if not sys.platform.startswith("linux"):  # elsewhere Numba knows what its code needs besides
-        _ask_numba()
+    if not sys.platform.startswith("linux"):  # elsewhere Numba registers further functions
+        _register_numba()
     return llvm.Target.from_default_triple()
 
 
-def _provide(llvm: Any, name: str) -> None:
-    """See that a name that code refers to is known: LLVM ends the process over one that is not."""
+def _register(llvm: Any, name: str) -> None:
+    """Register a name that code refers to with LLVM, which would end the process over an unknown one."""
     if llvm.address_of_symbol(name):
         return
     if name in NEVER_REACHED:
@@ -124,14 +124,14 @@ def _provide(llvm: Any, name: str) -> None:
 
         llvm.add_symbol(name, ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value)
         return
-    _ask_numba()
+    _register_numba()
     if not llvm.address_of_symbol(name):
         raise ValueError(f"{name} is not known")
 
 
 @cache
-def _ask_numba() -> None:
-    """Let Numba tell LLVM the functions of its own that code may call, as it does before it compiles."""
+def _register_numba() -> None:
+    """Make Numba register its own functions with LLVM, as it does before it compiles."""
     from numba import cfunc
 
     cfunc("int64()")(lambda: 0)

@@ -1,4 +1,4 @@
-"""Which modules the generated files of a mechanism reach: what digests of code and keys of runs are made of."""
+"""Modules that the generated files of a mechanism reach: for digests of code and keys of runs."""
 
 from __future__ import annotations
 
@@ -29,15 +29,14 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.effects import Scheme
 
 SOURCES = sources_of(TREE)
-#: where the code of kernels is, and what they number by
+#: packages of the kernels' code and of the numbers it uses
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.scene.event_kinds")
 
 
 def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
-    """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
-    files import.
+    """Return the modules that a run of the scene reaches by names: of its parts, its effects and its generated files.
 
-    alone: whether it is a run without others next to it, and without derivatives; what it may meet is in `met` then.
+    alone: True for a run without concurrent ones and without derivatives, whose conditional modules `met` lists.
     Raises InputError when a name is not listed in its family.
     """
     scene = _switched(scene)
@@ -48,7 +47,7 @@ def modules(scene: Scene, *, alone: bool = False) -> tuple[str, ...]:
 
 
 def met(scene: Scene, *, alone: bool = True) -> dict[str, tuple[str, ...]]:
-    """Modules that such a run reaches only if it meets something, by the name that `encounters` has for that."""
+    """Return the modules that a run reaches only under a condition, by the condition's name in `encounters`."""
     scene = _switched(scene)
     parts, known = most_parts(scene), schemes(scene)
     deep = [_composed(replace(parts, articulated=True), scheme, alone) for scheme in known]
@@ -64,13 +63,13 @@ def _switched(scene: Scene) -> Scene:
 
 
 def _needed(scene: Scene) -> int:
-    """How many of `schemes` count whatever the run meets: where one is chosen all of them do."""
+    """Return the number of `schemes` that count unconditionally: all of them where the run chooses one."""
     return len(schemes(scene)) if scene.by_need() else 1
 
 
 @cache
 def _composed(parts: Parts, scheme: Scheme, alone: bool) -> frozenset[str]:
-    """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
+    """Return the modules that the generated files of parts import; cached, since many scenes share them."""
     texts = [*sources.sources(parts, scheme).values(), *sources.kernels(parts).values(), sources.straight(parts, ())]
     texts += [] if alone else [sources.batched(parts, (), lanes=2), sources.tangent(parts, ())]
     return frozenset().union(*map(_reached, texts))
@@ -78,18 +77,18 @@ def _composed(parts: Parts, scheme: Scheme, alone: bool) -> frozenset[str]:
 
 @cache
 def _reached(source: str) -> frozenset[str]:
-    """Modules that a generated file imports; steps depend on few of the parts."""
-    return frozenset(name for name in imported(source) if source_file(TREE, name))  # others are in modules
+    """Return the modules that a generated file imports; cached, since steps depend on few of the parts."""
+    return frozenset(name for name in imported(source) if source_file(TREE, name))  # other names are attributes
 
 
 def imported(source: str) -> set[str]:
-    """Modules and names that a generated file imports, as `fingerprint.imported` returns those of any other source."""
+    """Return the modules and names that a generated file imports, as `fingerprint.imported` does for other sources."""
     lines = re.findall(r"^from (\S+) import (\S+)", source, re.MULTILINE)
     return {name for module, part in lines for name in (module, f"{module}.{part}")}
 
 
 def reached(source: str) -> dict[str, str]:
-    """Digests of the modules with `CODE` that a generated source imports, directly or not.
+    """Return the digests of the modules with `CODE` that a generated source imports, directly or not.
 
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """

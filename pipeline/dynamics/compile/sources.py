@@ -1,11 +1,11 @@
-"""Sources of the functions that are compiled for a mechanism, each in a file of its own: lists of parts.
+"""Sources of the compiled functions of a mechanism, a file each, composed of lists of parts.
 
-A file composes exactly the kernels of the kinds present: what a scene does not call for is neither
-imported nor compiled. Of no more than it needs, so that mechanisms share files: steps depend on
-the integrator and on whether there are closures and contacts, not on joints or bodies.
+A file composes exactly the kernels of the kinds present: kernels that a scene does not use are neither imported nor
+compiled. A file depends on no more than it needs, so that mechanisms share files: steps depend on the integrator and on
+the presence of closures and contacts, not on joints or bodies.
 
-What effects add to a file they declare (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
-right-hand side) and "observe" (what is recorded).
+Effects declare what they add to a file (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
+right-hand side) and "observe" (recorded quantities).
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 DYNAMICS = "flexclear.pipeline.dynamics"
-#: what others are called by, and what takes LLVM's text
+#: modules of calls by address, and of functions assembled from LLVM code
 CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
-#: straight code: the right-hand side as steps call it, the same with all that it leaves, and what is recorded
+#: specialised code: right-hand side as steps call it, right-hand side with all its side results, recorded quantities
 SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
 PRESCRIBED, RIGHT_HAND_SIDE = f"{DYNAMICS}.equations.prescribed_motion", f"{DYNAMICS}.equations.right_hand_side"
 
 
 @dataclass
 class Composition:
-    """A file in the making for a mechanism's parts.
+    """A generated file under construction for a mechanism's parts.
 
-    what, kernel, maker: what it is of, the name of its kernel, and the module and name of what makes that.
+    what: description.  kernel: name of its kernel.  maker: module and name of the function that builds the kernel.
     given: arguments of the maker, by name.  imports: (module, name) each.
     """
 
@@ -57,69 +57,69 @@ class Composition:
     imports: list[tuple[str, str]] = field(default_factory=list)
 
     def take(self, module: str, name: str) -> str:
-        """Import a name, which is returned."""
+        """Import a name and return it."""
         others = {known for package, known in self.imports if package != module}
         assert name not in others, f"two parts of one mechanism are called {name}"
         self.imports.append((module, name))
         return name
 
     def part(self, package: str, name: str) -> str:
-        """A family's part: a module, or what it holds."""
+        """Return the expression for a family's part: a module, or an attribute of one, which is imported."""
         module, attribute = listed(package, name, where="parts")
         below, _, own = module.rpartition(".")
         return f"{self.take(below, own)}.{attribute}".rstrip(".")
 
     def family(self, package: str, names: Iterable[str]) -> str:
-        """A tuple of a family's parts."""
+        """Return the expression for a tuple of a family's parts."""
         return "(" + "".join(f"{self.part(package, name)}, " for name in names) + ")"
 
     @property
     def tree(self) -> str:
-        """The module that factors the mass matrix."""
+        """Name of the module that factors the mass matrix."""
         return self.take(f"{DYNAMICS}.equations", "articulated" if self.parts.articulated else "composite")
 
     @property
     def forms(self) -> str:
-        """The forms of normal forces."""
+        """Expression for the forms of normal forces."""
         return self.family(FORMS, self.parts.forms)
 
     @property
     def harmonics(self) -> str:
-        """The kernel of the harmonics of laws, if there are some."""
+        """Name of the kernel of harmonic laws; empty without harmonics."""
         return self.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if self.parts.harmonics else ""
 
     @property
     def flexible(self) -> str:
-        """What makes the kernels of the flexible bodies, unless an effect brings more."""
+        """Expression for the kernels of the flexible bodies, unless an effect replaces them."""
         return f"{self.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
 
     @property
     def projection(self) -> str:
-        """What takes states back onto the closures."""
+        """Expression for the kernel that projects states onto the closures."""
         return (
             "calls.project" if self.parts.closures else self.take(f"{DYNAMICS}.equations.projection", "no_projection")
         )
 
     def add_effects(self, point: str) -> None:
-        """Add what the effects present declare for a point."""
+        """Add the arguments that the present effects declare for a point."""
         for effect in self.parts.present:
             self.given |= {name: self._of(effect, text) for name, text in effect.compose.get(point, {}).items()}
 
     def _of(self, effect: Effect, text: str) -> str:
-        """An argument that an effect declares, its own names imported."""
+        """Return the expression of an argument that an effect declares, after importing its names."""
         kinds, own = self.parts.kinds(effect.name), f"{PACKAGE}.{effect.name}"
         text = re.sub(r"<(?:(\w+)\.)?(\w+)>", lambda m: self.take(f"{own}.{m[1]}" if m[1] else own, m[2]), text)
         chosen = self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds and "{kinds}" in text else ""
         return text.format(file=self, kinds=chosen)
 
     def add_closures(self) -> None:
-        """Add the kernels of the closures: of joints, unless an effect brings more."""
+        """Add the kernels of the closures: those of joints, unless an effect replaces them."""
         self.add_effects("closures")
         if "closures" not in self.given:
             self.given["closures"] = f"{self.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({self.tree})"
 
     def text(self, function: str, formulas: str = "", using: tuple[str, str] = CALLS) -> str:
-        """The source.  function: what is compiled.  formulas: kernels of expressions.  using: what `function` names."""
+        """Return the source; function: code to compile; formulas: expressions' kernels; using: import of `function`."""
         maker = self.take(*self.maker)
         lines = sorted(
             {f"from {module} import {name}" for module, name in [*([using] if function else []), *self.imports]}
@@ -129,14 +129,14 @@ class Composition:
         return "\n".join([f'"""Generated: {self.what}."""', *lines, "", formulas, *made])
 
     def calling(self, name: str, arguments: str = "", formulas: str = "") -> str:
-        """The source of the function that others call by its address for a kernel that returns nothing."""
+        """Return the source of a function that others call by its address, for a kernel that returns nothing."""
         given = ", ".join(["h, f, w, n", *([arguments] if arguments else [])])
         function = f'@calls.exported("{name}")\ndef {name}({given}):\n    {self.kernel}({given})\n    return 0\n'
         return self.text(function, formulas)
 
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
-    """Source by name of what it compiles besides the right-hand side, in the order of which calls which."""
+    """Return the sources by function name, without the right-hand side, in an order where callees come first."""
     laws = Composition(parts, "laws of time", "laws", (PRESCRIBED, "make_laws"))
     if parts.harmonics:
         laws.given["harmonics"] = laws.harmonics
@@ -155,7 +155,7 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
 
 
 def kernels(parts: Parts) -> dict[str, str]:
-    """Source by name of what a mechanism of these parts calls whose wiring has no code of its own."""
+    """Return the sources of generic right-hand side and recorded quantities, for a topology without own code."""
     file = _equations(parts)
     file.kernel, file.maker = "right_hand_side", (RIGHT_HAND_SIDE, "make_right_hand_side")
     file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({file.harmonics})"
@@ -165,10 +165,10 @@ def kernels(parts: Parts) -> dict[str, str]:
 
 
 def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bool = False) -> str:
-    """Source of straight code for one wiring.
+    """Return the source of specialised code for one topology.
 
-    name: of the right-hand side as steps call it, of the same with all that it leaves, or of what is recorded.
-    exact: with the bits that it gives to each of several lanes.
+    name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
+    exact: True for the same bits as in each of several lanes.
     """
     file = _description(parts) if name == DESCRIBED else _equations(parts)
     for taken in ("straight", "NAME"):
@@ -179,7 +179,7 @@ def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bo
 
 
 def batched(parts: Parts, wiring: Wiring, lanes: int) -> str:
-    """Source of what lets so many steppers of one wiring proceed (`compile.lanes`)."""
+    """Return the source of the function that advances several steppers of one topology (`compile.lanes`)."""
     file = _equations(parts)
     file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
@@ -187,7 +187,7 @@ def batched(parts: Parts, wiring: Wiring, lanes: int) -> str:
 
 
 def tangent(parts: Parts, wiring: Wiring) -> str:
-    """Source of the right-hand side for one wiring with its tangent."""
+    """Return the source of the right-hand side for one topology with its tangents."""
     file = _equations(parts)
     file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.fields", "data")
@@ -204,12 +204,12 @@ def _of_wiring(
 
 
 def rates(parts: Parts) -> str:
-    """Source of the kernel `rates` alone, which Python runs (`specialise.dual`), without friction of ideal joints."""
+    """Return the source of the kernel `rates` for Python (`specialise.dual`), without friction of ideal joints."""
     return _equations(parts, whole=False).text("", _formulas(parts))
 
 
 def _equations(parts: Parts, *, whole: bool = True) -> Composition:
-    """A file for the right-hand side.  whole: with friction of ideal joints."""
+    """Return a file for the right-hand side; whole: with friction of ideal joints."""
     file = _forces(parts, "right-hand side of", "rates", (RIGHT_HAND_SIDE, "make_rates"))
     file.given["tree"] = file.tree
     if parts.closures:
@@ -232,7 +232,7 @@ def _project(parts: Parts) -> str:
 
 
 def _description(parts: Parts) -> Composition:
-    """A file for what is recorded of an evaluation."""
+    """Return a file for the recorded quantities of an evaluation."""
     maker = (f"{DYNAMICS}.equations.observation", "make_description")
     file = _forces(parts, "what is recorded of", "description", maker)
     file.add_effects("observe")
@@ -258,7 +258,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
 
 
 def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> Composition:
-    """A file for steps, or for the events in them."""
+    """Return a file for steps, or for the events in them."""
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
     file = Composition(parts, what, kernel, (f"{INTEGRATORS}.stepper", maker))
     file.given = {
@@ -278,7 +278,7 @@ def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> 
 
 
 def _events(file: Composition, scheme: Scheme) -> str:
-    """What the stepper searches for in each step; nothing for the default, which is nothing."""
+    """Return the expression for the events that the stepper locates in each step; empty for the default: none."""
     parts, chosen = file.parts, not scheme.fixed
     touching = parts.surfaces or any(effect.touches for effect in parts.present)
     if touching and not scheme.located:
@@ -294,14 +294,14 @@ def _events(file: Composition, scheme: Scheme) -> str:
 
 
 def _joints(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
-    """A file that depends on the joints."""
+    """Return a file that depends on the joints."""
     file = Composition(parts, f"{what} {', '.join(parts.joints)}", kernel, maker)
     file.given["joints"] = file.family(JOINTS, parts.joints)
     return file
 
 
 def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
-    """A file with what acts in the mechanism: joints, flexible bodies, contacts, loads."""
+    """Return a file with the forces of a mechanism: joints, flexible bodies, contacts, loads."""
     file = _joints(parts, what, kernel, maker)
     if parts.flexible:
         file.given["flexible"] = file.flexible
@@ -317,7 +317,7 @@ def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Com
 
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
-    """The kernel of a kind of loads, which may be made of that of an expression (`_formulas`)."""
+    """Return the expression for the kernel of a kind of loads, which may call that of an expression (`_formulas`)."""
     module = file.part(LOADS, name)
     if not formula:
         return f"{module}.apply"
@@ -327,16 +327,16 @@ def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
 
 
 def _formulas(parts: Parts) -> str:
-    """The kernels of the expressions of loads."""
+    """Return the kernels of the expressions of loads."""
     written = [(n, kind.split(maxsplit=1)) for n, kind in enumerate(parts.loads)]
     texts = [(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1]
     if not texts:
         return ""
-    formulas = lookup(RUNS, "expressions", where="parts")  # as `effects.ways` has it of scenes with such loads
+    formulas = lookup(RUNS, "expressions", where="parts")  # `effects.ways` lists it for scenes with such loads
     return "\n\n".join(formulas.source(*text) for text in texts)
 
 
-# laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
+# laws of time are not specialised: their pieces change with time, and their number with the scene's numbers
 STRAIGHT = """WIRING = (
 {wiring})
 files.assembles(__name__, NAME, lambda: straight({kernel}, WIRING, {options}), {level})
@@ -381,7 +381,7 @@ def resolve(h, f, w, n, step, t_new, rows, count, width, events, event_count, ev
     rows, events = calls.carray(rows, (count, width)), calls.carray(events, (event_count, event_width))
     return resolution(data(h, f, w, n), step, t_new, rows, events)
 """
-# one function for both tasks: each would be an object of its own to fetch
+# one function for both tasks: each function is an object of its own to load
 ADVANCE = """@calls.exported("advance")
 def advance(h, f, w, n, t, repeat, outputs, times, rows, count, width, events, event_count, event_width):
     if repeat < 0:

@@ -1,1 +1,1 @@
-"""Contact: forces from a normal law and a friction law, stiffness from geometry and materials."""
+"""Contact: forces of a normal law and a friction law, stiffness from geometry and materials."""

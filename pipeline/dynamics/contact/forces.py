@@ -1,11 +1,10 @@
-"""Forces of the contacts: geometry of two nested surfaces, laws by their kinds.
+"""Contact forces: geometry of two nested surfaces, with the laws that a scene uses.
 
-gap = c - |p_OI|, with p_OI from the centre of the outer surface (socket, journal) to that of the
-inner one (ball, pin), where the surfaces part (a slot and a plane measure the gap otherwise, see
-`surfaces`); depth d = -gap; d' = n . (velocity of the inner centre as seen from the outer body), n
-along p_OI. Both forces act at one point Q on the line of centres, on the inner surface (Wang & Wang
-2019, eq. 23); the sliding velocity is that of the material points there, so that rolling is no
-sliding. Acting at one point keeps angular momentum.
+gap = c - |p_OI|, with p_OI from the centre of the outer surface (socket, journal) to that of the inner one (ball, pin);
+slots and planes measure the gap differently (see `surfaces`). Penetration d = -gap; its rate d' = n . (velocity of the
+inner centre as seen from the outer body), n along p_OI. Both forces act at one point Q on the line of centres, on the
+inner surface (Wang & Wang 2019, eq. 23). The sliding velocity is that of the material points at Q, so that rolling is
+no sliding. A common point of action conserves angular momentum.
 """
 
 from __future__ import annotations
@@ -24,31 +23,31 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, 
 
 @kernel
 def contact_slots(c):
-    """Index in LEDGER_RATE of contact c's slots."""
+    """Return the index in LEDGER_RATE of contact c's variables."""
     return m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c
 
 
 @kernel
 def point_velocity(frame, point):
-    """Velocity of the material point of a frame's body that is at `point`; Wang & Wang (2019), eqs. (23), (24)."""
+    """Return the velocity of the material point of a frame's body at `point`; Wang & Wang (2019), eqs. (23), (24)."""
     arm = sub(point, frame.origin)
     return add(frame.velocity, cross(frame.omega, arm))
 
 
 @kernel
 def tangential(normal, v):
-    """The part of v normal to `normal`; Wang & Wang (2019), eqs. (23), (24)."""
+    """Return the component of v across `normal`; Wang & Wang (2019), eqs. (23), (24)."""
     return sub(v, scale(dot(normal, v), normal))
 
 
 @kernel
 def frictionless(d, c, normal, turning, p_WQ, f_n):
-    """The kernel `rub` of a scene without friction."""
+    """Return no friction: the kernel `rub` of a scene without friction."""
     return ZERO
 
 
 def rubbing(traction: Callable) -> Callable:
-    """The kernel rub(d, c, normal, turning, p_WQ, f_n) -> friction on the inner body [N].
+    """Build the kernel rub(d, c, normal, turning, p_WQ, f_n) -> friction on the inner body [N].
 
     traction(kind, z, slip, f_n, p): see `contact.friction`.
     turning: rate of the normal as seen from the outer body [1/s], world axes.
@@ -56,7 +55,7 @@ def rubbing(traction: Callable) -> Callable:
 
     @kernel
     def bristle_rate(d, c, axes, normal, turning, z, z_rate):
-        """Rate of the deflection z, which the outer body carries and which stays tangent to the surface."""
+        """Store the rate of the deflection z, which the outer body carries and which stays tangent to the surface."""
         transported = sub(tangential(normal, z_rate), scale(dot(turning, z), normal))
         put(d.ledger_rate, d.contacts[c].bristle - d.nq - d.nv, turn_back(axes, transported))
 
@@ -81,9 +80,9 @@ def rubbing(traction: Callable) -> Callable:
 
 
 def make_normal_force(forms: tuple[Any, ...]) -> Callable:
-    """The kernel normal_force(d, c) -> normal force of a closed contact [N], from its gap and rate, booked.
+    """Build normal_force(d, c) -> normal force of a closed contact [N], from gap and rate; it also fills the ledger.
 
-    forms: of normal forces, with `force` and `stored`.
+    forms: modules of normal forces, with `force` and `stored`.
     """
     normal, stored = choose(tuple(form.force for form in forms)), choose(tuple(form.stored for form in forms))
 
@@ -103,9 +102,9 @@ def make_normal_force(forms: tuple[Any, ...]) -> Callable:
 
 
 def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: tuple[Any, ...]) -> Callable:
-    """The kernel contacts(d) that applies all contacts, given the modules of their kinds.
+    """Build the kernel contacts(d) that applies all contacts, from the modules of their kinds.
 
-    surfaces: with `separation`.  forms: of normal forces, with `force` and `stored`.  frictions: laws with `traction`.
+    surfaces: with `separation`.  forms: normal forces, with `force` and `stored`.  frictions: laws with `traction`.
     """
     separation = choose(tuple(kind.separation for kind in surfaces))
     normal_force = make_normal_force(forms)
@@ -113,7 +112,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
 
     @kernel
     def measure(d, c):
-        """Gap, rate and offset of contact c, no force; returns the normal, its rate seen from the outer body."""
+        """Store gap, rate and offset of contact c, no force; return the normal and its rate in the outer body."""
         contact, touch = d.contacts[c], d.touch[c]
         outer, inner = d.site_frames[contact.outer], d.site_frames[contact.inner]
         p_OI = sub(inner.origin, outer.origin)
@@ -126,7 +125,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
 
     @kernel
     def forces(d, c, axis, turning):
-        """Forces of a closed contact, on both bodies, and their powers; Wang & Wang (2019), eqs. (23), (24)."""
+        """Apply a closed contact's forces to both bodies, store their powers; Wang & Wang (2019), eqs. (23), (24)."""
         contact, touch = d.contacts[c], d.touch[c]
         f_n = normal_force(d, c)
         p_WQ = add(d.site_frames[contact.inner].origin, scale(d.contact_numbers[c].radius, axis))

@@ -1,4 +1,4 @@
-"""Stiffness of surfaces from radii and materials."""
+"""Hertzian contact: stiffness of surfaces from radii and materials, and contact widths."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Pin = ClearanceRevolute | ClearanceSlot
 
 
 def published(stiffness: Mapping[float, Callable[[Any], float]]) -> Callable[[Clearance, float], float]:
-    """The function (joint, exponent) -> stiffness K [N/m^exponent] that the scene gives, or published for the exponent.
+    """Return (joint, exponent) -> stiffness K [N/m^exponent], given by the scene or published for the exponent.
 
-    It raises ValueError where nothing is published.
+    The function raises ValueError for exponents without a published stiffness.
     """
 
     def given_or_published(joint: Clearance, exponent: float) -> float:
@@ -33,7 +33,7 @@ def published(stiffness: Mapping[float, Callable[[Any], float]]) -> Callable[[Cl
 
 
 def compliance(joint: Clearance) -> float:
-    r"""Sum of sigma = (1 - nu^2) / (pi E) [1/Pa] of both surfaces; 1 / (pi times it) is Hertz's E*."""
+    """Return the sum of sigma = (1 - nu^2) / (pi E) [1/Pa] over both surfaces; 1 / (pi sum) is Hertz's E*."""
     return sum(
         (1.0 - material.poisson**2) / (math.pi * material.youngs_modulus)
         for material in joint.materials
@@ -42,12 +42,12 @@ def compliance(joint: Clearance) -> float:
 
 
 def sphere_stiffness(joint: Clearance) -> float:
-    r"""Generalised stiffness K [N/m^1.5] of a sphere in a sphere.
+    r"""Return the generalised stiffness K [N/m^1.5] of a sphere in a sphere.
 
     .. math:: K = \frac{4}{3\pi(\sigma_i+\sigma_j)}\sqrt{\frac{R_iR_j}{R_i-R_j}}, \quad
               \sigma = \frac{1-\nu^2}{\pi E}
 
-    It grows as the clearance to the power -1/2. Holds while the contact's radius is small against
+    K grows as the clearance to the power -1/2. It holds while the contact's radius is small against
     the ball's (below about 0.3 of it).
     Source: Wang & Wang (2019), eq. (26).
     """
@@ -55,24 +55,24 @@ def sphere_stiffness(joint: Clearance) -> float:
 
 
 def plane_stiffness(joint: Clearance) -> float:
-    r"""The same [N/m^1.5] of a sphere on a plane: :math:`K = \frac{4}{3\pi(\sigma_i+\sigma_j)}\sqrt{R}`."""
+    r"""Return K [N/m^1.5] of a sphere on a plane, :math:`K = \frac{4}{3\pi(\sigma_i+\sigma_j)}\sqrt{R}`."""
     return 4.0 / (3.0 * math.pi * compliance(joint)) * math.sqrt(joint.radius)
 
 
 def cylinder_stiffness(joint: Pin) -> float:
-    r"""K [N/m] of two parallel cylinders, or of one on a plane: :math:`K = \tfrac{\pi}{4}E^*L`, whatever the radii."""
+    r"""Return K [N/m] of parallel cylinders, or of one on a plane: :math:`K = \tfrac{\pi}{4}E^*L`, for any radii."""
     return joint.length / (4.0 * compliance(joint))
 
 
 def relative_radius(joint: Clearance) -> float:
-    """Radius R_i R_j / (R_i - R_j) [m] of the sphere or cylinder that meets a plane as these two meet."""
+    """Return the radius R_i R_j / (R_i - R_j) [m] of the sphere or cylinder on a plane with the same contact."""
     return (joint.radius + joint.clearance) * joint.radius / joint.clearance
 
 
 def half_width(joint: Pin, radius: float, depth: float, force: float) -> float:
-    r"""Half-width of a pin's contact [m] under a force [N]: :math:`\sqrt{4FR/(\pi E^*L)}` (Hertz).
+    r"""Return the half-width of a pin's contact [m] under a force [N]: :math:`\sqrt{4FR/(\pi E^*L)}` (Hertz).
 
-    Without materials: sqrt(R d), the width that a parabolic gap would leave.  radius: R, relative one of the surfaces.
+    Without materials: sqrt(R d), the half-width for a parabolic gap.  radius: relative radius R of the surfaces [m].
     """
     if None in joint.materials:
         return math.sqrt(radius * depth)

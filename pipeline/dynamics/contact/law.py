@@ -1,4 +1,4 @@
-"""A normal law with its numbers, and the family of laws that a factor of hysteresis distinguishes."""
+"""Normal laws with their numbers, and the family of laws with hysteretic damping."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import NamedTuple
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution as closed_form
 
-#: a law that delivers a restitution further than this from the one asked for is used outside its range
+#: largest deviation of the delivered from the requested restitution within a law's range
 RESTITUTION_ERROR = 0.05
 
 
 class Numbers(NamedTuple):
-    """Of a normal law, as its form has them: CONTACT_NUMBERS has the same.
+    """Numbers of a normal law for its form; CONTACT_NUMBERS has the same fields.
 
-    stiffness: K [N/m^n].  damping: C [N s/m], or a factor of hysteresis; 0 of a law without loss.
+    stiffness: K [N/m^n].  damping: C [N s/m], or the hysteresis factor; 0 for a law without loss.
     """
 
     stiffness: float
@@ -27,7 +27,7 @@ class Numbers(NamedTuple):
 
 @dataclass(frozen=True)
 class Resolved:
-    """What a normal law comes to: form and numbers for the kernels, and what a free impact gets.
+    """A normal law, resolved: form and numbers for the kernels, and the restitution of a free impact.
 
     parameter: the law's own coefficient of restitution, or None.  delivered: the rebound over the
     approach speed of a free impact.  warning: in words, when the law is used outside its range.
@@ -42,10 +42,10 @@ class Resolved:
 
 @dataclass(frozen=True)
 class Hysteresis:
-    """A law F = K d^n (1 + a d'/d'0); `factor` gives a for the coefficient of restitution asked for.
+    """A law F = K d^n (1 + a d'/d'0); `factor` gives a for the requested coefficient of restitution.
 
-    valid: restitutions for which the law delivers what it is asked for within RESTITUTION_ERROR.
-    exponent: where the scene gives none.
+    valid: range of restitutions that the law delivers within RESTITUTION_ERROR.
+    exponent: default exponent n.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Hysteresis:
     exponent: float = 1.5
 
     def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
-        """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+        """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
         refuse_linear(self.name, law)
         exponent = self.exponent if law.exponent is None else law.exponent
         if law.delivered_restitution is not None:
@@ -83,7 +83,7 @@ class Hysteresis:
             return inf
 
     def _parameter(self, a: float) -> float:
-        """The parameter whose factor is a; the factors of all these laws fall as it grows."""
+        """Return the parameter whose factor is a; the factors of all these laws decrease with the parameter."""
         if a == 0.0:
             return 1.0
         least = 0.0 if isfinite(self._at(0.0)) else 1e-300
@@ -106,7 +106,7 @@ class Hysteresis:
 
 
 def refuse_linear(name: str, law: NormalLaw) -> None:
-    """ValueError when a scene gives a law numbers that only linear ones take."""
+    """Raise ValueError when a scene gives a law numbers that only linear laws take."""
     for key in ("damping", "effective_mass"):
         if getattr(law, key) is not None:
             raise ValueError(f"the law '{name}' takes no {key}; 'kelvin-voigt' does")

@@ -1,8 +1,8 @@
-r"""What restitution a law delivers: closed forms of a free impact.
+r"""Restitution of a normal law: closed forms of a free impact.
 
-For :math:`F = K\delta^n(1 + a\,\dot\delta/\dot\delta_0)` the rebound e over the approach obeys
+For :math:`F = K\delta^n(1 + a\,\dot\delta/\dot\delta_0)` the ratio e of rebound to approach speed obeys
 :math:`\ln[(1+a)/(1-ae)] = a(1+e)`, that is psi(a) = psi(-ae) with psi(x) = x - ln(1 + x),
-whatever K, n, mass and speed.
+for any K, n, mass and speed.
 Source: Gonthier, McPhee, Lange & Piedboeuf (2004), Multibody System Dynamics 11, 209-233, eq. (29);
 Zhang & Sharf (2009), J. Applied Mechanics 76, 034501.
 """
@@ -12,21 +12,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-#: nearest to 1 that psi(-y) may come; beyond it 1 - y is rounding
+#: largest y of psi(-y); beyond it 1 - y is rounding
 NEAREST = 1.0 - 2.0**-53
-#: below this the first term of the series, e = 1 - 2 a / 3, is as exact as a root of differences of rounding size
+#: below this the first term of the series, e = 1 - 2 a / 3, is as exact as a root, where rounding cancels digits
 SLIGHT_DAMPING = 1e-7
 
 
 def psi(x: float) -> float:
-    """X - ln(1 + x) without cancellation."""
+    """Return x - ln(1 + x) without cancellation."""
     if abs(x) > 0.05:
         return x - math.log1p(x)
     return sum((-1) ** k * x**k / k for k in range(2, 14))  # 0.05^14 / 14 is below rounding of x^2 / 2
 
 
 def delivered(a: float) -> float:
-    """Rebound over approach speed that the factor a >= 0 gives a free impact."""
+    """Return rebound over approach speed of a free impact with the factor a >= 0."""
     if a < SLIGHT_DAMPING:
         return 1.0 - 2.0 * a / 3.0
     level = psi(a)
@@ -36,7 +36,7 @@ def delivered(a: float) -> float:
 
 
 def factor(e: float) -> float:
-    """Factor a that delivers the restitution 0 < e <= 1; ValueError for 0, which no finite factor delivers."""
+    """Return the factor a that delivers the restitution 0 < e <= 1; raise ValueError for 0, which none delivers."""
     if e <= 0.0:
         raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
     if 1.0 - e < SLIGHT_DAMPING:
@@ -51,9 +51,9 @@ def factor(e: float) -> float:
 
 
 def root(f: Callable[[float], float], low: float, high: float) -> float:
-    """Return the root of f between two arguments, to the last bit; ValueError where f has one sign at both.
+    """Return the root of f between two arguments, to the last bit; raise ValueError for equal signs at both.
 
-    By halving: f takes a microsecond, importing `scipy.optimize` four tenths of the processor time of a short run.
+    Bisection: f takes a microsecond, importing `scipy.optimize` four tenths of the processor time of a short run.
     """
     rising, at_high = f(low) < 0.0, f(high)
     if f(low) == 0.0:
@@ -66,7 +66,7 @@ def root(f: Callable[[float], float], low: float, high: float) -> float:
 
 
 def linear_delivered(zeta: float) -> float:
-    r"""Rebound over approach speed of :math:`m\ddot\delta = -\max(0, K\delta + C\dot\delta)`, zeta = C / (2 sqrt(K m)).
+    r"""Return rebound over approach of :math:`m\ddot\delta = -\max(0, K\delta + C\dot\delta)`, C = 2 zeta sqrt(K m).
 
     The contact ends where the force would begin to pull:
     :math:`e = \exp[-\tan\varphi\,(\pi - 2\varphi)]`, :math:`\sin\varphi = \zeta`, and
@@ -83,8 +83,8 @@ def linear_delivered(zeta: float) -> float:
 
 
 def damping_ratio(e: float) -> float:
-    """Zeta with linear_delivered(zeta) = e, 0 < e <= 1; ValueError for 0."""
+    """Return zeta with linear_delivered(zeta) = e, 0 < e <= 1; raise ValueError for 0."""
     if e <= 0.0:
         raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
-    # beyond 1 the restitution falls below (2 zeta)^-2, so that this is enough
+    # beyond zeta = 1 the restitution falls below (2 zeta)^-2, so that this bracket suffices
     return root(lambda z: linear_delivered(z) - e, 0.0, 2.0 + e**-0.5)

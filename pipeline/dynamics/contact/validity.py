@@ -1,4 +1,4 @@
-"""What a run says when its contacts left the range for which their laws were made."""
+"""Warnings and errors of a run whose contacts left the validity range of their laws."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from flexclear.pipeline.core.system.errors import SolverError
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
-#: above this fraction of the inner radius a contact is no longer small and Hertz's theory ends
+#: contact size, as a fraction of the inner radius, above which Hertz's theory no longer holds
 SMALL_CONTACT = 0.3
-#: above this fraction of the inner radius a penetration is no local indentation any more, whatever the law
+#: penetration, as a fraction of the inner radius, above which no contact law holds
 SHALLOW = 0.1
 
 
 def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -> list[str]:
-    """Sentences about a contact that was used outside the range of its law; empty when it was not.
+    """Return warnings about a contact that was used outside the range of its law; empty for none.
 
-    name: in words.  depth, force: largest penetration [m] and normal force [N] of the run.
+    name: of the contact, in words.  depth, force: largest penetration [m] and normal force [N] of the run.
     """
     found = [] if law.warning is None else [f"{name}: {law.warning}"]
     if not joint.radius:
@@ -45,7 +45,7 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
 
 
 def deepest(events: np.ndarray, touch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Largest penetration [m] and normal force [N] of every contact, of its events and of the observed rows.
+    """Return the largest penetration [m] and normal force [N] of every contact, over its events and the observed rows.
 
     events: named fields of EVENT, (events,).  touch: named fields of TOUCH, (rows, contacts).
     """
@@ -59,16 +59,16 @@ def deepest(events: np.ndarray, touch: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def refuse_deep(name: str, joint: Any, depth: float) -> None:
-    """SolverError when the inner surface's centre has gone through the outer surface: depth [m] above its radius.
+    """Raise SolverError when the inner centre has passed through the outer surface: penetration [m] above the radius.
 
-    name: in words.
+    name: of the contact, in words.
     """
     if problem := pressed_through(name, joint, depth):
         raise SolverError(f"{problem}: choose a stiffer contact, a slower impact or smaller loads")
 
 
 def pressed_through(name: str, joint: Any, depth: float) -> str:
-    """What is wrong with such a contact; empty for others. Arguments: as of `refuse_deep`."""
+    """Return the error text for a contact that `refuse_deep` refuses; empty for others."""
     if not depth > joint.radius > 0.0:
         return ""
     return (
@@ -78,7 +78,7 @@ def pressed_through(name: str, joint: Any, depth: float) -> str:
 
 
 def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resolved]) -> str:
-    """What every contact was made with, as JSON for the dataset's attributes."""
+    """Return the resolved law of every contact as JSON, for the dataset's attributes."""
     found = {
         name: {
             "law": joint.normal.law,

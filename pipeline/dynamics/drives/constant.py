@@ -1,4 +1,4 @@
-"""A law that keeps its value."""
+"""A law of constant value."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 
 def pieces(law: Constant, dimension: str) -> Pieces:
-    """One piece."""
+    """Return one piece."""
     return Pieces((Piece(0.0, (quantity(law.value, dimension),)),))

@@ -1,4 +1,4 @@
-"""A law that counts time from a later moment on: the course of a motion that begins at an event."""
+"""A law that starts at a later time: the course of a motion that begins at an event."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 
 
 def pieces(law: Delayed, dimension: str) -> Pieces:
-    """The pieces of the inner law, each later by the delay."""
+    """Return the pieces of the inner law, each later by the delay."""
     inner = pieces_of(law.law, dimension)
     return Pieces(tuple(p.later(law.by) for p in inner.pieces), (inner.span[0] + law.by, inner.span[1] + law.by))

@@ -1,7 +1,7 @@
-"""A law written as an expression of the time, worked out into pieces of polynomials and sines.
+"""A law written as an expression of the time, expanded into pieces of polynomials and sines.
 
-Products of sines become sums, so that value and rates are those of any other law. `max`, `min`, `abs`, `sign` and
-`step` part the time where their argument passes zero.
+Products of sines become sums, so that value and rates have the form of any other law. `max`, `min`, `abs`, `sign` and
+`step` split the time where their argument passes zero.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from flexclear.pipeline.core.scene.laws import COEFFICIENTS, Expression
 from flexclear.pipeline.core.scene.quantity import read
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, Terms
 
-#: samples among which a switch is searched for: at least, and per period of the fastest sine
+#: samples in which sign changes are searched for: at least, per period of the fastest sine, and at most
 FEWEST_SAMPLES, PER_PERIOD, MOST_SAMPLES = 256, 32, 2_000_000
 ZERO = Piece(0.0, (0.0,))
-#: functions of a constant
+#: functions of a constant argument
 PLAIN = {name: getattr(math, name) for name in ("exp", "log", "sqrt", "tan", "tanh")}
 
 
 @dataclass(frozen=True)
 class Course:
-    """What a part of an expression does: pieces written from time 0 on, each from its start [s] until the next one."""
+    """A part of an expression as a function of time: pieces in powers of t, each from its start [s] to the next."""
 
     starts: tuple[float, ...]
     pieces: tuple[Piece, ...]
 
     def at(self, t: float) -> Piece:
-        """The piece that holds at a time."""
+        """Return the piece that holds at a time."""
         return self.pieces[max(int(np.searchsorted(self.starts, t, side="right")) - 1, 0)]
 
 
 def pieces(law: Expression, dimension: str) -> Pieces:
-    """The pieces of the expression; ValueError, in words, for what is no sum of polynomials and sines."""
+    """Return the pieces of the expression; raise ValueError, in words, unless it is made of polynomials and sines."""
     known = constants_of(law.values)
     require_used(known, (law.value,))
     try:
@@ -65,7 +65,7 @@ def pieces(law: Expression, dimension: str) -> Pieces:
 
 
 def _applied(operator: str, operands: list[Course], span: tuple[float, float]) -> Course:
-    """Result of an operation, piece by piece."""
+    """Return the result of an operation, piece by piece."""
     if operator in ("max", "min"):
         a, b = operands
         return _split(_each(_OPERATIONS["-"], a, b), *((a, b) if operator == "max" else (b, a)), span)
@@ -91,7 +91,7 @@ def _constant(value: float, span: tuple[float, float]) -> Course:
 
 
 def _split(switch: Course, above: Course, below: Course, span: tuple[float, float]) -> Course:
-    """`above` where the switch is positive, else `below`."""
+    """Return `above` where the switch is positive, else `below`."""
     starts: list[float] = []
     for start, end in pairwise((*switch.starts, span[1])):
         starts += [start, *_roots(switch.at(start), start, end)]
@@ -102,7 +102,7 @@ def _split(switch: Course, above: Course, below: Course, span: tuple[float, floa
 
 
 def _roots(piece: Piece, start: float, end: float) -> list[float]:
-    """Times strictly between start and end at which a piece changes its sign."""
+    """Return the times strictly between start and end at which a piece changes its sign."""
     fastest = max((abs(w) for _, w, _ in piece.terms), default=0.0)
     count = FEWEST_SAMPLES + PER_PERIOD * fastest * (end - start) / (2.0 * math.pi)
     if count > MOST_SAMPLES:
@@ -119,7 +119,7 @@ def _roots(piece: Piece, start: float, end: float) -> list[float]:
 
 
 def _number(a: Piece, what: str) -> float:
-    """The value of a constant; ValueError for what changes."""
+    """Return the value of a constant; raise ValueError for a piece that varies."""
     if a.terms or any(a.coefficients[1:]):
         raise ValueError(f"{what} does not lead to polynomials and sines: use a law of type 'spline' or 'table'")
     return a.coefficients[0]
@@ -142,7 +142,7 @@ def _product(a: Piece, b: Piece) -> Piece:
 
 
 def _sines(one: tuple[float, float, float], other: tuple[float, float, float]) -> Piece:
-    """Product of two sines: half the cosine of the difference less that of the sum."""
+    """Return the product of two sines: half the cosine of the difference less that of the sum."""
     (a, w, p), (b, v, q) = one, other
     parts = ((0.5 * a * b, w - v, p - q), (-0.5 * a * b, w + v, p + q))
     return reduce(Piece.plus, (_sine(size, rate, phase + 0.5 * math.pi) for size, rate, phase in parts), ZERO)
@@ -168,7 +168,7 @@ def _power(a: Piece, b: Piece) -> Piece:
 
 
 def _function(name: str, a: Piece) -> Piece:
-    """A function of one number; `norm` is refused as any other that is no function of the time."""
+    """Return a function of one number; `norm` and others that are no function of the time raise ValueError."""
     if name not in ("sin", "cos"):
         return Piece(0.0, (float(PLAIN.get(name, abs)(_number(a, f"{name}(...) of the time"))),))
     if a.terms or any(a.coefficients[2:]):

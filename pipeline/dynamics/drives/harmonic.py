@@ -1,4 +1,4 @@
-"""Offset and sines."""
+"""A constant offset plus sines."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 
 def pieces(law: Harmonic, dimension: str) -> Pieces:
-    """One piece."""
+    """Return one piece."""
     phases = law.phase or (0.0,) * len(law.amplitude)
     amplitudes = (quantity(a, dimension) for a in law.amplitude)
     terms = tuple(zip(amplitudes, law.frequency, phases, strict=True))

@@ -1,4 +1,4 @@
-"""Harmonics of the laws; compiled where a law has some."""
+"""Harmonics of the laws of time; compiled only where a law has some."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def oscillate(d, k, piece, s):
 
 @kernel
 def change_oscillation(d, k, piece, s, numbers, out):
-    """Add what the harmonics of a piece change in law k along a direction (`equations.prescribed_motion`)."""
+    """Add the derivative of a piece's harmonics along a direction, for law k (`equations.prescribed_motion`)."""
     its, size = d.piece_harmonics[piece], m.HARMONICS.size
     later = -d.f[numbers + d.at_pieces + m.PIECES.size * piece + m.PIECES.start]
     for i in range(its.harmonic0, its.harmonic0 + its.n_harmonics):

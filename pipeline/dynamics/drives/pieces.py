@@ -1,9 +1,9 @@
-r"""What every law of time becomes: pieces, each a polynomial plus harmonics in the time since its start.
+r"""Common form of every law of time: pieces, each a polynomial plus harmonics in the time since its start.
 
 .. math:: x(t) = \sum_k c_k s^k + \sum_j A_j \sin(\omega_j s + \varphi_j), \quad s = t - t_{start}
 
-so that value, rate and second rate are exact, and every time where a derivative may jump is the
-start of a piece, where integration stops and starts anew.
+so that value, rate and second rate are exact, and derivatives may jump only at the
+start of a piece, where integration restarts.
 """
 
 from __future__ import annotations
@@ -21,41 +21,41 @@ from flexclear.pipeline.core.scene.laws import COEFFICIENTS
 from flexclear.pipeline.core.scene.registry import lookup
 
 PACKAGE = "flexclear.pipeline.dynamics.drives"
-#: times at which a piece is evaluated for its size: enough for polynomials of degree 7
+#: times at which a piece is evaluated for its size; enough for polynomials of degree 7
 GRID = 17
 Terms = tuple[tuple[float, float, float], ...]  #: amplitude, angular frequency [rad/s], phase at the start [rad]
 
 
 @dataclass(frozen=True)
 class Piece:
-    """From `start` [s] on. coefficients: of rising order, at most 8."""
+    """A piece that holds from `start` [s] on. coefficients: of rising order, at most 8."""
 
     start: float
     coefficients: tuple[float, ...]
     terms: Terms = ()
 
     def moved(self, start: float) -> Piece:
-        """The same function, written from another time on."""
+        """Return the same function, written from another time on."""
         d, c = start - self.start, self.coefficients
         shifted = tuple(sum(comb(n, k) * c[n] * d ** (n - k) for n in range(k, len(c))) for k in range(len(c)))
         return Piece(start, shifted, tuple((a, w, phase + w * d) for a, w, phase in self.terms))
 
     def later(self, delay: float) -> Piece:
-        """The same course, from a later time on."""
+        """Return the piece delayed by `delay` [s]."""
         return Piece(self.start + delay, self.coefficients, self.terms)
 
     def times(self, factor: float) -> Piece:
-        """The function multiplied by a factor."""
+        """Return the function multiplied by a factor."""
         terms = tuple((factor * size, w, phase) for size, w, phase in self.terms)
         return Piece(self.start, tuple(factor * c for c in self.coefficients), terms)
 
     def plus(self, other: Piece) -> Piece:
-        """The sum of two functions, both written from the same time on."""
+        """Return the sum of two functions, both written from the same time on."""
         pairs = zip_longest(self.coefficients, other.coefficients, fillvalue=0.0)
         return Piece(self.start, tuple(a + b for a, b in pairs), self.terms + other.terms)
 
     def value(self, t: float, order: int = 0) -> float:
-        """A derivative at time t."""
+        """Return the derivative of this order at time t."""
         s, smooth = t - self.start, 0.0
         for n in range(len(self.coefficients) - 1, order - 1, -1):
             smooth = smooth * s + perm(n, order) * self.coefficients[n]
@@ -64,7 +64,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Pieces:
-    """Pieces in order; the first also holds before it starts. span: where the law is known at all [s]."""
+    """Pieces in order; the first also holds before its start. span: times between which the law is defined [s]."""
 
     pieces: tuple[Piece, ...]
     span: tuple[float, float] = (-inf, inf)
@@ -76,23 +76,23 @@ class Pieces:
 
     @property
     def harmonic(self) -> bool:
-        """Whether a piece has more than a polynomial."""
+        """True when a piece has harmonics."""
         return any(p.terms for p in self.pieces)
 
     def at(self, t: float) -> Piece:
-        """The piece that holds at t, of two that meet there the later."""
+        """Return the piece that holds at t; where two meet, the later one."""
         return self.pieces[max(bisect_right(self.starts, t) - 1, 0)]
 
     def value(self, t: float, order: int = 0) -> float:
-        """A derivative at t."""
+        """Return the derivative of this order at time t."""
         return self.at(t).value(t, order)
 
     def times(self, factor: float) -> Pieces:
-        """The law multiplied by a factor."""
+        """Return the law multiplied by a factor."""
         return Pieces(tuple(p.times(factor) for p in self.pieces), self.span)
 
     def table(self) -> tuple[np.ndarray, list[Terms]]:
-        """Rows (start, eight coefficients), shape (n, 9), and the harmonics of each piece."""
+        """Return rows (start, eight coefficients), shape (n, 9), and the harmonics of each piece."""
         rows = np.zeros((len(self.pieces), 1 + COEFFICIENTS))
         for row, p in zip(rows, self.pieces, strict=True):
             row[0], row[1 : 1 + len(p.coefficients)] = p.start, p.coefficients
@@ -100,37 +100,37 @@ class Pieces:
 
 
 def pieces_of(law: object, dimension: str) -> Pieces:
-    """The pieces of any law; ValueError, in words, for values of another dimension."""
+    """Return the pieces of any law; raise ValueError, in words, for values of another dimension."""
     made: Pieces = lookup(PACKAGE, law.type, where="law")(law, dimension)  # type: ignore[attr-defined]
     return made
 
 
 def polynomials(starts: Iterable[float], coefficients: Iterable[Sequence[float]]) -> tuple[Piece, ...]:
-    """Pieces without harmonics."""
+    """Return pieces without harmonics."""
     return tuple(Piece(float(t), tuple(float(c) for c in row)) for t, row in zip(starts, coefficients, strict=True))
 
 
 def covers(law: Pieces, start: float, end: float) -> bool:
-    """Whether the law is known from start to end, but for rounding of the times."""
+    """Return True when the law is defined from start to end, up to rounding of the times."""
     slack = 1e-9 * (end - start)
     return law.span[0] <= start + slack and end - slack <= law.span[1]
 
 
 def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
-    """Time of the first break between start and end where value or rate jumps, and which of them does."""
+    """Return the time of the first break between start and end where value or rate jumps, and which of them does."""
     meeting = [(p, q) for p, q in pairwise(law.pieces) if start < q.start < end]
     for order, word in ((0, "value"), (1, "rate")):
         for left, right in meeting:
             here = left.value(right.start, order), right.value(right.start, order)
             step = abs(here[1] - here[0])
-            # the size of the law is asked for last: most laws meet exactly
+            # the size of the law is evaluated last: most laws meet exactly
             if step > 1e-6 * max(abs(here[0]), abs(here[1])) and step > 1e-6 * size(law, start, end, order):
                 return right.start, word
     return None
 
 
 def size(law: Pieces, start: float, end: float, order: int) -> float:
-    """Largest value of a law, or of a derivative, between two times, on a grid of each piece."""
+    """Return the largest magnitude of a law's derivative of this order between two times, on a grid of each piece."""
     until = [*law.starts[1:], inf]
     spans = [
         (p, max(p.start, start), min(after, end))

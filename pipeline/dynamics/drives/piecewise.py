@@ -1,4 +1,4 @@
-"""Laws one after the other."""
+"""Laws in sequence, each in its own section of time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 
 
 def pieces(law: Piecewise, dimension: str) -> Pieces:
-    """The pieces of each law within its section; ValueError when one does not cover its section."""
+    """Return the pieces of each law within its section; raise ValueError when one does not cover its section."""
     collected = []
     low, high = -inf, inf
     ends = [*(s.start for s in law.sections[1:]), inf]

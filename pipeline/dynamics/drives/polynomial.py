@@ -8,6 +8,6 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 
 def pieces(law: Polynomial, dimension: str) -> Pieces:
-    """One piece."""
+    """Return one piece."""
     coefficients = (coefficient(c, dimension, order) for order, c in enumerate(law.coefficients))
     return Pieces((Piece(law.origin, tuple(coefficients)),))

@@ -1,4 +1,4 @@
-"""A law that starts over, period after period: cycles of a cam, strokes of a press."""
+"""A periodically repeated law: cycles of a cam, strokes of a press."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 
 
 def pieces(law: Repeated, dimension: str) -> Pieces:
-    """The inner law's first period, set down `times` times; the last one continues as the inner law does.
+    """Return the inner law's first period `times` times; the last period continues as the inner law does.
 
-    ValueError when the inner law does not cover its first period.
+    Raises ValueError when the inner law does not cover its first period.
     """
     inner, start, end = pieces_of(law.law, dimension), law.start, law.start + law.period
-    # a table's last time may be a rounding short of the period that is meant
+    # a table's last time may fall short of the period by rounding
     if inner.span[0] > start + 1e-9 * law.period or inner.span[1] < end - 1e-9 * law.period:
         raise ValueError(
             f"the repeated law is known between {inner.span[0]} and {inner.span[1]} s only, not over its period from "

@@ -17,12 +17,12 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, polynomials
 
 
 def pieces(law: Spline, dimension: str) -> Pieces:
-    """A piece between each two points."""
+    """Return one piece between each two points."""
     return through(law.time, [quantity(v, dimension) for v in law.value], law.degree, law.ends)
 
 
 def through(time: Sequence[float], value: Sequence[float], degree: int, ends: Ends) -> Pieces:
-    """The spline through the points; ValueError when they are not periodic though they should be."""
+    """Return the spline through the points; raise ValueError when periodic ends differ in value."""
     if ends == "periodic" and value[0] != value[-1]:
         raise ValueError("a periodic spline must end with the value that it starts with")
     t, x = np.asarray(time, dtype=float), np.asarray(value, dtype=float)

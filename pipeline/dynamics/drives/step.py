@@ -1,4 +1,4 @@
-r"""Sum of smooth steps: each a cubic from 0 to its change, flat outside.
+r"""Sum of smooth steps: each a cubic from 0 to its change, constant before and after.
 
 .. math:: h\,(3 s^2 - 2 s^3), \quad s = (t - t_0)/(t_1 - t_0)
 
@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, polynomials
 
 
 def pieces(law: Step, dimension: str) -> Pieces:
-    """Pieces between all starts and ends; Wang & Wang (2019), eq. (35)."""
+    """Return the pieces between all starts and ends; Wang & Wang (2019), eq. (35)."""
     breaks = sorted({*law.start, *law.end})
     starts = [breaks[0] - 1.0, *breaks]
     changes = [quantity(change, dimension) for change in law.change]
@@ -27,7 +27,7 @@ def _width(starts: list[float], k: int) -> float:
 
 
 def _taylor(law: Step, changes: list[float], t: float, inside: float) -> list[float]:
-    """Coefficients about t of the polynomial that holds at the time `inside`."""
+    """Return the coefficients about t of the polynomial that holds at the time `inside`."""
     c = [0.0] * 4
     for start, end, change in zip(law.start, law.end, changes, strict=True):
         if inside >= end:

@@ -9,7 +9,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
 
 
 def pieces(law: Sum, dimension: str) -> Pieces:
-    """Pieces between all breaks of all laws."""
+    """Return the pieces between all breaks of all laws."""
     laws = [pieces_of(part, dimension) for part in law.laws]
     starts = sorted({float(t) for one in laws for t in one.starts[1:]})
     first = starts[0] - 1.0 if starts else 0.0

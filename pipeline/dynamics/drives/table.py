@@ -1,4 +1,4 @@
-"""A spline through the rows of a file, which the scene has read."""
+"""A spline through the rows of a file, which the scene has already read."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from flexclear.pipeline.dynamics.drives.spline import through
 
 
 def pieces(law: Table, dimension: str) -> Pieces:
-    """A piece between each two rows."""
-    # "1" is the unit of bare numbers; a column of a mechanism says what it measures
+    """Return one piece between each two rows."""
+    # "1" is the unit of bare numbers; a column that states its unit has another one
     factor = 1.0 if law.value.unit == "1" else quantity(f"1 {law.value.unit}", dimension)
     time, value = [t for t, _ in law.points], [factor * v for _, v in law.points]
     return through(time, value, law.degree, law.ends)

@@ -1,12 +1,12 @@
-"""What each effect of a scene brings: the parts that its machine code is composed of, and the modules that hold them.
+"""Effects of a scene: the parts that its machine code is composed of, and the modules that hold these parts.
 
-Nothing is compiled here, nor is anything imported that compiles: generated files (`compile.sources`), lazy imports
-(`core.scene.registry`) and the keys of results (`compile.reach.modules`) read the same tables, those of the family
-folders, and the same declarations, those of the effects.
+This package compiles nothing and imports nothing that compiles. Generated files (`compile.sources`), lazy imports
+(`core.scene.registry`) and the keys of results (`compile.reach.modules`) all read the tables of the family folders and
+the declarations of the effects.
 
-An effect is a folder here. Its declaration is in `effect`; its other modules are called like the folder of the tower
-whose work they do for the effect, and import what modules there may: `model`, `equations`, `contact`, `run`, `record`.
-A load that comes with an effect is a module there, called like the load.
+An effect is a folder here. Its declaration is in `effect`. Its other modules do the work of a folder of the tower for
+the effect and have that folder's name and imports: `model`, `equations`, `contact`, `run`, `record`. A load that comes
+with an effect is a module in the effect's folder, named like the load.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ LOADS, LAWS = "flexclear.pipeline.dynamics.loads", "flexclear.pipeline.dynamics.
 RECORDS = "flexclear.pipeline.dynamics.record"
 EVENTS, RUNS = "flexclear.pipeline.dynamics.events", "flexclear.pipeline.dynamics.run"
 INTEGRATORS, STARTS = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.starts"
-#: ways over singular poses and out of them, and what they are for: a run of loops may meet some, and few do
+#: ways that start at singular poses and pass over them, and the word for them: only runs with loops may need them
 POSES, SINGULAR = ("beginning", "collocation", "passing"), "singular poses"
-#: what a run meets whose tree is deep; what it meets that is integrated by a method
+#: words for what a run encounters: a deep tree, or an integration method
 DEEP, METHOD = "a deep tree", "the method {}"
-#: laws of time that are polynomials throughout, or made of others
+#: laws of time that are polynomials throughout, or composed of other laws
 WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated", "delayed"}
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Which kinds of parts a mechanism has, each sorted by name: all that the code of its equations depends on.
+    """Kinds of parts of a mechanism, each sorted by name: all that the code of its equations depends on.
 
-    surfaces, forms, frictions: of contacts.  loads: their types, of expressions with their structure.
-    effects: names, each followed by the kinds of which its code is composed.  harmonics: whether a law of time has
-    some.  load_kinks: whether loads bend.
-    articulated: whether the tree is so deep that its mass matrix is factored by articulated inertias.
+    surfaces, forms, frictions: of contacts.  loads: their types, with the structure of expressions.
+    effects: names, each followed by the kinds of which its code is composed.  harmonics: True when a law of time has
+    some.  load_kinks: True when loads have kinks.
+    articulated: True when the tree is so deep that articulated inertias factor its mass matrix.
     """
 
     joints: tuple[str, ...]
@@ -66,22 +66,22 @@ class Parts:
 
     @property
     def present(self) -> list[Effect]:
-        """The effects, in the order of their declarations."""
+        """Effects of the parts, in the order of their declarations."""
         names = {one.partition(" ")[0] for one in self.effects}
         return [effect for effect in EFFECTS if effect.name in names]
 
     def functions(self, kind: str) -> list[Any]:
-        """What the effects declare under one of the names of `Effect`, imported now."""
+        """Return the functions that the effects declare under a field name of `Effect`; import them."""
         return [effect.load(getattr(effect, kind)) for effect in self.present if getattr(effect, kind)]
 
     def kinds(self, name: str) -> tuple[str, ...]:
-        """The kinds of which the code of an effect is composed."""
+        """Return the kinds of which the code of an effect is composed."""
         return next((tuple(kinds) for first, *kinds in map(str.split, self.effects) if first == name), ())
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """Which stepper is compiled: method, fixed or chosen steps, events located or noticed at step ends."""
+    """Variant of the stepper: method, fixed or adaptive steps, events located or noticed at step ends."""
 
     integrator: str
     fixed: bool = False
@@ -89,12 +89,12 @@ class Scheme:
 
 
 def scheme_of(solver: Any) -> Scheme:
-    """The scheme that a scene's solver table asks for."""
+    """Return the scheme that a scene's solver table requests."""
     return Scheme(solver.integrator, solver.step is not None, solver.events == "located")
 
 
 def most_parts(scene: Scene) -> Parts:
-    """All parts that the machine code of a scene may have, as far as the scene alone decides: its code has no more."""
+    """Return all parts that the machine code of a scene may have, as far as the scene alone decides."""
     contacts, joints = scene.contacts(), import_module(JOINTS)
     ideal = {joint.type for name, joint in scene.joint.items() if name not in contacts}
     ideal |= {joints.HELD[joint.type] for joint in contacts.values() if joint.type in joints.HELD}
@@ -116,12 +116,12 @@ def most_parts(scene: Scene) -> Parts:
 
 
 def _touches(scene: Scene) -> bool:
-    """Whether there are contacts, or effects that have some."""
+    """Return True when the scene has contacts, or effects with contacts."""
     return bool(scene.contacts()) or any(effect.touches and effect.kinds(scene) is not None for effect in EFFECTS)
 
 
 def _loops(scene: Scene) -> bool:
-    """Whether joints, contacts and paths close loops, or gears their own; the tree may break some that share bodies."""
+    """Return True when joints, contacts, paths or gears close loops; the tree may break some loops of shared bodies."""
     if scene.gear:
         return True
     paths = [("", drive.frame) for drive in scene.drive.values() if isinstance(drive, PathDrive)]
@@ -141,7 +141,7 @@ def _loops(scene: Scene) -> bool:
 
 
 def load_kind(scene: Scene, name: str) -> str:
-    """Kind of a load by which its code is composed: its type, and behind that the structure of its expression."""
+    """Return the kind of a load by which its code is composed: its type, with the structure of its expression."""
     from flexclear.pipeline.core.scene.formulas import formula
 
     written = formula(scene, name)
@@ -155,7 +155,7 @@ def _laws(scene: Scene) -> set[str]:
 
 
 def named(scene: Scene) -> set[str]:
-    """Modules of the parts of families that a scene names; InputError for a name that its family does not have."""
+    """Return modules of the family members that a scene names; raise InputError for names outside their family."""
     contacts, laws = scene.contacts(), sorted(_laws(scene))
     parts = [(INTEGRATORS, integrator, "[solver]") for integrator in _integrators(scene)]
     for name, joint in scene.joint.items():
@@ -179,14 +179,14 @@ def named(scene: Scene) -> set[str]:
 
 
 def ways(scene: Scene) -> list[str]:
-    """What the run of a scene may call for and those of others do not, as `dynamics.run` lists it."""
+    """Return the ways of a run (`dynamics.run`) that this scene may need and others do not."""
     found = []
     if any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
         found.append("inverse dynamics")
     if scene.accuracy.quantities if scene.accuracy is not None else scene.solver.by_need:
         found += ["accuracy", *(["method selection"] if scene.by_need() else [])]
     found += ["horizon"] if _touches(scene) else []
-    # plans make bodies of recipes rigid, whose frames are then known as well as the mesh has them
+    # plans make bodies with recipes rigid, whose frames are then as exact as the mesh has them
     if scene.recipes() or any(body.frame_tolerance for body in scene.rigid().values()):
         found.append("frames to a tolerance")
     if any(" " in load_kind(scene, name) for name in scene.forces()):
@@ -195,9 +195,9 @@ def ways(scene: Scene) -> list[str]:
 
 
 def way(scene: Scene, name: str) -> Any:
-    """What `dynamics.run` lists under a name, imported now, where the scene calls for it; else None.
+    """Import and return the way that `dynamics.run` lists under a name where the scene needs it; else None.
 
-    The key of a run holds it in that case alone.
+    Only then the key of a run contains it.
     """
     if name not in ways(scene):
         return None
@@ -207,9 +207,9 @@ def way(scene: Scene, name: str) -> Any:
 
 
 def schemes(scene: Scene) -> list[Scheme]:
-    """The scheme that a scene asks for, and that of the method that takes over where it would crawl.
+    """Return the requested scheme, and that of the method which takes over where the requested one becomes too slow.
 
-    Those of all methods among which it is chosen, where a scene leaves that open.
+    Where the scene leaves the method open, return the schemes of all candidate methods.
     """
     scheme = scheme_of(scene.solver)
     if scene.by_need():

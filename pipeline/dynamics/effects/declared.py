@@ -1,4 +1,4 @@
-"""The effects that there are, in the order of their blocks in the ledger. To add one: its folder, and its lines here.
+"""List of all effects, in the order of their blocks in the ledger. To add one: its folder, and its lines here.
 
 Only declarations are imported (`effects.effect`).
 """

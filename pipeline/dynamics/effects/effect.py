@@ -1,7 +1,7 @@
-"""What an effect declares: all by which the rest of the program knows of it.
+"""Declaration of an effect: the only part of it that the rest of the program refers to.
 
-A declaration is data. It names the effect's modules in texts, so that to read it imports none of them and no Numba:
-they are imported for scenes that have the effect, and are in the keys of these scenes' results alone.
+A declaration is data. It names the effect's modules as texts, so that reading it imports neither them nor Numba. Only
+scenes that have the effect import its modules and have them in the keys of their results.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ PACKAGE = "flexclear.pipeline.dynamics.effects"
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect; functions of its modules as ``"module:function"``, of a module in its folder.
+    """An effect; it names functions of the modules in its folder as ``"module:function"``.
 
     name: of its folder.
     kinds: for a scene with the effect the kinds by which its code is composed, often none; None for other scenes.
-    family: whose parts these kinds are, below `dynamics`.
-    named: parts of families that it names in a scene: family, name, and where the scene says so.
-    wiring, numbers: rows of its tables in h and f by their names (`memory`). A table in h adds a size ``n_<table>`` to
-    the header, a ledger the size ``<name>_slot``.  work: the same in w, each after how many rows there are.
-    stretches: of w, each with its length; both as `memory` writes them.
-    compose: arguments that it adds to generated files, or replaces there, by the point in `compile.sources` at which
-    it does.  In their texts, ``<module.name>`` is a name in its folder, ``{file}`` the `compile.sources.Composition`,
-    and ``{kinds}`` the tuple of the modules of its kinds.
-    changeable: keys of a scene, as ``table.key``, that decide none but numbers of the effect (`model.refill`).
-    touches: whether it has contacts, which open and close at events.
+    family: package below `dynamics` whose members these kinds are.
+    named: family members that it names in a scene: family, name, and key path in the scene.
+    wiring, numbers: rows of its tables in h and f by table name (`memory`). A table in h adds a size ``n_<table>`` to
+    the header, a ledger the size ``<name>_slot``.  work: likewise in w, each after the number of its rows.
+    stretches: arrays in w, each with its length, as `memory` writes them.
+    compose: arguments that it adds to generated files, or replaces, by the point in `compile.sources` where it does so.
+    In their texts, ``<module.name>`` is a name in its folder, ``{file}`` the `compile.sources.Composition`, and
+    ``{kinds}`` the tuple of the modules of its kinds.
+    changeable: keys of a scene, as ``table.key``, that change only numbers of the effect (`model.refill`).
+    touches: True when it has contacts, which open and close at events.
     fill: ``fill(filling)`` -> rows of the tables by name (`model.filling`).
     ledger: ``ledger(mechanism, energies, lengths)`` -> groups of its block of the ledger (`model.filling.blocks`).
     guards: ``guards(mechanism)`` -> rows of the table GUARDS, on which steps end.
     states: ``states(model, sites, internal)`` -> its internal states that follow from the frames of sites
     (`model.initial.of_effects`).
-    samples: ``sampler(engine)`` -> ``sample(y, t)``, the state after a break of the run, from that before.
-    losses: ``losses(model)`` -> which variables of its ledger are losses (`run.ledger.Losses`).
-    refuses: ``refuse(model, trajectory, seen)``, which raises SolverError for a run that it makes worthless.
-    explains: ``explanation(engine)`` -> why the run stopped, in words, or None.
-    records: ``series(model, seen)`` -> variables and coordinates of the run's dataset, by the beginnings of the
-    variables' names.
+    samples: ``sampler(engine)`` -> ``sample(y, t)``, the state after a break of the run, from the state before.
+    losses: ``losses(model)`` -> the variables of its ledger that are losses (`run.ledger.Losses`).
+    refuses: ``refuse(model, trajectory, seen)``, which raises SolverError for an unusable run.
+    explains: ``explanation(engine)`` -> the reason why the run stopped, in words, or None.
+    records: ``series(model, seen)`` -> variables and coordinates of the run's dataset, by prefixes of the variables'
+    names.
     acts: ``acting(model, seen)`` -> frames on which it acts, moments and forces (`record.wrenches`).
-    warns: ``warnings(run)`` -> sentences about what a run is to be doubted for.
+    warns: ``warnings(run)`` -> warnings about the results of a run.
     """
 
     name: str
@@ -73,17 +73,17 @@ class Effect:
 
     @property
     def sizes(self) -> list[str]:
-        """Names of its sizes in the header."""
+        """Names of the effect's sizes in the header."""
         return [*(f"n_{table}" for table in self.wiring), *([f"{self.name}_slot"] if self.ledger else [])]
 
     @property
     def modules(self) -> set[str]:
-        """Full names of its modules that functions are named of, which are not imported."""
+        """Full names of the effect's modules whose functions it declares; they are not imported."""
         texts = [getattr(self, one.name) for one in fields(self) if one.type == "str"]
         functions = [text.split(":") for text in [*texts, *self.records.values()] if ":" in text]
         return {f"{PACKAGE}.{self.name}.{module}" for module, _ in functions}
 
     def load(self, function: str) -> Any:
-        """A function of its modules, imported now."""
+        """Import and return a function of the effect's modules."""
         module, _, name = function.partition(":")
         return getattr(import_module(f"{PACKAGE}.{self.name}.{module}"), name)

@@ -1,1 +1,1 @@
-"""Kernels of the equations of motion: kinematics, forces, closures, projection and what is recorded."""
+"""Kernels of the equations of motion: kinematics, forces, closures, projection and recorded outputs."""

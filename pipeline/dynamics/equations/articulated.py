@@ -1,13 +1,13 @@
 r"""Elimination along the tree by articulated inertias: linear cost, and rounding that does not grow with its depth.
 
-From the leaves to the ground, each link has the inertia that it offers while everything beyond it moves freely.
-Coordinate after coordinate is taken out of it: with a column s of coordinate k and the inertia I there,
+From the leaves to the ground, each link has the inertia with which it resists while all links beyond it move freely.
+Each coordinate is eliminated from it: with the column s of coordinate k and the inertia I,
 
 .. math:: g = I s, \quad D_k = s\cdot g, \quad K_k = g/\sqrt{D_k}, \qquad I \leftarrow I - K_k K_k^T ,
 
-and what is left joins the parent's inertia. This is the Cholesky factor of the mass matrix, M = LL^T with
-:math:`L_{jk} = s_j\cdot K_k` for k beyond j, without the matrix: it never adds up the inertia of all that a coordinate
-moves, which loses the digits of M's condition number. All vectors of a link refer to its own origin.
+and the rest is added to the parent's inertia. This is the Cholesky factor of the mass matrix, M = LL^T with
+:math:`L_{jk} = s_j\cdot K_k` for k beyond j, without the matrix itself: summing the inertia of all that a coordinate
+moves would lose the digits of M's condition number. All vectors of a link refer to its own origin.
 
 The modes of a flexible link come before the coordinates of its joint (`equations.articulated_modes`).
 
@@ -65,13 +65,13 @@ NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def origin(d, i):
-    """What the inertia of link i refers to is its own origin, far from which it loses digits."""
+    """Return the reference point of link i's inertia: its own origin, since a distant point costs digits."""
     return ZERO
 
 
 @kernel
 def demand_of(d, i, moment, force):
-    """Store the wrench that the accelerations of link i need; WRENCH then is that of all else that acts on it."""
+    """Store the wrench that the accelerations of link i need; WRENCH then has all other wrenches on the link."""
     wrench, body = d.wrench[i], d.articulated[i]
     body.own_moment, body.own_force = moment, force
     wrench.moment, wrench.force = ZERO, ZERO
@@ -129,13 +129,13 @@ def localise_shape(d, k, base, angular, linear):
 
 @kernel
 def step(d, i, arm):
-    """Store the way from the origin of link i's parent to its own; as a difference of positions it loses digits."""
+    """Store the vector from the origin of link i's parent to its own; a difference of positions would lose digits."""
     d.articulated[i].arm = arm
 
 
 @kernel
 def shift(d, i, arm):
-    """Take that way, and its joint's columns, from the joint's frame to link i's origin, from which arm leads there."""
+    """Refer that vector and the joint's columns to link i's origin; arm: vector from there to the joint's frame."""
     link, body = d.links[i], d.articulated[i]
     body.arm = sub(body.arm, arm)
     for k in range(link.c0, link.c0 + link.n_speeds):
@@ -145,7 +145,7 @@ def shift(d, i, arm):
 
 @kernel
 def reduce(d, i):
-    """Take the modes of link i and the coordinates of its joint out of its inertia and pass the rest to its parent.
+    """Eliminate the modes of link i and the coordinates of its joint, and add the remaining inertia to its parent's.
 
     Stores the factor's part of each coordinate (MASS: 1/sqrt(D), GAIN: K) and L^-1 of minus the bias (FORCE).  Returns
     whether all pivots are sound.
@@ -214,7 +214,7 @@ def reduce(d, i):
 
 @kernel
 def forward(d, b):
-    """L^-1 applied to the generalised forces in w from index b."""
+    """Apply L^-1 to the generalised forces in w from index b."""
     for i in range(d.n_links - 1, 0, -1):
         link, body = d.links[i], d.articulated[i]
         moment, force = ZERO, ZERO
@@ -252,9 +252,9 @@ def carried(d, i, b):
 
 @kernel
 def backward(d, b):
-    """L^-T applied to the vector in w from index b; leaves the accelerations of all links, about their origins.
+    """Apply L^-T to the vector in w from index b; store the accelerations of all links, about their origins.
 
-    Those of flexible links are as if they went rigidly with the frame of their joint.
+    Accelerations of flexible links are those of a rigid motion with the frame of their joint.
     """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
@@ -272,7 +272,7 @@ def backward(d, b):
 
 @kernel
 def spread(d, c):
-    """L^-1 J^T of closure c, laid out like J^T: along the way of its two sides to the ground."""
+    """Compute L^-1 J^T of closure c, stored like J^T: along the paths of its two sides to the ground."""
     closure = d.closures[c]
     for t in range(closure.threes):
         start = closure.jacobian0 + 3 * t * closure.n_support
@@ -310,9 +310,9 @@ def spread(d, c):
 
 @kernel
 def transmit(d, b, biased):
-    """What each link needs through its joint, about its origin, for accelerations in w from index b.
+    """Compute the wrench that each link needs through its joint, about its origin, for accelerations at index b.
 
-    biased: 1.0 with the forces that act and what the present motion needs, 0.0 for the accelerations alone.
+    biased: 1.0 includes applied forces and velocity-dependent terms, 0.0 takes the accelerations alone.
     """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
@@ -342,7 +342,7 @@ def transmit(d, b, biased):
 
 @kernel
 def demand(d, j, b, biased):
-    """What the links beyond joint j with friction need through it, about the kernels' origin; after `transmit`."""
+    """Return the wrench through joint j with friction, about the kernels' origin; use after `transmit`."""
     i = d.rubbing[j].link
     moment, force = d.articulated[i].moment, d.articulated[i].force
     return add(moment, cross(d.link_frames[i].origin, force)), force
@@ -350,14 +350,14 @@ def demand(d, j, b, biased):
 
 @kernel
 def along(d, k, i):
-    """What coordinate k of link i's joint must supply of what that joint transmits."""
+    """Return the component along coordinate k of the wrench that link i's joint transmits."""
     local, body = d.local[k], d.articulated[i]
     return dot(local.angular, body.moment) + dot(local.linear, body.force)
 
 
 @kernel
 def drive_forces(d):
-    """Forces that the prescribed coordinates need: what their joints transmit at the accelerations in DU."""
+    """Compute the forces of the prescribed coordinates: wrenches through their joints at the accelerations in DU."""
     if d.n_drives == 0:
         return
     transmit(d, d.at_du, 1.0)
@@ -370,7 +370,7 @@ def drive_forces(d):
 
 @kernel
 def drive_power(d, b, motion):
-    """Power of the drives at accelerations in w from index b; motion: where w has the rates of all coordinates."""
+    """Return the drives' power at accelerations in w from index b; motion: index of the rates of all coordinates."""
     power = 0.0
     if d.n_drives > 0:
         transmit(d, b, 0.0)
@@ -383,7 +383,7 @@ def drive_power(d, b, motion):
 
 
 def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
-    """The kernels unfactor(d), which leaves the modes' own mass so that they can get more, and refactor(d)."""
+    """Build the kernels unfactor(d), which restores the modes' own mass so that more can be added, and refactor(d)."""
     modal_mass = flexible.mass_matrix
 
     @kernel
@@ -396,7 +396,7 @@ def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
 
 
 def make_eliminate(flexible: FlexibleBodies) -> Callable:
-    """The kernel eliminate(d): factor of the mass matrix and L^-1 of minus the bias (FORCE); whether it is sound."""
+    """Build the kernel eliminate(d): factor of the mass matrix, L^-1 of minus the bias (FORCE); True if regular."""
 
     @kernel
     def eliminate(d):

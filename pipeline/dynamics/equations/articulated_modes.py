@@ -1,9 +1,9 @@
 """The modes of flexible links in the elimination along the tree (`equations.articulated`).
 
-They come before the coordinates of the link's joint. With the twist of its joint's frame they have the inertia
-:math:`(I, P; P^T, m)`, to which each link that the body carries adds its own, seen through the columns of the port that
-carries it. The block m has a factor of its own, m = ll^T in its envelope, and :math:`K = P l^{-T}`. Held shapes move no
-port; no closure and no link beyond has a part in them.
+They precede the coordinates of the link's joint. Together with the twist of its joint's frame they have the inertia
+:math:`(I, P; P^T, m)`. Each link that the body carries adds its inertia, transformed by the columns of its port. The
+block m has its own factor, m = ll^T in its envelope, and :math:`K = P l^{-T}`. Shapes with held interfaces move no
+port; no closure and no link beyond contributes to them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def outer(s, a, b):
 
 @kernel
 def begin_modes(d):
-    """Forces on the modes, and momenta of their rates, to which what bodies carry is to be added."""
+    """Initialise the forces on the modes and the momenta of their rates, before carried links add theirs."""
     for f in range(d.n_flex):
         body = d.flexes[f]
         for k in range(body.c0, body.c0 + body.n_modes):
@@ -61,7 +61,7 @@ def load_modes(d, p, A, B, C):
 
 @kernel
 def push_modes(d, p, b, moment, force):
-    """Take a wrench that port p passes on, about the link's origin, off the forces on its modes in w from index b."""
+    """Subtract a wrench through port p, about the link's origin, from the forces on its modes in w from index b."""
     port = d.ports[p]
     n, c = moving(d.flexes[port.flex])
     for j in range(n):
@@ -71,7 +71,7 @@ def push_modes(d, p, b, moment, force):
 
 @kernel
 def forward_modes(d, f, b, moment, force):
-    """L^-1 of the forces on the modes of body f in w from index b; the wrench of what it carries, with theirs."""
+    """Apply L^-1 to the forces on the modes of body f in w from index b; return the carried wrench with theirs."""
     body = d.flexes[f]
     begin, end = body.c0, body.c0 + body.n_modes
     envelope.forward(d.h, d.at_envelope, d.w, d.at_mass, begin, end, b)
@@ -83,7 +83,7 @@ def forward_modes(d, f, b, moment, force):
 
 @kernel
 def factor_modes(d, f, least):
-    """The factor of the modal block of body f, and K of its modes; whether pivots exceed a fraction of the diagonal."""
+    """Factorise the modal block of body f, and K of its modes; return True when pivots are large enough."""
     body = d.flexes[f]
     begin, end = body.c0, body.c0 + body.n_modes
     sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, begin, end, least)
@@ -100,7 +100,7 @@ def factor_modes(d, f, least):
 
 @kernel
 def backward_modes(d, f, b, angular, linear):
-    """L^-T of the modes of body f in w from index b, where its joint's frame accelerates so, about its origin."""
+    """Apply L^-T to the modes of body f in w from index b, for given accelerations of its joint's frame."""
     begin, end = d.flexes[f].c0, d.flexes[f].c0 + d.flexes[f].n_modes
     for k in range(begin, end):
         d.w[b + k] -= dot(d.gain[k].moment, angular) + dot(d.gain[k].force, linear)
@@ -109,7 +109,7 @@ def backward_modes(d, f, b, angular, linear):
 
 @kernel
 def at_port(d, p, b, angular, linear):
-    """An acceleration of a link with what its shapes add at port p, at those in w from index b."""
+    """Return a link's acceleration at port p, with the part of its shapes' accelerations in w from index b."""
     port = d.ports[p]
     n, c = moving(d.flexes[port.flex])
     for j in range(n):
@@ -120,7 +120,7 @@ def at_port(d, p, b, angular, linear):
 
 @kernel
 def deforming(d, f, b, angular, linear):
-    """The acceleration of the frame of body f, whose modes have those in w from index b, from that of its joint's; and
+    """Return the acceleration of body f's frame from that of its joint's frame and its modes' in w from index b, and
     the wrench that its deformation needs."""
     body, moment, force = d.flexes[f], ZERO, ZERO
     for k in range(body.c0, body.c0 + body.n_modes):
@@ -137,7 +137,7 @@ def deforming(d, f, b, angular, linear):
 
 @kernel
 def begin_shapes(d, path, start):
-    """Three rows of J^T for the shapes of a link on a closure's way to the ground, from which what comes is taken."""
+    """Initialise three rows of J^T for the shapes of a link on a closure's path to the ground."""
     n, _ = moving(d.flexes[d.links[path.link].flex])
     for place in range(start + 3 * path.shapes, start + 3 * (path.shapes + n)):
         d.spread[place] = d.jacobian[place]
@@ -145,7 +145,7 @@ def begin_shapes(d, path, start):
 
 @kernel
 def spread_shapes(d, path, start, moments, forces):
-    """L^-1 J^T of three rows for these shapes; what the link then transmits of them."""
+    """Compute L^-1 J^T of three rows for these shapes; return the wrenches that the link transmits."""
     n, c = moving(d.flexes[d.links[path.link].flex])
     first = start + 3 * path.shapes
     for j in range(n):
@@ -160,7 +160,7 @@ def spread_shapes(d, path, start, moments, forces):
 
 @kernel
 def push_shapes(d, p, first, moments, forces):
-    """Take what port p transmits, about the link's origin, off three rows for its shapes from `first` on."""
+    """Subtract the wrenches through port p, about the link's origin, from three rows for its shapes from `first` on."""
     port = d.ports[p]
     n, _ = moving(d.flexes[port.flex])
     for j in range(n):

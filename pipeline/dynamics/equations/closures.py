@@ -1,4 +1,4 @@
-r"""Loop closures: rows, Jacobian, and the multipliers that keep them closed.
+r"""Loop closures: rows, Jacobian and multipliers.
 
 A closure row is a wrench (moment about the world's origin, force); its Jacobian against a
 coordinate is that wrench times the coordinate's column. With :math:`M = LL^T` the multipliers solve
@@ -6,10 +6,10 @@ coordinate is that wrench times the coordinate's column. With :math:`M = LL^T` t
 .. math:: (J M^{-1} J^T)\lambda = \gamma - J M^{-1} f, \qquad
           M\dot v = f + J^T\lambda
 
-with :math:`L^{-1}J^T` kept on the support of each closure (the coordinates on the way to the ground).
+with :math:`L^{-1}J^T` stored on the support of each closure (the coordinates on its paths to the ground).
 
-Rows that follow from others (planar loops in space, Bricard's loop) are not solved for: the kept
-rows of a closure come first among its rows, the residuals of all are known (`model.selection`).
+Rows that follow from others (planar loops in space, Bricard's loop) are redundant. The selected rows of a closure come
+first among its rows; the residuals of all rows are computed (`model.selection`).
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from flexclear.pipeline.dynamics.equations.envelope import backward, factor, for
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, axis, cross, dot, dot_wrench, scale, sub
 
-#: pivots of J M^-1 J^T below this fraction of their diagonal mean a singular configuration
+#: pivots of J M^-1 J^T below this fraction of their diagonal entry indicate a singular configuration
 SINGULAR_PIVOT = 1e-13
 
 
 @kernel
 def rows(d, c):
-    """Wrenches, residuals [m or -], rates and acceleration biases of closure c; Wang & Wang (2019), eqs. (30), (31)."""
+    """Compute wrenches, residuals [m or -], rates and biases of closure c; Wang & Wang (2019), eqs. (30), (31)."""
     closure = d.closures[c]
     a, b = d.site_frames[closure.site_a], d.site_frames[closure.site_b]
     A, B, omega_a, omega_b, p_b = a.axes, b.axes, a.omega, b.omega, b.origin
@@ -57,7 +57,7 @@ def rows(d, c):
 
 @kernel
 def at_some(a, i, count):
-    """The first `count` entries of a vector stored from index i, zeros for those that are not there."""
+    """Return the first `count` entries of a vector stored from index i, padded with zeros."""
     return (a[i], a[i + 1] if count > 1 else 0.0, a[i + 2] if count > 2 else 0.0)
 
 
@@ -73,13 +73,13 @@ def put_some(a, i, v, count):
 
 @kernel
 def three(closure, t):
-    """Index in JACOBIAN or SPREAD of the t-th three rows of a closure: slot after slot, side by side."""
+    """Return the index in JACOBIAN or SPREAD of the t-th three rows of a closure, stored slot after slot."""
     return closure.jacobian0 + 3 * t * closure.n_support
 
 
 @kernel
 def jacobian(d, c):
-    """J^T of closure c on its support."""
+    """Compute J^T of closure c on its support."""
     closure = d.closures[c]
     for t in range(closure.threes):
         start, k = three(closure, t), closure.row0 + 3 * t
@@ -102,13 +102,13 @@ def jacobian(d, c):
 
 @kernel
 def put_couplings(d, row, column, values, count):
-    """The first `count` of three entries of J M^-1 J^T."""
+    """Store the first `count` of three entries of J M^-1 J^T."""
     put_some(d.schur, d.closure_envelope[row].origin + column, values, count)
 
 
 @kernel
 def couple(d, p):
-    """The block of J M^-1 J^T between the closures of pair p, three by three entries after the other."""
+    """Compute the block of J M^-1 J^T between the closures of pair p, by blocks of three by three."""
     pair = d.closure_pairs[p]
     a, b = d.closures[pair.a], d.closures[pair.b]
     for t in range(b.threes):
@@ -131,7 +131,7 @@ def couple(d, p):
 
 @kernel
 def couple_all(d):
-    """The factor of J M^-1 J^T, from L^-1 J^T."""
+    """Factorise J M^-1 J^T, from L^-1 J^T."""
     for k in range(d.schur_size):
         d.schur[k] = 0.0
     for p in range(d.n_closure_pairs):
@@ -146,7 +146,7 @@ def couple_all(d):
 
 @kernel
 def independence(d):
-    """Smallest pivot of J M^-1 J^T as a fraction of the largest that its row's diagonal entry has been on the way."""
+    """Return the smallest pivot of J M^-1 J^T over its row's largest diagonal entry during the elimination."""
     most = 1.0
     for r in range(d.n_kept_rows):
         inverse = d.schur[d.closure_envelope[r].origin + r]
@@ -156,7 +156,7 @@ def independence(d):
 
 @kernel
 def add_spread(d, y, weight):
-    """Y <- y + weight L^-1 J^T lambda, y in w."""
+    """Add weight L^-1 J^T lambda to y in w."""
     for c in range(d.n_closures):
         closure = d.closures[c]
         for t in range(closure.threes):
@@ -169,7 +169,7 @@ def add_spread(d, y, weight):
 
 @kernel
 def take_spread(d, y):
-    """Lambda <- lambda - (L^-1 J^T)^T y, y in w."""
+    """Subtract (L^-1 J^T)^T y from lambda, y in w."""
     for c in range(d.n_closures):
         closure = d.closures[c]
         for t in range(closure.threes):
@@ -183,7 +183,7 @@ def take_spread(d, y):
 
 @kernel
 def gather_rows(d, values):
-    """The kept ones of the rows' values from w[values] on, as a right-hand side for the multipliers."""
+    """Copy the selected rows' values from w[values] on to the right-hand side of the multipliers."""
     for c in range(d.n_closures):
         closure = d.closures[c]
         for k in range(closure.n_kept):
@@ -192,15 +192,15 @@ def gather_rows(d, values):
 
 @kernel
 def solve(d):
-    """Multipliers from their right-hand side, in place."""
+    """Solve for the multipliers in place of their right-hand side."""
     forward(d.h, d.at_closure_envelope, d.w, d.at_schur, 0, d.n_kept_rows, d.at_multiplier)
     backward(d.h, d.at_closure_envelope, d.w, d.at_schur, 0, d.n_kept_rows, d.at_multiplier)
 
 
 @kernel
 def respond(d):
-    """Multipliers of what is asked of the rows (there, in place) and of FORCE, which holds L^-1 f and is completed by
-    them: L^-T then gives the accelerations."""
+    """Solve for the multipliers in place of the rows' required rates; FORCE, which has L^-1 f, gets their part, so that
+    L^-T gives the accelerations."""
     take_spread(d, d.at_force)
     solve(d)
     add_spread(d, d.at_force, 1.0)
@@ -208,14 +208,14 @@ def respond(d):
 
 @kernel
 def finish(d):
-    """Multipliers of the rows' biases and of FORCE; see `respond`."""
+    """Solve for the multipliers of the rows' biases and of FORCE; see `respond`."""
     gather_rows(d, d.at_gamma)
     respond(d)
 
 
 @kernel
 def locate(d):
-    """Rows and Jacobians of all closures."""
+    """Compute rows and Jacobians of all closures."""
     for c in range(d.n_closures):
         rows(d, c)
         jacobian(d, c)
@@ -223,13 +223,13 @@ def locate(d):
 
 @kernel
 def wrench_row(d, c, part):
-    """First row of ROWS of closure c; of a coupling that of its second joint, or of its first one (part 1)."""
+    """Return the first row of ROWS of closure c; of a coupling that of its second joint, or of its first (part 1)."""
     return d.closures[c].row0 if part == 0 else d.n_closure_rows + d.closures[c].coupling
 
 
 @kernel
 def closure_wrench(d, c, part):
-    """Wrench of closure c on its second body, or of a coupling on its first joint (part 1)."""
+    """Return the wrench of closure c on its second body, or of a coupling on its first joint (part 1)."""
     closure, moment, force, first = d.closures[c], ZERO, ZERO, wrench_row(d, c, part)
     for k in range(closure.n_kept):
         size, row = d.multiplier[closure.kept0 + k], d.rows[first + k]
@@ -239,7 +239,7 @@ def closure_wrench(d, c, part):
 
 @kernel
 def known_forces(d):
-    """Take what closures do along known columns out of the forces that the drives must supply."""
+    """Subtract the closures' forces along prescribed coordinates from the forces that the drives must supply."""
     for e in range(d.n_known_entries):
         known = d.known_entries[e]
         closure, column = d.closures[known.closure], d.columns[known.column]
@@ -252,10 +252,10 @@ def known_forces(d):
 class Closing(NamedTuple):
     """Kernels of all closures.
 
-    close(d): rows, Jacobians and multipliers, see `finish`.  complete(d): the factor of J M^-1 J^T, of Jacobians that
-    are there; needs the factor of M.  correction(d, residual, step): step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both
-    indices in w, with the factors of `complete`: the least correction of the coordinates, in the metric of M, that
-    undoes a residual.  known_forces(d): takes what closures do out of the forces that the drives must supply.
+    close(d): rows, Jacobians and multipliers, see `finish`.  complete(d): factor of J M^-1 J^T for known Jacobians;
+    needs the factor of M.  correction(d, residual, step): step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both indices in
+    w, with the factors of `complete`: the least correction of the coordinates, in the metric of M, that removes a
+    residual. known_forces(d): subtracts the closures' forces from those that the drives must supply.
     """
 
     close: Callable
@@ -267,7 +267,7 @@ class Closing(NamedTuple):
 def make_closing(tree: Any, locate: Callable = locate) -> Closing:
     """Return the kernels of all closures.
 
-    tree: what factors the mass matrix, the module `articulated` or `composite`.  locate: fills rows and Jacobians.
+    tree: the module that factors the mass matrix.  locate: fills rows and Jacobians.
     """
     spread, tree_backward = tree.spread, tree.backward
 

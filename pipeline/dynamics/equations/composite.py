@@ -20,7 +20,7 @@ MASSLESS_COMPOSITE = 1e-15
 
 @kernel
 def origin(d, i):
-    """What the inertia of link i refers to is the kernels' origin: where the link's own is from there."""
+    """Return the origin of link i from the kernels' origin, to which its inertia refers."""
     return d.link_frames[i].origin
 
 
@@ -37,13 +37,13 @@ def column(d, k):
     return d.columns[k].angular, d.columns[k].linear
 
 
-# columns about the kernels' origin are enough, and positions; `demand` has momenta and wrenches passed to the ground
+# columns and positions about the kernels' origin suffice; `demand` uses momenta and wrenches summed towards the ground
 localise = localise_shape = step = shift = transmit = nothing
 
 
 @kernel
 def copy_inertia(d):
-    """Inertia of each link's tree, to which the links beyond are still to be added."""
+    """Initialise the inertia of each link's subtree with its own; the links beyond add theirs later."""
     for i in range(d.n_links):
         tree, own = d.inertia[i], d.own[i]
         tree.mass, tree.moment = own.mass, own.moment
@@ -53,7 +53,7 @@ def copy_inertia(d):
 
 @kernel
 def gather(d, i):
-    """Force and momentum of link i's coordinates; then take its subtree to its parent."""
+    """Compute force and momentum of link i's coordinates, and add its subtree to its parent's."""
     link, wrench = d.links[i], d.wrench[i]
     for k in range(link.c0, link.c0 + link.n_speeds):
         carry(d, i, k)
@@ -71,7 +71,7 @@ def gather(d, i):
 
 @kernel
 def assemble_mass(d):
-    """Mass matrix in its envelope, from momenta and columns."""
+    """Assemble the mass matrix in its envelope, from momenta and columns."""
     for p in range(d.n_pairs):
         pair = d.pairs[p]
         momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
@@ -80,19 +80,19 @@ def assemble_mass(d):
 
 @kernel
 def forward(d, b):
-    """L^-1 applied to the generalised forces in w from index b."""
+    """Apply L^-1 to the generalised forces in w from index b."""
     envelope.forward(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, b)
 
 
 @kernel
 def backward(d, b):
-    """L^-T applied to the vector in w from index b."""
+    """Apply L^-T to the vector in w from index b."""
     envelope.backward(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, b)
 
 
 @kernel
 def spread(d, c):
-    """L^-1 J^T of closure c, laid out like J^T."""
+    """Compute L^-1 J^T of closure c, stored like J^T."""
     closure = d.closures[c]
     for t in range(closure.threes):
         start = closure.jacobian0 + 3 * t * closure.n_support
@@ -109,9 +109,9 @@ def spread(d, c):
 
 @kernel
 def demand(d, j, b, biased):
-    """What the links beyond joint j with friction need through it for accelerations in w from index b.
+    """Return the wrench through joint j with friction for accelerations in w from index b.
 
-    biased: 1.0 with the forces that act and what the present motion needs, 0.0 for the accelerations alone.
+    biased: 1.0 includes applied forces and velocity-dependent terms, 0.0 takes the accelerations alone.
     """
     joint, moment, force, angular, linear = d.rubbing[j], ZERO, ZERO, ZERO, ZERO
     for k in range(joint.momentum0, joint.momentum0 + joint.n_momenta):
@@ -129,7 +129,7 @@ def demand(d, j, b, biased):
 
 @kernel
 def drive_forces(d):
-    """Forces that the prescribed coordinates need: their rows of the equations of motion."""
+    """Compute the forces of the prescribed coordinates: their rows of the equations of motion."""
     for k in range(d.n_drives):
         d.drive_force[k] = d.bias[d.nv + k]
     for p in range(d.n_known_pairs):
@@ -141,7 +141,7 @@ def drive_forces(d):
 
 @kernel
 def drive_power(d, b, motion):
-    """Power of the drives at accelerations in w from index b; motion: where w has the rates of all coordinates."""
+    """Return the drives' power at accelerations in w from index b; motion: index of the rates of all coordinates."""
     power = 0.0
     for p in range(d.n_known_pairs):
         pair = d.known_pairs[p]
@@ -152,7 +152,7 @@ def drive_power(d, b, motion):
 
 
 def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
-    """The kernels unfactor(d), which leaves the mass matrix so that modes can get more, and refactor(d)."""
+    """Build the kernels unfactor(d), which restores the mass matrix so that more can be added, and refactor(d)."""
 
     @kernel
     def unfactor(d):
@@ -166,7 +166,7 @@ def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
 
 
 def make_eliminate(flexible: FlexibleBodies) -> Callable:
-    """The kernel eliminate(d): factor of the mass matrix and L^-1 of minus the bias (FORCE); whether it is sound."""
+    """Build the kernel eliminate(d): factor of the mass matrix, L^-1 of minus the bias (FORCE); True if regular."""
     port_load, modal = flexible.port_load, flexible.modal_forces
 
     @kernel

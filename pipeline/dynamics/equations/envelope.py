@@ -2,11 +2,11 @@
 
 In the order "descendants before ancestors" the mass matrix of a tree has no fill outside this
 envelope (Featherstone, *Rigid Body Dynamics Algorithms*, sec. 6.5), so that the cost follows the
-branches of the mechanism. A matrix lies in w from place `a`; its row table (first column, origin)
-in h from place `e`. Rows from `begin` to before `end` are worked on, with no column before `begin`: all, or a block on
-the diagonal. On its diagonal a factor L holds the reciprocals 1/L_ii, by which all that it is applied to multiplies.
+branches of the mechanism. A matrix is stored in w from index `a`; its row table (first column, origin)
+in h from index `e`. Functions process rows from `begin` to before `end`, with no column before `begin`: all, or a
+diagonal block. The diagonal of a factor L has the reciprocals 1/L_ii, so that its application multiplies.
 
-The inmost loops count for themselves: `range` counts its turns besides, a sixth of their instructions.
+The innermost loops are while loops: `range` counts its turns as well, a sixth of their instructions.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def base(h, e, a, i):
-    """Place in w of column 0 of row i (which may lie before the row's first entry)."""
+    """Return the index in w of column 0 of row i (possibly before the row's first entry)."""
     return a + h[e + 2 * i + 1]
 
 
 @kernel
 def factor(h, e, w, a, begin, end, threshold):
-    """Overwrite a symmetric matrix with its factor L, reciprocals on the diagonal; whether it is one.
+    """Overwrite a symmetric matrix with its factor L, reciprocals on the diagonal; return True on success.
 
-    It is not, and unusable, where a pivot is at most this fraction of its diagonal entry before elimination: the matrix
-    is not positive definite to working precision.
+    It fails when a pivot is at most this fraction of its diagonal entry before elimination: the matrix is not positive
+    definite to working precision.
     """
     sound = True
     for i in range(begin, end):
@@ -51,7 +51,7 @@ def factor(h, e, w, a, begin, end, threshold):
 
 @kernel
 def multiply(h, e, w, a, n):
-    """Overwrite a factor L with the matrix L L^T that it is of."""
+    """Overwrite a factor L with its matrix L L^T."""
     for i in range(n - 1, -1, -1):
         first, row = h[e + 2 * i], base(h, e, a, i)
         for j in range(i, first - 1, -1):
@@ -64,7 +64,7 @@ def multiply(h, e, w, a, n):
 
 @kernel
 def forward(h, e, w, a, begin, end, b):
-    """L^-1 applied to the vector in w from place b."""
+    """Apply L^-1 to the vector in w from index b."""
     for i in range(begin, end):
         row = base(h, e, a, i)
         total = w[b + i]
@@ -77,7 +77,7 @@ def forward(h, e, w, a, begin, end, b):
 
 @kernel
 def backward(h, e, w, a, begin, end, b):
-    """L^-T applied to the vector in w from place b."""
+    """Apply L^-T to the vector in w from index b."""
     for i in range(end - 1, begin - 1, -1):
         row = base(h, e, a, i)
         value = w[b + i] * w[row + i]

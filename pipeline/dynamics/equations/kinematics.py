@@ -20,7 +20,7 @@ def _store(frame, p, R, omega, v, alpha, a):
 
 @kernel
 def rigid_site(d, s):
-    """Motion of a site from that of its rigid link; the way to it from the link's origin."""
+    """Compute the motion of a site from that of its rigid link; return the vector to it from the link's origin."""
     frame, site = d.link_frames[d.sites[s].link], d.site_numbers[s]
     R, omega, alpha = frame.axes, frame.omega, frame.alpha
     arm = turn(R, site.origin)
@@ -32,11 +32,11 @@ def rigid_site(d, s):
 
 
 def make_kinematics(joints: tuple[Any, ...], tree: Any, flexible: FlexibleBodies) -> Callable:
-    """The kernel kinematics(d) that moves everything.
+    """Build the kernel kinematics(d), which computes the motion of all links and sites.
 
-    joints: modules of the joint types present.  tree: what factors the mass matrix; its localise(d, k, angular, linear)
-    is called with each column about its joint's frame, its step(d, i, arm) for each link with the way from its parent's
-    origin to its joint's frame.  flexible: kernels of the flexible bodies.
+    joints: modules of the joint types present.  tree: the module that factors the mass matrix; its localise(d, k,
+    angular, linear) is called with each column about its joint's frame, its step(d, i, arm) for each link with the
+    vector from its parent's origin to its joint's frame.  flexible: kernels of the flexible bodies.
     """
     joint_motion = choose(tuple(joint.motion for joint in joints))
     position_rate = choose(tuple(joint.position_rate for joint in joints))
@@ -45,7 +45,8 @@ def make_kinematics(joints: tuple[Any, ...], tree: Any, flexible: FlexibleBodies
 
     @kernel
     def place(d, i, way):
-        """Link i from its inboard site, which must be up to date; way: to there from its parent's origin.
+        """Compute link i from its inboard site, which must be up to date; way: vector to there from its parent's
+        origin.
 
         The relative twist is S u in the axes of the joint's first frame F, its rate S u' + bias.
         """
@@ -76,12 +77,12 @@ def make_kinematics(joints: tuple[Any, ...], tree: Any, flexible: FlexibleBodies
 
     @kernel
     def locate(d, s):
-        """Site s from its link; the way to it from the link's origin."""
+        """Compute site s from its link; return the vector to it from the link's origin."""
         return port_site(d, s) if d.sites[s].port >= 0 else rigid_site(d, s)
 
     @kernel
     def kinematics(d):
-        """All links and sites: positions from X, velocities from U, accelerations from DU.
+        """Compute all links and sites: positions from X, velocities from U, accelerations from DU.
 
         With the known part of the accelerations in DU this gives the acceleration bias; with the
         whole of them, the accelerations. Gravity is an upward acceleration of the ground.

@@ -1,6 +1,6 @@
 """Motion of the bodies and frames that a scene names, from that of the links that carry them, for the record.
 
-Kernels write each quantity of all rows of the record in one piece, as datasets have it.
+Kernels store each quantity of all rows of the record contiguously, as datasets have it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_symmetric,
 )
 
-#: what is written of every body, in this order, and how many numbers each is; together
+#: outputs of every body, in this order, and how many numbers each is; their sum
 OF_BODIES = {"position": 3, "quaternion": 4, "velocity": 3, "omega": 3, "acceleration": 3, "alpha": 3, "demand": 6}
 SIZE = sum(OF_BODIES.values())
 

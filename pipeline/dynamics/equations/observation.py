@@ -1,4 +1,4 @@
-"""What is recorded of a state: true accelerations, joint forces, contacts, energies."""
+"""Outputs of a state: true accelerations, joint forces, contacts, energies."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ BEARING = m.NAMED["bearing"]
 #: variables of a run's dataset with their dimensions, and coordinates
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 Series = tuple[Variables, dict[str, object]]
-#: tolerance by which the loops of rows stay as they are, and nothing but frames is written
+#: tolerance with which the loops of rows are not closed, and only frames are stored
 AS_RECORDED = -1.0
-#: of so many rows one is closed first, and those between two of them start from what that changed there, where rows
-#: follow at distances in time that differ by no more than this fraction
+#: one of so many rows is closed first; its change predicts those of the rows between, if the rows' distances in time
+#: differ by at most this fraction
 STRIDE, EVEN = 4, 1e-6
 
 
 @dataclass(frozen=True)
 class Observed:
-    """What is observed of rows of the record; all over the rows, world axes, from the kernels' origin.
+    """Outputs at rows of the record; all over the rows, in world axes, from the kernels' origin.
 
     state: with its loops closed, (rows, NY).  positions, speeds, accelerations: of all coordinates, free ones first.
     links, sites: their frames (LINK_FRAMES), of which accelerations are true ones less gravity; (rows, links or sites).
     body_position, ...: of the moving bodies' centres of mass and axes, (rows, bodies, 3); quaternions w x y z, w >= 0,
-    (rows, bodies, 4).  frame_position: of all named frames, (rows, frames, 3).  Of flexible bodies as if undeformed.
-    body_demand: what rigid bodies need to move as they do, less their weight, where others share their link: moment
-    about the kernels' origin, force; (rows, bodies, 6), 0 of all others.
+    (rows, bodies, 4).  frame_position: of all named frames, (rows, frames, 3), of flexible bodies as if undeformed.
+    body_demand: wrench that rigid bodies need for their motion, less their weight, when others share their link: moment
+    about the kernels' origin, force; (rows, bodies, 6), 0 for all others.
     link_wrenches: on each link through its inboard joint; closure_wrenches: on the closures' second bodies; moment
-    about the kernels' origin (WRENCH).  touch, loads, bearings: what contacts, loads and bearings with friction do
-    (TOUCH, LOAD, BEARING).
+    about the kernels' origin (WRENCH).  touch, loads, bearings: of contacts, loads and bearings with friction (TOUCH,
+    LOAD, BEARING).
     drive_force: along the drives' coordinates in the tree [N or N m].  energy: ENERGY, (rows, independent
     mechanisms).
-    jacobian: of the closure rows solved for, as the kernels store it.
-    residual: largest violation of a closure, shape (rows,).  status: what an evaluation reports there, shape (rows,).
+    jacobian: of the selected closure rows, as the kernels store it.
+    residual: largest residual of a closure, shape (rows,).  status: of the evaluation, shape (rows,).
     """
 
     state: np.ndarray
@@ -78,9 +78,9 @@ class Observed:
 
 
 def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
-    """What `observe` writes, in its order: of what in each row, and how many of them.
+    """Return the outputs of `observe` in order, with their kind and number per row.
 
-    Of rows of a table, of vectors of so many numbers, or of floats (None).
+    Kinds: rows of a table, vectors of so many numbers, or floats (None).
     """
     drives = size(m.N_DRIVES)
     return {
@@ -110,20 +110,20 @@ def _frames(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
 
 
 class Frames(NamedTuple):
-    """Frames of links and sites in rows of the record; of LINK_FRAMES without accelerations, (rows, links or sites)."""
+    """Frames of links and sites in rows of the record: LINK_FRAMES without accelerations, (rows, links or sites)."""
 
     links: np.ndarray
     sites: np.ndarray
 
 
-#: what `observe` has written, each over the rows: (rows, numbers)
+#: outputs that `observe` has stored, each over the rows: (rows, numbers)
 Blocks = dict[str, np.ndarray]
 
 
 def room(rows: int, size: Callable[[int], int], *, frames: bool = False) -> tuple[np.ndarray, Blocks]:
-    """Zeros that `observe` can write on, all in one piece, and the parts of it; size: of a place in the header.
+    """Allocate zeros for `observe`, contiguous, and return them with their parts; size: returns a number of the header.
 
-    One quantity of all rows is in one piece, as datasets have it.  frames: whether only they are written.
+    Each quantity of all rows is contiguous, as datasets have it.  frames: whether only frames are stored.
     """
     columns = _frames(size) if frames else _columns(size)
     widths = [_numbers(kind) * count for kind, count in columns.values()]
@@ -138,13 +138,13 @@ def _numbers(kind: Any) -> int:
 
 
 def frames_by_name(blocks: Blocks, size: Callable[[int], int]) -> Frames:
-    """Views of the frames alone that `observe` has written."""
+    """Return views of the frames that `observe` has stored alone."""
     known = ["origin", "axes", "omega", "velocity"]
     return Frames(*(_named(kind, count, blocks[name])[known] for name, (kind, count) in _frames(size).items()))
 
 
 def by_name(blocks: Blocks, size: Callable[[int], int]) -> Observed:
-    """Views of what `observe` has written."""
+    """Return views of the outputs that `observe` has stored."""
     fields = {name: _named(kind, count, blocks[name]) for name, (kind, count) in _columns(size).items()}
     accelerations = np.concatenate([fields.pop("free_accelerations"), fields.pop("driven_accelerations")], axis=1)
     single = {name: fields[name][:, 0] for name in ("residual", "status")}
@@ -159,20 +159,20 @@ def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
 
 @kernel
 def columns_before_state(d):
-    """Columns of what is worked out, and of the frames of links and sites."""
+    """Return the number of columns of computed outputs, and of the frames of links and sites."""
     return SIZE * d.n_bodies + 3 * d.n_frames + 2 + m.FRAME.size * (d.n_links + d.n_sites)
 
 
 @kernel
 def place_of(k, count):
-    """Row that comes k-th: of `count` rows every fourth comes first."""
+    """Return the k-th row in the order of processing: every fourth of `count` rows precedes the others."""
     first = (count + STRIDE - 1) // STRIDE
     return STRIDE * k if k < first else (k - first) + (k - first) // (STRIDE - 1) + 1
 
 
 @kernel
 def even(rows, first, last):
-    """Whether the rows from the first to the last follow at equal distances in time."""
+    """Return True when the rows from the first to the last have equal distances in time."""
     step = (rows[last, 0] - rows[first, 0]) / (last - first)
     most = 0.0
     for r in range(first, last):
@@ -182,17 +182,17 @@ def even(rows, first, last):
 
 @kernel
 def component_of(d, a, b):
-    """Independent mechanism to which what acts between sites belongs; a: may be -1."""
+    """Return the independent mechanism of a part that acts between sites; a may be -1."""
     other = d.links[d.sites[a].link].component if a >= 0 else -1
     return max(other, d.links[d.sites[b].link].component)
 
 
 @kernel
 def foresee(d, rows, r, state, closed, states):
-    """Add to Y, which is as recorded, what closing the loops is to change there; whether that is anything.
+    """Add the predicted change by closing the loops to the recorded state in Y; return True when there is one.
 
-    By how much loops are open grows and falls within a step as smoothly as the motion: the cubic through the changes
-    of two rows before and two after that have been closed.  states: place of their states, row after row, in closed.
+    The residual of the loops varies within a step as smoothly as the motion: the prediction is the cubic through the
+    changes of two closed rows before and two after.  states: index of their states, row after row, in closed.
     """
     before, most = r - r % STRIDE, 0.0
     s = (r - before) / STRIDE
@@ -218,9 +218,9 @@ def make_description(
     couplings: Callable = nothing,
     friction: Callable = nothing,
 ) -> Callable:
-    """The kernel describe(h, f, w, n): motion, wrenches and energies of what has been evaluated.
+    """Build the kernel describe(h, f, w, n): motion, wrenches and energies of the last evaluation.
 
-    couplings: takes them off their links (`effects.gears`); friction: of ideal joints, in closures
+    couplings: subtracts gears' wrenches from their links (`effects.gears`); friction: of ideal joints, in closures
     (`effects.joint_friction`); the other arguments are those of `make_rates`.
     """
     bodies = flexible(composite)  # wrenches about the kernels' origin
@@ -230,7 +230,7 @@ def make_description(
 
     @kernel
     def closure_wrenches(d):
-        """Wrench of every closure on its second body; taken off the links that it acts on."""
+        """Compute the wrench of every closure on its second body, and subtract it from the links it acts on."""
         for c in range(d.n_closures):
             closure, moment, force = d.closures[c], ZERO, ZERO
             for k in range(closure.n_kept):
@@ -246,7 +246,7 @@ def make_description(
 
     @kernel
     def joint_wrenches(d):
-        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler)."""
+        """Compute the wrench on every link through its inboard joint, at its frames' accelerations (Newton-Euler)."""
         forces(d)
         modal_inertia(d)
         closure_wrenches(d)
@@ -255,7 +255,7 @@ def make_description(
 
     @kernel
     def energies(d):
-        """Kinetic energy, potential of gravity, energy stored in bodies and contacts."""
+        """Compute kinetic energy, potential of gravity, energy stored in bodies and contacts."""
         for component in range(d.n_components):
             kinetic, elastic = flexible_energy(d, component)
             potential = 0.0
@@ -285,23 +285,23 @@ def make_description(
 
 
 def make_observation(evaluate: Callable, project: Callable, laws: Callable, describe: Callable) -> Callable:
-    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out), which writes on the blocks of `room`.
+    """Build the kernel observe(h, f, w, n, rows, pieces, tolerance, out), which fills the blocks of `room`.
 
-    With a tolerance of AS_RECORDED nothing is evaluated and only frames are written, of links and of sites.
+    With a tolerance of AS_RECORDED nothing is evaluated, and only the frames of links and sites are stored.
 
     evaluate, project, laws: as the stepper calls them.  describe: of `make_description`.
     """
 
     @kernel
     def place(d, t):
-        """Positions and speeds of the state in Y."""
+        """Compute positions and speeds of the state in Y."""
         laws(d.h, d.f, d.w, d.n, t)
         spread_state(d, d.at_y)
         prescribe(d)
 
     @kernel
     def copy(d, out, every, r, column, frames):
-        """Copy the stretches of w that are recorded as they are, each to its row in its block.
+        """Copy the sections of w that are outputs themselves, each to its row in its block.
 
         column: number of columns before them.  frames: whether only those of links and sites.
         """
@@ -332,7 +332,7 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
 
     @kernel
     def store(d, out, every, r):
-        """Store what is worked out of a row that has been evaluated; the number of columns that it takes."""
+        """Store the computed outputs of an evaluated row; return their number of columns."""
         put_bodies(d, out, 0, every, r)
         column = SIZE * d.n_bodies
         put_frames(d, out, every * column + 3 * d.n_frames * r)
@@ -343,7 +343,7 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
 
     @kernel
     def select(d, row, pieces):
-        """State, contacts' modes and pieces of the laws of a row of the record."""
+        """Set state, contacts' modes and pieces of the laws of a row of the record."""
         mode, latched, state = m.record_columns(d.n_contacts)
         for c in range(d.n_contacts):
             d.mode[c] = int(row[mode + c])

@@ -1,4 +1,4 @@
-"""Known motion: every law of time at the present time, and the prescribed coordinates from theirs."""
+"""Known motion: every law of time at the present time, and the prescribed coordinates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DEGREE = 7
 
 @kernel
 def prescribe(d):
-    """Prescribed coordinates, speeds and accelerations from their laws, which are the first ones."""
+    """Set prescribed coordinates, speeds and accelerations from their laws, which are the first ones."""
     for k in range(d.n_drives):
         law = d.law[k]
         d.x[d.nq + k] = law.value
@@ -24,11 +24,11 @@ def prescribe(d):
 
 
 def make_laws(harmonics: Callable = nothing) -> Callable:
-    """The kernel laws(h, f, w, n, t); harmonics(d, k, piece, s) adds those of law k in a piece."""
+    """Build the kernel laws(h, f, w, n, t); harmonics(d, k, piece, s) adds those of law k in a piece."""
 
     @kernel
     def laws(h, f, w, n, t):
-        """Value, rate and second rate of every law, from its piece in force."""
+        """Compute value, rate and second rate of every law, from its present piece."""
         d = data(h, f, w, n)
         for k in range(d.n_laws):
             active = d.active[k]
@@ -46,10 +46,10 @@ def make_laws(harmonics: Callable = nothing) -> Callable:
 
 
 def make_law_changes(harmonics: Callable = nothing) -> Callable:
-    """The kernel law_changes(d, t, k): changes of all laws along direction k, counted from 1, after `laws`.
+    """Build the kernel law_changes(d, t, k): changes of all laws along direction k, counted from 1, after `laws`.
 
-    harmonics(d, law, piece, s, numbers, out) adds those of a piece; numbers: where the direction's begin in f, out:
-    where the law's changes are in w.
+    harmonics(d, law, piece, s, numbers, out) adds those of a piece; numbers: index in f of the direction's numbers,
+    out: index in w of the law's changes.
     """
 
     @kernel

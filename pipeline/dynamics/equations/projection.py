@@ -1,7 +1,7 @@
-"""Back onto the closures: positions and speeds, by the least change in the metric of the mass.
+"""Projection of positions and speeds onto the closures, by the least change in the metric of the mass.
 
-Flexible bodies give way as slowly loaded ones do: in that metric alone their light modes would take up most of a gap,
-and ring.
+Flexible bodies deform as under slow loads: in the metric of the mass alone, their light modes would take up most of a
+gap, and vibrate.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 
 PROJECTIONS = 8
-#: pivot ratio of the closures below which residuals are left alone: of a residual r, a correction r / sqrt(ratio)
+#: pivot ratio of the closures below which residuals are not corrected: a residual r needs a change r / sqrt(ratio)
 BLIND = 1e-8
 #: rounding may stop the residuals this far above a very tight tolerance
 ROUNDING_FACTOR = 1e3
-#: rows that are not solved for may open by this fraction of the mechanism's size: joints whose axes miss each other by
-#: less than `model.rates.ZERO_SINGULAR_VALUE` count as redundant, and on the way they part by that, times some turns
+#: redundant rows may have residuals of this fraction of the mechanism's size: rows of joints whose axes miss each other
+#: by less than `model.rates.ZERO_SINGULAR_VALUE` are redundant, and open by that, times some turns, during the motion
 OPEN_REDUNDANT = 1e-6
-#: a gap is closed as if over this time [s]: modes with shorter periods follow by their stiffness, not by their mass
+#: time over which a gap is closed [s]: modes with shorter periods respond by their stiffness, not by their mass
 CLOSING_TIME = 0.1
 
 
 @kernel
 def largest(values, count):
-    """Largest magnitude of the first `count` entries of a stretch; NaN counts as infinite."""
+    """Return the largest magnitude of the first `count` entries of a section; NaN counts as infinite."""
     result = 0.0
     for k in range(count):
         if not abs(values[k]) <= result:
@@ -39,10 +39,10 @@ def largest(values, count):
 
 @kernel
 def widest(d, values, solved):
-    """Largest of the closure rows' values, a turn counting with the mechanism's size [m, or m/s].
+    """Return the largest of the closure rows' values, angles times the mechanism's size [m, or m/s].
 
-    solved: whether only of the rows that are solved for.  Lengths of an independent mechanism that is smaller than all
-    that there is count for more by that much.
+    solved: whether only selected rows count.  Lengths of an independent mechanism are scaled up by the ratio of the
+    whole scene's size to its own.
     """
     result, arm = 0.0, d.length
     for c in range(d.n_closures):
@@ -56,25 +56,25 @@ def widest(d, values, solved):
 
 @kernel
 def open_by(d):
-    """How far loops are open, or how fast they open, at the evaluated state [m, or m/s]."""
+    """Return the largest residual of the loops, or its rate, at the state evaluated last [m, or m/s]."""
     return max(widest(d, d.residual, True), widest(d, d.residual_rate, True))
 
 
 @kernel
 def no_projection(h, f, w, n, t, y, dy, tolerance):
-    """A tree cannot drift."""
+    """Do nothing: a tree has no closures."""
     return 0
 
 
 @kernel
 def keep_scales(d):
-    """Sizes of the closure rows at an accepted step; a rejected trial far away must not count."""
+    """Store the sizes of the closure rows at an accepted step, since rejected steps may be far away."""
     for r in range(d.n_kept_rows):
         d.row_scale[r] = max(d.row_scale[r], d.row_scale[d.n_closure_rows + r])
 
 
 def make_stiffen(closures: Any, tree: Any, flexible: Any) -> Callable:
-    """The kernel stiffen(d): the factors of an evaluation, with the modal stiffness next to the mass.
+    """Build the kernel stiffen(d): the factors of an evaluation, with the modal stiffness added to the mass.
 
     closures: kernels of all closures.  tree, flexible: as of `make_rates`.
     """
@@ -105,16 +105,16 @@ def make_projection(
     stiffen: Callable = nothing,
     to_modes: Callable = nothing,
 ) -> Callable:
-    """The kernel project(h, f, w, n, t, y, dy, tolerance).
+    """Build the kernel project(h, f, w, n, t, y, dy, tolerance).
 
     evaluate: the right-hand side.  joints: modules of the joint types.  closures: kernels of all closures.
-    stiffen, to_modes: of `make_stiffen` and of `bodies.interface`, where bodies are flexible.
+    stiffen, to_modes: of `make_stiffen` and of `bodies.interface`, for flexible bodies.
     """
     position_rates, correction = make_position_rates(joints), closures.correction
 
     @kernel
     def move(d, y, step):
-        """Add to the positions of y the change that a small displacement of the coordinates means."""
+        """Add a small displacement of the coordinates to the positions of y."""
         for k in range(d.nv):
             d.u[k] = d.w[step + k]
         position_rates(d)
@@ -123,11 +123,11 @@ def make_projection(
 
     @kernel
     def project(h, f, w, n, t, y, dy, tolerance):
-        """Correct y until residuals [m] and their rates [m/s] of the rows solved for are below `tolerance`.
+        """Correct y until residuals [m] and their rates [m/s] of the selected rows are below `tolerance`.
 
-        Needs the work space of evaluate(t, y); leaves it, and dy, up to date.  Returns the number
-        of evaluations, or -1 when the loops do not close.  So near to a singular pose that a
-        residual says little about the error behind it, nothing is changed.
+        It needs the work array of evaluate(t, y), and leaves it, and dy, up to date.  It returns the number of
+        evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says little about
+        the error of the state, nothing changes.
         """
         d = data(h, f, w, n)
         step, used, redundant = d.at_correction, 0, OPEN_REDUNDANT * d.length

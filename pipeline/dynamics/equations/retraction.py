@@ -1,8 +1,8 @@
-"""Positions after a displacement, given as one number per speed: the joints' own way to add it.
+"""Positions after a displacement, given as one number per speed, by each joint's own composition rule.
 
 The displacement is the constant speed of a motion of unit duration, qdot = N(q) u, which is followed by
 one step of order 4: exact for translations and single angles, and for quaternions to 3e-4 times the fifth power of
-the angle, which is far below what a method of second order leaves.
+the angle, far below the error of a method of second order.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def make_position_rates(joints: tuple[Any, ...]) -> Callable:
-    """The kernel position_rates(d): rates of the positions in X at the speeds in U, modes included."""
+    """Build the kernel position_rates(d): rates of the positions in X at the speeds in U, modes included."""
     joint_rate = choose(tuple(joint.position_rate for joint in joints))
 
     @kernel
@@ -34,7 +34,7 @@ def make_position_rates(joints: tuple[Any, ...]) -> Callable:
 
 
 def make_retraction(joints: tuple[Any, ...]) -> Callable:
-    """The kernel retract(h, f, w, n, y, displacement, out, total); the last four are places in w.
+    """Build the kernel retract(h, f, w, n, y, displacement, out, total); the last four are indices in w.
 
     total: scratch of NQ floats.
     """

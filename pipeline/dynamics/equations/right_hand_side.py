@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.vectors import ZERO
 
 @kernel
 def spread_state(d, y):
-    """Positions, speeds and internal states from the state at place y; no accelerations yet."""
+    """Copy positions, speeds and internal states from the state at index y, and set accelerations to zero."""
     for k in range(d.nq):
         d.x[k] = d.w[y + k]
     for k in range(d.nv):
@@ -33,7 +33,7 @@ def spread_state(d, y):
 
 
 def make_forces(tree: Any, flexible: FlexibleBodies, contacts: Callable, loads: Callable, stops: Callable) -> Callable:
-    """The kernel forces(d): inertia and applied forces of all links, before the tree gathers them."""
+    """Build the kernel forces(d): inertia and applied forces of all links, before the elimination."""
     rigid_inertia, flexible_inertia = rigid.make_inertia(tree), flexible.inertia
 
     @kernel
@@ -52,7 +52,7 @@ def make_forces(tree: Any, flexible: FlexibleBodies, contacts: Callable, loads: 
 
 
 def make_right_hand_side(laws: Callable, **parts: Any) -> Callable:
-    """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
+    """Build the kernel evaluate(h, f, w, n, t, y, dy) from the parts of a mechanism.
 
     laws: of time (`equations.prescribed_motion`).  parts: see `make_rates`.
     """
@@ -60,7 +60,7 @@ def make_right_hand_side(laws: Callable, **parts: Any) -> Callable:
 
     @kernel
     def evaluate(h, f, w, n, t, y, dy):
-        """Rates dy of the state y at time t, both places in w; n[EVALUATION] says whether it could."""
+        """Compute the rates dy of the state y at time t, both indices in w; n[EVALUATION] is the status."""
         laws(h, f, w, n, t)
         rates(h, f, w, n, y, dy)
 
@@ -77,7 +77,7 @@ def make_rates(
     closures: Any = None,
     friction: tuple[Callable, Callable] = (nothing, nothing),
 ) -> Callable:
-    """The kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
+    """Build the kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
     joints: modules of the joint types.  tree: how the mass matrix is factored, the module `equations.articulated` or
     `equations.composite`.  flexible: makes the kernels of the flexible bodies, of that.  contacts, loads, stops: the
@@ -95,7 +95,7 @@ def make_rates(
 
     @kernel
     def store_rates(d, dy):
-        """Positions' rates, accelerations, and the ledger's powers."""
+        """Store the positions' rates, the accelerations, and the ledger's powers."""
         for k in range(d.n_drives):
             d.ledger_rate[d.drives[k].book] += d.drive_force[k] * d.u[d.nv + k]
         for k in range(d.nq):
@@ -108,7 +108,7 @@ def make_rates(
 
     @kernel
     def rates(h, f, w, n, y, dy):
-        """Rates dy of the state y, both places in w; Wang & Wang (2019), eqs. (32), (34)."""
+        """Compute the rates dy of the state y, both indices in w; Wang & Wang (2019), eqs. (32), (34)."""
         d = data(h, f, w, n)
         d.state, d.abridged = y, 0
         spread_state(d, y)

@@ -1,4 +1,4 @@
-"""What continues from one phase to the next: states that belong to parts, and contacts that are closed."""
+"""Transfer from one phase to the next: internal states of parts, and contacts that are closed."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 
-#: key of an angle with its turns, before the coordinate's name in records
+#: first part of the key of a counted angle, before the coordinate's name in records
 TURNS = "turns"
 
 
 def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapping[str, float]) -> np.ndarray:
-    """State y of a model with the internal states of the parts that it has in common with an old one in state before.
+    """Return state y of a new model with the internal states of its common parts from an old model's state `before`.
 
     These are angles with their turns, integral parts of controllers, rotation vectors and deflections of bristles.
     known: joint coordinates, by name in records, for turns that no part of the old model counts.
@@ -39,7 +39,7 @@ def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapp
 
 
 def closed(scene: Scene, engine: Engine) -> Scene:
-    """The scene whose contacts that are closed in an engine's work space go on with their impact rates."""
+    """Return the scene with initial approach speeds for the contacts that are closed in an engine's work space."""
     joints, stops = dict[str, Any](scene.joint), dict[str, Any](scene.stop)
     for c, contact in enumerate(engine.model.contacts):
         if engine.modes[c]:
@@ -53,7 +53,7 @@ def closed(scene: Scene, engine: Engine) -> Scene:
 
 
 def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
-    """Where in the state each part has internal states, by what they are."""
+    """Yield the state's index range of each part's internal states, after a key that names part and states."""
     arrays, scene = model.arrays, model.scene
     first, gauges = model.ny - arrays.size(m.N_INTERNAL), arrays.table(m.GAUGES)
 
@@ -91,7 +91,7 @@ def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
 
 
 def _coordinates(scene: Scene, name: str) -> list[tuple[str, Coordinate] | None]:
-    """Joint and coordinate along which a load acts, and those that it measures."""
+    """Return joint and coordinate along which a load acts, and those that it measures."""
     load: Any = scene.load[name]
     if not hasattr(load, "joint"):
         return [None, None]
@@ -102,7 +102,7 @@ def _coordinates(scene: Scene, name: str) -> list[tuple[str, Coordinate] | None]
 
 
 def _states(scene: Scene, name: str) -> int:
-    """Number of internal states of a load, but for turns."""
+    """Return the number of internal states of a load, without turns."""
     load: Any = scene.load[name]
     given = [one[1] for one in _coordinates(scene, name) if one is not None]
     return int(lookup(LOADS, load.type, where="[load]").row(load, "", *given).states)

@@ -1,4 +1,4 @@
-"""What events make of a scene: parts that are gone, coordinates that are held, parts that have become others."""
+"""Changes of a scene by events: parts removed, coordinates held, parts exchanged."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ALONG = {"drive": ("joint",), "load": ("joint", "measured"), "stop": ("joint",),
 
 @dataclass(frozen=True)
 class Held:
-    """A coordinate of a joint with a drive of its own; label: its name in records; turns: whether it is an angle."""
+    """A coordinate of a joint with a drive of its own; label: its name in records; turns: True for an angle."""
 
     drive: str
     joint: str
@@ -34,12 +34,12 @@ class Held:
 
     @property
     def dimension(self) -> str:
-        """What its values measure."""
+        """Dimension of its values."""
         return "angle" if self.turns else "length"
 
 
 def released(scene: Scene, event: Event) -> Scene:
-    """The scene without a part; what acts along the coordinates of a joint, or reads them, goes with it."""
+    """Return the scene without a part; with a joint go all parts that act along its coordinates or read them."""
     family, name = event.part
     if family == "event":
         kept = {n: d for n, d in scene.drive.items() if n != name and not n.startswith(f"{name}.")}
@@ -60,14 +60,14 @@ def _acts_along(part: Any, keys: tuple[str, ...], joint: str) -> bool:
 
 
 def _reads(scene: Scene, load: str, joint: str) -> bool:
-    """Whether a load by an expression reads a coordinate of a joint."""
+    """Return True when a load by an expression reads a coordinate of a joint."""
     written = formula(scene, load)
     reads = written.reads if written else ()
     return any(sort == "coordinate" and what.partition(".")[0] == joint for sort, what in reads)
 
 
 def driven(scene: Scene, name: str, event: Event) -> list[Held]:
-    """Coordinates whose motion an event prescribes: those of a lock, or the one whose drive is switched."""
+    """Return the coordinates whose motion an event prescribes: those of a lock, or the one whose drive is switched."""
     family, part = event.part
     if event.kind == "lock" and scene.joint[part].type in COORDINATES:
         return [_held(scene, drive, part, c) for drive, (c, _) in locked(scene, name, event).items()]
@@ -84,7 +84,7 @@ def _held(scene: Scene, drive: str, joint: str, coordinate: str | None) -> Held:
 
 
 def freed(scene: Scene, held: Iterable[Held]) -> Scene:
-    """The scene without the drives of some coordinates."""
+    """Return the scene without the drives of some coordinates."""
     mine = {(one.joint, one.coordinate) for one in held}
 
     def on(drive: Any) -> bool:
@@ -96,7 +96,7 @@ def freed(scene: Scene, held: Iterable[Held]) -> Scene:
 
 
 def prescribed(scene: Scene, event: Event, held: Iterable[Held], at: Mapping[str, float], t: float) -> Scene:
-    """The scene with drives whose laws begin at time t [s] in the present positions [m or rad], by name in records."""
+    """Return the scene with drives whose laws begin at time t [s] at the positions `at` [m or rad], by record name."""
     made: dict[str, Any] = {}
     for one in held:
         law: Any = Constant(type="constant", value=at[one.label])
@@ -109,13 +109,13 @@ def prescribed(scene: Scene, event: Event, held: Iterable[Held], at: Mapping[str
 
 
 def rates(scene: Scene, held: Iterable[Held], t: float) -> dict[str, float]:
-    """Rates of driven coordinates after time t [s], by name in records [m/s or rad/s]."""
+    """Return the rates of driven coordinates after time t [s], by name in records [m/s or rad/s]."""
     drives: Any = scene.drive
     return {one.label: pieces_of(drives[one.drive].law, one.dimension).value(t, 1) for one in held}
 
 
 def exchanged(scene: Scene, event: Event, t: float) -> Scene:
-    """The scene with a load switched at time t [s], from which laws and expressions that are given there count."""
+    """Return the scene with a load switched at time t [s], which is time zero for the new laws and expressions."""
     name, keys = event.part[1], event.to or {}
     new = switched(scene.load[name], event)
     changed = {key: _later(getattr(new, key), t) for key in keys}
@@ -127,7 +127,7 @@ def exchanged(scene: Scene, event: Event, t: float) -> Scene:
 
 
 def _later(value: Any, by: float) -> Any:
-    """A value of a part with the laws in it delayed."""
+    """Return a value of a part with the laws in it delayed by `by` [s]."""
     if isinstance(value, Constant):
         return value
     if isinstance(value, KINDS):

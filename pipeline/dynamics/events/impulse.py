@@ -1,11 +1,11 @@
-r"""Velocities after coordinates are brought to given rates at once, the impulses that take part, and what is lost.
+r"""Velocities after coordinates are brought to given rates at once, with impulses and energy loss.
 
 With the free motions Z of the mechanism, Z^T M Z = 1 and J Z = 0, and the rates C of the coordinates along them,
 
 .. math:: \Delta u = Z C^T \Lambda, \quad (C C^T) \Lambda = r - c\,u, \quad D = \tfrac12 \Delta u^T M \Delta u
 
-so that every other change of the velocities that gives the rates r takes more kinetic energy. The ideal drive that
-moves on at the rate r does the work r Lambda; T grows by that less D.
+so that every other change of the velocities that gives the rates r takes more kinetic energy. An ideal drive that then
+moves at the rate r does the work r Lambda; the kinetic energy T grows by this work less D.
 Source: Pars (1965), A Treatise on Analytical Dynamics, ch. XIV (impulsive constraints, theorems of Carnot and Gauss).
 """
 
@@ -28,8 +28,8 @@ from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapp
 IMPULSE_RANK = 1e-9
 
 
-class Blow(NamedTuple):
-    """State after it; impulse [N s or N m s] on each coordinate; work of the drives and energy that is lost [J]."""
+class Impulses(NamedTuple):
+    """State after the impulses; impulse [N s or N m s] on each coordinate; work of the drives and energy loss [J]."""
 
     y: np.ndarray
     impulses: dict[str, float]
@@ -38,7 +38,7 @@ class Blow(NamedTuple):
 
 
 def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
-    """Rows of the record for states at the start, all with the contacts that a run from the first begins with."""
+    """Return record rows for states at the start, all with the contacts with which a run from the first one begins."""
     modes, latched = np.zeros((2, len(engine.model.contacts)))
     for c in overlapping(engine, states[0]):
         speed = engine.model.contacts[c].joint.initial_approach_speed
@@ -47,8 +47,8 @@ def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
     return rows_of(engine, states, t, modes, latched)
 
 
-def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Blow:
-    """The state y at time t after coordinates, by their names in records, are brought to rates [m/s or rad/s]."""
+def apply_impulses(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Impulses:
+    """Bring coordinates, by their names in records, to rates [m/s or rad/s] in the state y at time t."""
     model = engine.model
     closure_rows.evaluate(engine, y, t)
     Z = free_motions(*inertia(engine))[0]
@@ -63,4 +63,4 @@ def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) 
     after, s = y.copy(), C.T @ impulses
     after[model.speeds] += Z @ s
     work = float(np.array(list(targets.values())) @ impulses)
-    return Blow(after, dict(zip(targets, impulses.tolist(), strict=True)), work, 0.5 * float(s @ s))
+    return Impulses(after, dict(zip(targets, impulses.tolist(), strict=True)), work, 0.5 * float(s @ s))

@@ -1,4 +1,4 @@
-"""The phases of a run as one dataset: names and energies of all, each event in the table of events.
+"""Joining of the phases of a run into one dataset, with all events in the table of events.
 
 The state before an event is a row, at the last number before its time; the state after it is the next one.
 """
@@ -23,15 +23,15 @@ from flexclear.pipeline.dynamics.record.dataset import attributes, recorded, sub
 from flexclear.pipeline.dynamics.run import ledger
 from flexclear.pipeline.dynamics.run.run import Run
 
-#: what counts from the start of the run on
+#: variables that accumulate from the start of the run
 GROWING = re.compile(r".*_loss$|dissipated|drive_work|load_work|contact_impulse|wear_sliding_distance|wear_load_path")
-#: what is zero where a part is not there; all else of it is undefined
+#: variables that are zero where their part does not exist; all others are undefined there
 NOTHING = re.compile(r".*(force|moment|power|load$|penetration|contact_(rate|elastic|sliding)|sliding_speed|redundant)")
-#: attributes that add up, and those of which the largest counts
+#: attributes that are summed; of other numbers the largest counts
 COUNTS = re.compile(r".*(evaluations|steps|projections|jacobians)$")
 #: energies of a state
 ENERGIES = ("kinetic", "potential", "elastic")
-#: those that the balance adds up, and what drives bring in
+#: energies in the balance, and the drives' work
 BOOKED = (*ENERGIES, "dissipated", "drive_work")
 #: columns of the table of events that name its rows
 EVENT_COORDS = ("event_time", "event_contact", "event_kind", "event_motion")
@@ -41,8 +41,9 @@ UNIQUE = ("parameters", "references", "versions", "Conventions", "title", "sourc
 
 @dataclass(frozen=True)
 class Happened:
-    """An event. impulse: on the coordinate that it holds or drives [N s or N m s], NaN where there is none or several;
-    work: of the drives [J]; turns: whether the coordinate is an angle.
+    """Record of an event; impulse: on the coordinate that it holds or drives [N s or N m s], NaN for none or several.
+
+    work: of the drives [J].  turns: True when the coordinate is an angle.
     """
 
     name: str
@@ -71,20 +72,20 @@ class Phase:
 
 
 def stored(model: Model, seen: Observed) -> dict[str, np.ndarray]:
-    """Energies over rows [J]; the potential from the world's origin on, wherever that of the kernels is."""
+    """Return the energies over rows [J]; the potential refers to the world's origin, not to that of the kernels."""
     series = ledger.series(model, seen)
     made = {name: series[name][1] for name in ENERGIES}
     return {**made, "potential": made["potential"] + _raised(model)}
 
 
 def _raised(model: Model) -> float:
-    """Potential energy that the kernels' origin stands for [J]."""
+    """Return the potential energy at the kernels' origin relative to the world's [J]."""
     mass = sum(link.mass for link in model.links[1:])
     return -float(mass * model.gravity @ model.mechanism.origin)
 
 
-def joined(scene: Scene, phases: Sequence[Phase], doubts: Sequence[str]) -> LabelledArrays:
-    """All that is recorded of a run with events (schema RUN); doubts: sentences for its warnings."""
+def joined(scene: Scene, phases: Sequence[Phase], notes: Sequence[str]) -> LabelledArrays:
+    """Return the dataset of a run with events (schema RUN); notes: sentences for its warnings."""
     runs = [phase.run for phase in phases if phase.run is not None]
     parts = [recorded(run) for run in runs]
     names = {dim: _names(parts, dim) for dim in dict.fromkeys(d for data in parts for d in data.sizes)}
@@ -109,14 +110,14 @@ def joined(scene: Scene, phases: Sequence[Phase], doubts: Sequence[str]) -> Labe
     coords = frozenset(name for data in parts for name in data.coords if name in made)
     table = _table(phases, parts)
     whole = LabelledArrays(made | table, coords | {n for n in table if n in EVENT_COORDS})
-    facts = attributes(scene) | _facts(parts, doubts)
+    facts = attributes(scene) | _facts(parts, notes)
     facts["events"] = "\n".join(_sentence(one, loss) for one, loss in _events(phases))
     schema = RUN | {name: replace(RUN[name], gaps=True) for name in gaps}
     return conformed(whole, schema, title=f"Motion of {subject(scene)}", **facts)
 
 
 def _events(phases: Sequence[Phase]) -> list[tuple[Happened, float]]:
-    """Every event, and the energy that it takes from the mechanism [J]."""
+    """Return all events, each with the energy that it takes from the mechanism [J]."""
     return [
         (one.happened, sum(one.ends[name] - other.begins[name] for name in ENERGIES) + one.happened.work)
         for one, other in pairwise(phases)
@@ -130,12 +131,12 @@ def _sentence(one: Happened, loss: float) -> str:
 
 
 def _names(parts: Sequence[LabelledArrays], dim: str) -> list[Any]:
-    """Entries of a dimension in any phase."""
+    """Return the entries of a dimension in any phase."""
     return list(dict.fromkeys(n for data in parts if dim in data.coords for n in data[dim].values.tolist()))
 
 
 def _times(times: Sequence[np.ndarray]) -> np.ndarray:
-    """Times of all rows [s]; the last one of a phase is just before the first one of the next."""
+    """Return the times of all rows [s]; the last one of a phase is just before the first one of the next."""
     made = [t.copy() for t in times]
     for one in made[:-1]:
         one[-1] = np.nextafter(one[-1], -np.inf)
@@ -145,7 +146,7 @@ def _times(times: Sequence[np.ndarray]) -> np.ndarray:
 def _series(
     name: str, first: LabelledArray, parts: Sequence[LabelledArrays], names: Mapping[str, list[Any]]
 ) -> np.ndarray:
-    """A variable over the rows of all phases; NaN where it is undefined."""
+    """Return a variable over the rows of all phases; NaN where it is undefined."""
     owner = first.dims[1] if len(first.dims) > 1 else ""
     grows = GROWING.fullmatch(name) is not None
     fill = 0.0 if grows or NOTHING.match(name) else np.nan
@@ -170,7 +171,7 @@ def _series(
 def _fixed(
     name: str, dim: str, first: LabelledArray, parts: Sequence[LabelledArrays], names: Mapping[str, list[Any]]
 ) -> np.ndarray:
-    """What does not change with time: of each entry as the first phase has it that has the entry."""
+    """Return a variable without time: for each entry, its value in the first phase that has the entry."""
     if name == dim or not names.get(dim):
         return np.array(names[dim]) if names.get(dim) else first.values
     entries: dict[Any, Any] = {}
@@ -182,7 +183,7 @@ def _fixed(
 
 
 def _continue_turns(made: dict[str, LabelledArray], rows: Sequence[int]) -> None:
-    """Let angles of joints go on with the full turns of earlier phases."""
+    """Add the full turns of earlier phases to the angles of joints."""
     if "joint_position" not in made:
         return
     values, turning = made["joint_position"].values.copy(), made["coordinate_motion"].values == motion(True)
@@ -193,7 +194,7 @@ def _continue_turns(made: dict[str, LabelledArray], rows: Sequence[int]) -> None
 
 
 def _balance(made: dict[str, LabelledArray], phases: Sequence[Phase], rows: Sequence[int]) -> None:
-    """Add what events take and bring in, write the potential from one origin, and balance all phases."""
+    """Add the energies that events take and supply, refer the potential to one origin, and balance all phases."""
     taken, brought, lost, work, models = list[float](), list[float](), 0.0, 0.0, list[Model]()
     after = iter(_events(phases))
     for phase in phases:
@@ -213,7 +214,7 @@ def _balance(made: dict[str, LabelledArray], phases: Sequence[Phase], rows: Sequ
 
 
 def _table(phases: Sequence[Phase], parts: Sequence[LabelledArrays]) -> dict[str, LabelledArray]:
-    """The table of events: contacts' of all phases, those that go on over an event as one, and the scene's events."""
+    """Return the table of events: of contacts in all phases, joined across scene events, and the scene's events."""
     listed = list[dict[str, Any]]()
     for data in parts:
         columns = [n for n in data.variables if n.startswith("event_") and not n.endswith("_units")]
@@ -233,7 +234,7 @@ def _table(phases: Sequence[Phase], parts: Sequence[LabelledArrays]) -> dict[str
 
 
 def _continued(listed: Sequence[dict[str, Any]], one: dict[str, Any], start: float) -> bool:
-    """Whether a closing at the start of a phase only goes on with one of the phase before, which it then completes."""
+    """Return True when a closing at a phase's start continues one of the previous phase; complete the latter then."""
     same = [k for k in listed if k["event_contact"] == one["event_contact"] and k["event_kind"] == "closing"]
     if one["event_kind"] != "closing" or one["event_time"] != start or not same:
         return False
@@ -246,8 +247,8 @@ def _continued(listed: Sequence[dict[str, Any]], one: dict[str, Any], start: flo
     return True
 
 
-def _facts(parts: Sequence[LabelledArrays], doubts: Sequence[str]) -> dict[str, Any]:
-    """How all phases were made: sums of counts, the largest of other numbers, the sentences of all."""
+def _facts(parts: Sequence[LabelledArrays], notes: Sequence[str]) -> dict[str, Any]:
+    """Return the attributes of all phases: sums of counts, the largest of other numbers, all sentences."""
     facts: dict[str, Any] = {}
     for name in dict.fromkeys(n for data in parts for n in data.attrs):
         values = [data.attrs[name] for data in parts if name in data.attrs]
@@ -257,5 +258,5 @@ def _facts(parts: Sequence[LabelledArrays], doubts: Sequence[str]) -> dict[str, 
             facts[name] = "\n".join(dict.fromkeys(line for text in values for line in text.split("\n") if line))
         else:
             facts[name] = sum(values) if COUNTS.fullmatch(name) else max(values)
-    facts["warnings"] = "\n".join(dict.fromkeys([*filter(None, [facts.get("warnings", "")]), *doubts]))
+    facts["warnings"] = "\n".join(dict.fromkeys([*filter(None, [facts.get("warnings", "")]), *notes]))
     return facts

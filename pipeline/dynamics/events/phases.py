@@ -1,4 +1,4 @@
-"""A scene with events as one run: phase after phase, each from the state and the scene that the event left."""
+"""Run of a scene with events: phase after phase, each from the state and the scene that the event left."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.events.carried import carry, closed
 from flexclear.pipeline.dynamics.events.changes import driven, exchanged, freed, prescribed, rates, released
-from flexclear.pipeline.dynamics.events.impulse import blow, rows
+from flexclear.pipeline.dynamics.events.impulse import apply_impulses, rows
 from flexclear.pipeline.dynamics.events.joined import Happened, Phase, joined, stored
 from flexclear.pipeline.dynamics.events.watch import Watch
 from flexclear.pipeline.dynamics.record.dataset import warnings
@@ -31,9 +31,9 @@ from flexclear.pipeline.dynamics.run.run import Run, follow, maker, observed, re
 from flexclear.pipeline.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never
 from flexclear.pipeline.dynamics.starts.snapshot import moving
 
-#: evaluations after which the conditions are examined; where a run fails after an event, again with fewer
+#: evaluations between checks of the conditions; where a run fails after an event, the smaller number
 PAUSES = (2_000, 50)
-#: conditions are examined at so many times at least
+#: least number of times at which conditions are examined
 CONDITION_TIMES = 500
 #: an event nearer than this fraction of the run to its end does not happen
 END = 1e-12
@@ -41,9 +41,9 @@ END = 1e-12
 
 @dataclass(frozen=True)
 class _Start:
-    """Where a phase begins. scene: with the bodies as they are then, and with times up to the end of the run.
+    """Start of a phase; scene: with the bodies as they are then, and with times up to the end of the run.
 
-    before: engine and state of the phase before; none of the first one.
+    before: engine and state at the end of the previous phase; None for the first one.
     """
 
     scene: Scene
@@ -53,9 +53,9 @@ class _Start:
 def simulated(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
 ) -> LabelledArrays:
-    """The run of a scene with events (schema RUN).
+    """Return the run of a scene with events (schema RUN).
 
-    Raises InputError for events that cannot happen as they are meant, SolverError when the run cannot continue.
+    Raises InputError for events that cannot happen as intended, SolverError when the run cannot continue.
     """
     plan = _Plan(scene, bundles, progress, judges.run if judges is not None else None)
     start, phases, waiting = _Start(scene.model_copy(update={"event": {}})), list[Phase](), dict(scene.event)
@@ -70,17 +70,17 @@ def simulated(
             start, happened = plan.changed(event, *after, phase)
         phases[-1] = replace(phase, happened=happened)
         progress(None, f"at t = {phase.end:.6g} s: {event} ({happened.kind})")
-    doubts = [f"event {name} did not happen in this run" for name in waiting]
+    notes = [f"event {name} did not happen in this run" for name in waiting]
     if scene.contacts() or scene.stop:
-        doubts.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
-    for doubt in doubts:
-        progress(None, f"warning: {doubt}")
-    return joined(scene, phases, doubts)
+        notes.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
+    for note in notes:
+        progress(None, f"warning: {note}")
+    return joined(scene, phases, notes)
 
 
 @contextmanager
 def _in_words(phases: list[Phase]) -> Iterator[None]:
-    """Errors of the scene that an event has left name the event."""
+    """Name the last event in errors of the scene that it has left."""
     last = next((phase.happened.name for phase in reversed(phases) if phase.happened is not None), None)
     try:
         yield
@@ -93,7 +93,7 @@ def _in_words(phases: list[Phase]) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Plan:
-    """What all phases of a run have in common."""
+    """Data common to all phases of a run."""
 
     scene: Scene
     bundles: Mapping[str, Labelled]
@@ -103,7 +103,7 @@ class _Plan:
     def phase(
         self, start: _Start, waiting: Mapping[str, Event], before: list[Phase]
     ) -> tuple[Phase, str | None, tuple[Scene, Engine, np.ndarray] | None]:
-        """A phase, the event that ends it, and scene, engine and state where it does; of the last one nothing."""
+        """Return a phase, the event that ends it, and scene, engine and state there; both None in the last phase."""
         t, end = start.scene.time.start, self.scene.time.end
         due = {n: e for n, e in waiting.items() if not e.before & waiting.keys()}
         timed = {n: max(e.at, t) for n, e in due.items() if isinstance(e.at, float)}
@@ -159,7 +159,7 @@ class _Plan:
     def _followed(
         self, engine: Engine, made: Callable[..., Engine], y: np.ndarray, watch: Watch, watched: bool
     ) -> tuple[Engine, Trajectory, str, str | None]:
-        """The trajectory to the end of a phase, and the event whose condition ends it."""
+        """Return the trajectory to the end of a phase, and the event whose condition ends it."""
         times = engine.output_times(self.scene.output.interval, self.scene.time.start)
         if not watched:
             return *self._steps(engine, made, y, never, times, SLICE), None
@@ -169,7 +169,7 @@ class _Plan:
         for pause in PAUSES:
             try:
                 done = self._steps(engine, made, y, watch.stop, np.union1d(times, looks), pause)
-                watch.look(done[1].rows)
+                watch.examine(done[1].rows)
             except SolverError as error:
                 if isinstance(error, StoppedError) or (pause == PAUSES[-1] and watch.hit is None):
                     raise
@@ -194,7 +194,7 @@ class _Plan:
         begun, span = self.scene.time.start, self.scene.time.end - self.scene.time.start
 
         def tell(fraction: float | None, text: str) -> None:
-            """Progress of the whole run."""
+            """Report progress as a fraction of the whole run."""
             at = engine.start + (engine.end - engine.start) * (fraction or 0.0)
             self.progress(None if fraction is None else (at - begun) / span, text)
 
@@ -205,7 +205,7 @@ class _Plan:
         return follow(engine, y, tell, lambda other: made(other, tell), panel, stop, times)
 
     def changed(self, name: str, scene: Scene, engine: Engine, y: np.ndarray, phase: Phase) -> tuple[_Start, Happened]:
-        """Where the next phase begins after an event, and what the event did."""
+        """Return the start of the next phase after an event, and the record of the event."""
         event, t = self.scene.event[name], phase.end
         still = moving(closed(scene, engine), engine, y, t)
         start = still.start.model_copy(update={"branch": ()}) if still.start is not None else None
@@ -224,7 +224,7 @@ class _Plan:
         free = freed(still, held)
         after = prescribed(free, event, held, phase.coordinates, t)
         other = maker(free, self.bundles, self.progress)()
-        struck = blow(other, consistent_start(other), t, rates(after, held, t))
+        struck = apply_impulses(other, consistent_start(other), t, rates(after, held, t))
         moved = moving(free, other, struck.y, t)
         after = after.model_copy(update={"body": moved.body, "start": moved.start})
         impulse = next(iter(struck.impulses.values())) if len(held) == 1 else np.nan
@@ -232,7 +232,7 @@ class _Plan:
 
 
 def _energies(engine: Engine, y: np.ndarray, t: float) -> dict[str, float]:
-    """Energies in a state at the start [J]."""
+    """Return the energies of a start state [J]."""
     engine.select_pieces_after(t)
     seen: Observed = observe(engine, rows(engine, y[None], t), after=True)
     return _last(stored(engine.model, seen))

@@ -1,4 +1,4 @@
-"""Where in a phase a condition first becomes true: looked for at its rows and at maxima between them, then located."""
+"""Conditions of events: the first time at which one becomes true in a phase, located between rows."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Blocks, by_name
 from flexclear.pipeline.dynamics.events.impulse import rows as rows_of
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.record.dataset import chosen
+from flexclear.pipeline.dynamics.record.dataset import variables_for
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
-from flexclear.pipeline.dynamics.run.horizon.periods import handed
+from flexclear.pipeline.dynamics.run.horizon.periods import handover
 from flexclear.pipeline.dynamics.run.pieces import Moment
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
-#: parts into which an interval is divided to look closer, and how often: what is left is a straight line
+#: number of parts of a refined interval, and number of refinements, after which a straight line is exact enough
 PARTS, CLOSER_LOOKS = 12, 5
-#: rows are looked at when they are more by this factor than at the last look
+#: rows are examined again when their number has grown by this factor
 GROWTH = 1.05
 
 
 class Watch:
-    """The conditions of a phase, by event. They are evaluated with an engine of its own.
+    """Conditions of a phase, by event, evaluated with a separate engine.
 
-    coordinates: where joint coordinates are at the start of the phase, full turns of earlier phases counted.
-    hit: the event that happens first and its time [s], once the rows that have been seen contain one.
+    coordinates: joint coordinates at the start of the phase, full turns of earlier phases counted.
+    hit: the event that happens first and its time [s], once the examined rows contain one.
     """
 
     def __init__(self, engine: Engine, y: np.ndarray, conditions: Mapping[str, Quantity], known: Mapping[str, float]):
@@ -59,14 +59,14 @@ class Watch:
         self.held = [name for name, values in self._values(start, np.array([engine.start])).items() if values[0] > 0.0]
 
     def stop(self, rows: np.ndarray) -> bool:
-        """Whether an event has happened in the rows so far."""
+        """Return True when an event has happened in the rows so far."""
         if len(rows) < GROWTH * len(self._rows):
             return False
-        self.look(rows)
+        self.examine(rows)
         return self.hit is not None
 
-    def look(self, rows: np.ndarray) -> None:
-        """Examine the rows that are new."""
+    def examine(self, rows: np.ndarray) -> None:
+        """Examine the new rows."""
         new = rows[len(self._rows) :]
         if len(new):
             self._rows, self._seen = rows.copy(), self._joined(self._seen, self._observed(new))
@@ -83,18 +83,18 @@ class Watch:
             self.hit = name, time
 
     def _first(self, name: str, values: np.ndarray, first: int) -> float | None:
-        """Time of the first passage through zero from row `first` on."""
+        """Return the time of the first passage through zero from row `first` on; None without one."""
         up = [k for k in range(first, len(values) - 1) if values[k + 1] > 0.0 and not values[k] > 0.0]
         for k in range(max(first, 1), (up[0] if up else len(values) - 1)):
             a, b, c = values[k - 1 : k + 2]
             if a < b >= c and b <= 0.0 and 2.0 * b - min(a, c) > 0.0:
-                time = self._located(name, k - 1, self._rows[k + 1, 0])
+                time = self._locate(name, k - 1, self._rows[k + 1, 0])
                 if time is not None:
                     return time
-        return self._located(name, up[0], self._rows[up[0] + 1, 0]) if up else None
+        return self._locate(name, up[0], self._rows[up[0] + 1, 0]) if up else None
 
-    def _located(self, name: str, k: int, end: float) -> float | None:
-        """Time at which a condition becomes true between row k and a time; None where it does not."""
+    def _locate(self, name: str, k: int, end: float) -> float | None:
+        """Return the time at which a condition becomes true between row k and a time; None where it does not."""
         row, known = self._rows[k : k + 1], self._head(k + 1)
         begin, found = float(row[0, 0]), False
         if begin in self._engine.breaks and self._values(self._observed(row, after=True), row[:, 0])[name][0] > 0:
@@ -115,7 +115,7 @@ class Watch:
         return begin - low / (high - low) * (end - begin) if np.isfinite(low) else end
 
     def _between(self, row: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Rows at times from that of a row on, integrated from there."""
+        """Return rows at these times, integrated from a row."""
         engine = another(self._engine)
         first = recording.record(row, len(engine.model.contacts))
         modes, latched = first.modes[0], first.latched[0]
@@ -127,7 +127,7 @@ class Watch:
         moment = Moment(first.state[0].copy(), modes, latched, watched, open_events)
         part = replace(engine, start=float(times[0]), end=float(times[-1]))
         closure_rows.select_rows(part, moment.y, part.start)
-        made = integrate(part, moment.y, silent, left=handed(part, moment), outputs=times)
+        made = integrate(part, moment.y, silent, left=handover(part, moment), outputs=times)
         return made.rows[np.minimum(np.searchsorted(made.time, times), len(made.rows) - 1)]
 
     def _observed(self, rows: np.ndarray, *, after: bool = False) -> Blocks:
@@ -137,20 +137,20 @@ class Watch:
         return observe_blocks(self._engine, rows, after=after)
 
     def _values(self, seen: Blocks, time: np.ndarray) -> dict[str, np.ndarray]:
-        """The conditions over rows, positive where they hold; NaN of what the scene of this phase does not have."""
+        """Return the conditions over rows, positive where they hold; NaN for parts that this phase's scene lacks."""
         observed, model = by_name(seen, self._engine.model.arrays.size), self._engine.model
         owners, values = model.scene.owners(), dict[str, np.ndarray]()
         for name, one in self._conditions.items():
             if not one.is_there(owners):
                 values[name] = np.full(len(time), np.nan)
                 continue
-            arrays = self._turned(chosen(model.scene, Motions(model, observed), one.terms(), time))
+            arrays = self._turned(variables_for(model.scene, Motions(model, observed), one.terms(), time))
             made = np.broadcast_to(quantities.series(arrays, one)[:, 0], len(time))
             values[name] = np.where(observed.status == m.OK, made, np.nan)
         return values
 
     def _turned(self, arrays: LabelledArrays) -> LabelledArrays:
-        """The same with the full turns of earlier phases."""
+        """Return the series with the full turns of earlier phases added to joint angles."""
         if "joint_position" not in arrays:
             return arrays
         old, names = arrays["joint_position"], arrays["coordinate"].values.tolist()

@@ -1,10 +1,10 @@
-"""Integrators. To add one: a module with a `METHOD` (see `method`), a line in `pipeline.core.scene.integrators`, a row
-in the order test, and parameters of its own, if it has any, in `pipeline.core.scene.solver`.
+"""Integrators. To add one: write a module with a `METHOD` (see `method`), a line in `pipeline.core.scene.integrators`,
+a row in the order test, and its parameters, if it has any, in `pipeline.core.scene.solver`.
 
-`stepper` runs any method, with steps that `adaptive` or `fixed` choose; `contact_events` locates contacts in its steps
-(`step_end_events` does not), `contact_phases` follows what happens inside them, `guards` end steps where friction
-bends, `singular_step` steps over singular poses, `recording` writes down. Methods share `runge_kutta`, `newton`,
-`hermite` and `norms`.
+`stepper` runs any method; `adaptive` or `fixed` choose the length of its steps. `contact_events` locates the begin and
+end of contacts within steps, `step_end_events` only at step ends. `contact_phases` records what happens during contact,
+`guards` end steps where a friction law has a kink, `singular_step` steps over singular poses, `recording` stores rows.
+Methods share `runge_kutta`, `newton`, `hermite` and `norms`.
 """
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS

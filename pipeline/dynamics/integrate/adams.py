@@ -1,9 +1,9 @@
-"""Predictor-corrector of Adams, Bashforth and Moulton, order 4, with fixed steps: what the paper integrates with.
+"""Predictor-corrector of Adams, Bashforth and Moulton, order 4, with fixed steps: the integrator of the paper.
 
 The paper says "a predictor-corrector method" with a step of 1e-5 s and neither its order nor its start (Wang & Wang
 2019, sec. 6.1, step 8). Assumed: the pair of order 4, predicted, evaluated, corrected once, evaluated (PECE), with
-three steps of the classical Runge-Kutta method of order 4 as its start. It starts again where integration does (drive
-breaks, located events); a step that is shortened to end on one of these is a Runge-Kutta step.
+three steps of the classical Runge-Kutta method of order 4 as its start. The method restarts at drive breaks and located
+events; a step that is shortened to end on one of these is a Runge-Kutta step.
 
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. III.1.
 """
@@ -20,10 +20,10 @@ from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
 from flexclear.pipeline.dynamics.kernels import kernel
 
 LAST = rk4.STAGES
-# floats: number of slopes kept, as vectors, the latest first, and their distance
+# floats: number of stored slopes (vectors, the latest first), and the time between them
 COUNT, DISTANCE, FLOATS = range(3)
 MOST_STEPS_BACK = 3
-#: steps whose lengths differ by less than this fraction are alike: rounding of times
+#: step lengths that differ by less than this fraction are equal: rounding of times
 EQUAL_STEPS = 1e-8
 
 
@@ -35,14 +35,14 @@ def begin(d):
 
 @kernel
 def alike(d, step):
-    """Whether a step is as long as those between the slopes that are kept."""
+    """Return True when a step is as long as the distance between the stored slopes."""
     distance = d.memory[DISTANCE]
     return abs(step - distance) <= EQUAL_STEPS * distance
 
 
 @kernel
 def keep(d, step):
-    """Remember the slope where an accepted step started."""
+    """Store the slope at the start of an accepted step."""
     if d.memory[COUNT] == 0.0 or not alike(d, step):
         d.memory[COUNT], d.memory[DISTANCE] = 0.0, step
     one, two, three = vector(d, 0), vector(d, 1), vector(d, 2)
@@ -54,13 +54,13 @@ def keep(d, step):
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
-    """The method's kernels; it has no error estimate."""
+    """Build the method's kernels; the method has no error estimate."""
     _, proceed = make_stages(evaluate, rk4.A, rk4.B, rk4.C)
     runge_kutta_step = make_attempt(evaluate, proceed)
 
     @kernel
     def attempt(d, step):
-        """State Y_NEW after a step from Y; False when there is no slope at the predicted state."""
+        """Step from Y to Y_NEW; return False when the right-hand side fails at the predicted state."""
         size, now, predicted = d.ny, slope(d, 0), slope(d, 1)
         if d.memory[COUNT] < MOST_STEPS_BACK or not alike(d, step):
             return runge_kutta_step(d, step)

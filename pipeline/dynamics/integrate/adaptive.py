@@ -1,4 +1,4 @@
-"""Steps whose length the estimated error chooses.
+"""Step size control by the estimated local error.
 
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.4;
 step control with memory: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.2.
@@ -16,18 +16,18 @@ from flexclear.pipeline.dynamics.integrate.norms import scaled_norm, set_error_s
 from flexclear.pipeline.dynamics.integrate.stepper import FAILED
 from flexclear.pipeline.dynamics.kernels import kernel
 
-# the factor to the next step is SAFETY norm^(-exponent) last_norm^MEMORY;
-# the memory keeps steps quiet where stability, not accuracy, limits them
+# the next step is longer by the factor SAFETY norm^(-exponent) last_norm^MEMORY;
+# the memory damps oscillating step lengths where stability, not accuracy, limits the steps
 SAFETY, SHRINK, GROW, MEMORY = 0.9, 0.2, 6.0, 0.04
 LEAST_NORM = 1e-4
-#: how much stricter steps are judged while a contact is closed: the errors of a few steps there become that of a
-#: rebound speed, which every later impact magnifies. A bounce without loss keeps its energy to 1e-10 at the default
+#: the tolerance is divided by this while a contact is closed: the errors of a few steps there become the error of the
+#: rebound speed, which every later impact magnifies. A bounce without loss conserves energy to 1e-10 at the default
 #: tolerance, seven times better than with 1, for a fifth more evaluations
 STRICTER = 10.0
 
 
 def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable, method: Any) -> tuple:
-    """The kernels first_step, error_norm, after_rejection and next_step of the stepper."""
+    """Build the stepper's kernels first_step, error_norm, after_rejection and next_step."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
@@ -35,7 +35,7 @@ def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable,
 
     @kernel
     def first_step(d):
-        """Length of the first step of a segment, from the slope at its start and one a little way along."""
+        """Return the length of a segment's first step, from the slopes at its start and a little later."""
         y, slope = d.at_y, d.at_slopes
         other = slope + d.ny
         set_error_scales(d, y)
@@ -62,7 +62,7 @@ def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable,
 
     @kernel
     def error_norm(d, step):
-        """Error norm of the step to Y_NEW, 1 at the tolerance."""
+        """Return the error norm of the step to Y_NEW, 1 at the tolerance."""
         set_error_scales(d, d.at_y_new)
         if any_closed(d):
             for g in range(d.n_groups):
@@ -71,9 +71,9 @@ def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable,
 
     @kernel
     def seen_order(d, step, norm):
-        """Power of the step with which the error falls, as this rejected step and the one before it say.
+        """Return the order with which the error falls, from this rejected step and the one before it.
 
-        Where a contact begins or friction turns, the solution has less derivatives than the method asks for.
+        Where a contact begins or friction reverses, the solution has fewer derivatives than the method's order needs.
         """
         longer, worse = d.rejected_step, d.rejected_norm
         if longer == 0.0 or worse >= FAILED:
@@ -84,7 +84,7 @@ def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable,
 
     @kernel
     def after_rejection(d, step, norm):
-        """Try again with a shorter step."""
+        """Shorten the step for the next attempt."""
         d.step = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(d, step, norm)))
         d.rejected_step, d.rejected_norm = step, norm
         d.most_growth = 1.0
@@ -92,7 +92,7 @@ def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable,
 
     @kernel
     def next_step(d, step, norm):
-        """Length of the step after the one that has just been accepted."""
+        """Return the length of the step after an accepted one."""
         norm = max(norm, LEAST_NORM)
         growth = SAFETY * norm**remembering * d.last_norm**MEMORY
         growth = min(d.most_growth, max(SHRINK, growth))

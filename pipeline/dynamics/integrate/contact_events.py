@@ -1,9 +1,9 @@
 """Contacts begin and end at located times; the impact rate is latched there, as state.
 
-A closing is a gap that falls through zero, an opening a penetration that does. Both are looked for in every accepted
-step, also when gap and penetration return within the step; the earliest is located on the dense output, the step is
-repeated to end there, and the contact's mode changes. What happens in between is followed by `contact_phases`, where
-in a step a mode changes by `mode_changes`.
+A closing is a gap that falls through zero, an opening a penetration that does. Every accepted
+step is searched for both, also when gap and penetration return within the step. The earliest one is located on the
+dense output (`mode_changes`), the step is repeated to end there, and the contact's mode changes. `contact_phases`
+records what happens during contact.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 #: mode changes at one and the same time before the solver gives up (Zeno)
 MOST_IMMEDIATE = 200
-#: what a contact does in a small fraction of a step is not where the dense output of the whole step has it;
-#: the step is then repeated, at most so often, with this fraction of its length or more
+#: the dense output of a long step misplaces what a contact does in a small fraction of it; the step is then repeated,
+#: at most so often, with this fraction of its length or more
 MOST_SHORTENED, REPEATED_FRACTION = 8, 0.1
 #: a contact that begins deeper than this fraction of its clearance, and so many tolerances, has been stepped over
 DEPTH_STEPPED_OVER, ERRORS = 1e-6, 100.0
-#: fraction of its length by which a step may miss the event that it is to end on
+#: fraction of its length by which a step may miss the event on which it must end
 EVENT_MISS = 1e-6
-#: a contact that would end where it has just begun is looked at in shorter steps, down to one in which it moves by so
-#: many times what its gap is off zero
+#: a contact that would end where it has just begun is resolved by shorter steps, down to one in which it moves by so
+#: many times the error of its gap
 FURTHER = 10.0
 
 
 # Modes ---------------------------------------------------------------------------------------------------------------
 @kernel
 def watch_start(d):
-    """Note what the contacts do where a segment starts, which has just been evaluated."""
+    """Store gaps, penetrations and their rates at the start of a segment, from the last evaluation."""
     for c in range(d.n_contacts):
         watch, now = d.watch[c], d.touch[c]
         watch.gap0, watch.rate0 = now.gap, now.rate
@@ -54,7 +54,7 @@ def watch_start(d):
 
 @kernel
 def any_closed(d):
-    """Whether some contact is closed."""
+    """Return True when a contact is closed."""
     result = False
     for c in range(d.n_contacts):
         result |= d.mode[c] == 1
@@ -63,7 +63,7 @@ def any_closed(d):
 
 @kernel
 def relax_bristles(d, c):
-    """The bristles of a contact that begins bear nothing yet."""
+    """Set the bristle states of a beginning contact to zero."""
     place = d.contacts[c].bristle
     if place >= 0:
         for k in range(3):
@@ -72,7 +72,7 @@ def relax_bristles(d, c):
 
 @kernel
 def change_mode(d, events, c, t):
-    """Change the mode of contact c at time t, latch its impact rate, and write the event down."""
+    """Change the mode of contact c at time t, latch its impact rate, and record the event."""
     watch = d.watch[c]
     rate = watch.rate1
     if d.mode[c] == 0:
@@ -94,21 +94,21 @@ def change_mode(d, events, c, t):
 # Events of a step ----------------------------------------------------------------------------------------------------
 @kernel
 def give_up(d, status, c):
-    """What resolve_events returns when contact c ends the run."""
+    """Return the result of resolve_events for a contact c that ends the run."""
     d.status, d.culprit = status, c
     return -1
 
 
 @kernel
 def try_again(d, c):
-    """What it returns when the step cannot be made with its end on an event of contact c."""
+    """Return the result of resolve_events for a step that cannot end on an event of contact c."""
     give_up(d, m.LOST_CLOSURE, c)
     return AGAIN
 
 
 @kernel
 def stepped_over(d, c):
-    """Whether contact c, about to change its mode where a step starts, has begun long before."""
+    """Return True when contact c, which changes its mode at the start of a step, is already too deep for a begin."""
     gap, length = d.touch[c].gap, d.contact_numbers[c].length
     deep = DEPTH_STEPPED_OVER * d.contact_numbers[c].clearance + ERRORS * d.rtol * length
     return gap < -deep and d.mode[c] == 0
@@ -116,16 +116,16 @@ def stepped_over(d, c):
 
 @kernel
 def backwards(d, c, rate):
-    """Whether contact c would change its mode on the way back: a graze that a shorter step is to decide.
+    """Return True when contact c would change its mode on its way back: a graze that a shorter step must resolve.
 
-    Steps of a chosen length, and polynomials, cannot be made shorter.
+    Fixed steps and polynomials cannot be shortened.
     """
     return side(d, c) * rate < 0.0 and d.fixed == 0.0 and d.collocated == 0.0
 
 
 @kernel
 def resolvable(d, c, step):
-    """Whether contact c moves further in a step than its gap at the start is uncertain."""
+    """Return True when contact c moves further in a step than the uncertainty of its gap at the start."""
     watch = d.watch[c]
     return abs(watch.rate0) * step > FURTHER * max(abs(watch.gap0), zero_gap(d, c))
 
@@ -139,7 +139,7 @@ def make_resolve_events(
     regimes: Callable,
     guards: tuple[Callable, ...],
 ) -> Callable:
-    """The kernel resolve_events(d, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
+    """Build the kernel resolve_events(d, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
     last = method.last
     evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
     follow_contacts = make_follow_contacts(evaluate, evaluate_at, extend, method, regimes)
@@ -147,9 +147,9 @@ def make_resolve_events(
 
     @kernel
     def end_on_event(d, step, c):
-        """Repeat the step so that it ends on the event: its length, or -1 when that fails, and whether it is there.
+        """Repeat the step to end on the event; return its length (-1: it fails), and whether its end is on the event.
 
-        Grazes are approached slowly: what is not there after three steps is left to shorter ones.
+        Newton's iteration approaches grazes slowly: after three repetitions shorter steps take over.
         """
         off = 0.0
         for _ in range(3):
@@ -169,7 +169,7 @@ def make_resolve_events(
 
     @kernel
     def first_change(d, step):
-        """Contact and share of the step of its first mode change, and whether the dense output is ready."""
+        """Return contact and fraction of the step of the first mode change, and whether the dense output is ready."""
         ready, first, which = False, NO_CHANGE, -1
         for c in range(d.n_contacts):
             if not (ends_tell(d, c) or cubic_tells(d, c, step)):
@@ -184,7 +184,7 @@ def make_resolve_events(
 
     @kernel
     def change_at_start(d, c, events):
-        """A mode change where the step starts: no step is made."""
+        """Change the mode of contact c at the start of the step; no step is made."""
         d.immediate += 1
         t = d.time
         for k in range(d.ny):
@@ -245,10 +245,10 @@ def make_resolve_events(
 
 
 def located(regimes: Callable, guards: tuple[Callable, ...] = NO_GUARDS) -> tuple[Callable, Callable, Callable]:
-    """What the stepper calls at the start of a segment, the maker of what it calls after each step, and `any_closed`.
+    """Return the stepper's kernel for segment starts, the maker of its kernel for step ends, and `any_closed`.
 
     regimes: whether contacts have regimes of sticking (`contact_phases.regimes` or `contact_phases.no_regimes`).
-    guards: on which steps end as well (`guards.AMONG_CONTACTS`).
+    guards: levels on which steps end as well (`guards.AMONG_CONTACTS`).
     """
     note_start = guards[0]
 

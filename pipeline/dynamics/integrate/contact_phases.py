@@ -1,9 +1,9 @@
-"""What happens inside a contact between its begin and its end: maximum compression, peak force, sticking and slipping.
+"""Events between begin and end of a contact: maximum compression, peak force, sticking and slipping.
 
-None of these changes the equations, so that no step ends on them; they are located on the dense output of the steps
-taken, as precisely as the integration itself. The force of a strongly damped contact peaks early in compression, so
-that its own trend is followed, not the penetration's. Each leaves a row of the motion, as an event that ends a step
-does: an impact is shorter than most output intervals, and forces and accelerations have their extremes in it.
+None of these changes the equations, so no step ends on them; they are located on the dense output of accepted steps, as
+precisely as the integration itself. The force of a strongly damped contact peaks early in compression, so its own trend
+is followed, not the penetration's. Each event stores a row of the motion, as an event that ends a step does: an impact
+is shorter than most output intervals, and forces and accelerations have their extremes in it.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from flexclear.pipeline.dynamics.kernels import kernel
 BACK = 1e-3
 
 
-# What is watched at the ends of a step -------------------------------------------------------------------------------
+# Contacts at the ends of a step -------------------------------------------------------------------------------
 @kernel
 def watch_end(d):
-    """Note what the contacts do at the end of the step, where it has just been evaluated."""
+    """Store gaps, penetrations and their rates at the end of the step, from the last evaluation."""
     for c in range(d.n_contacts):
         watch, now = d.watch[c], d.touch[c]
         watch.gap1, watch.rate1 = now.gap, now.rate
@@ -34,7 +34,7 @@ def watch_end(d):
 
 @kernel
 def end_becomes_start(d):
-    """The end of an accepted step is the start of the next."""
+    """Make the end of an accepted step the start of the next."""
     for c in range(d.n_contacts):
         watch = d.watch[c]
         watch.gap0, watch.rate0 = watch.gap1, watch.rate1
@@ -44,29 +44,29 @@ def end_becomes_start(d):
 
 @kernel
 def touch_at(d, c, field):
-    """Index in w of a field of TOUCH of contact c."""
+    """Return the index in w of a field of TOUCH of contact c."""
     return d.at_touch + m.TOUCH.size * c + field
 
 
 # Regimes of friction -------------------------------------------------------------------------------------------------
 @kernel
 def no_regimes(d, c):
-    """No friction: neither sticking nor slipping."""
+    """Return False: without friction a contact neither sticks nor slips."""
     return False
 
 
 @kernel
 def regimes(d, c):
-    """Whether contact c has a sliding speed below which its law sticks."""
+    """Return True when the law of contact c has a sliding speed below which it sticks."""
     return d.contact_numbers[c].stick_speed > 0.0
 
 
 @kernel
 def may_touch_level(watch, level, step):
-    """Whether a sliding speed that ends a step on the same side of a level may have been on the other meanwhile.
+    """Return True when a sliding speed may cross a level and return within the step.
 
-    It must approach the level at the start and leave it at the end; where it turns, the tangents at both ends meet
-    beyond it, since a speed is convex where it passes its least value and concave at its largest.
+    The speed must approach the level at the start and leave it at the end. The tangents at both ends then meet beyond
+    the level, since a speed is convex at its minimum and concave at its maximum.
     """
     first, second = watch.slip0 - level, watch.slip1 - level
     side = 1.0 if first > 0.0 else -1.0
@@ -80,7 +80,7 @@ def may_touch_level(watch, level, step):
 def make_follow_contacts(
     evaluate: Callable, evaluate_at: Callable, extend: Callable, method: Any, has_regimes: Callable
 ) -> Callable:
-    """The kernel follow_contacts(d, step, ready, rows, events) -> dense output ready?, after an accepted step.
+    """Build the kernel follow_contacts(d, step, ready, rows, events) -> dense output ready?, for accepted steps.
 
     evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step.
     has_regimes: `regimes` or `no_regimes`.
@@ -90,7 +90,7 @@ def make_follow_contacts(
 
     @kernel
     def value_at(d, step, theta, index):
-        """What w holds at an index, at a fraction of the step."""
+        """Return w[index] after an evaluation at a fraction of the step."""
         evaluate_at(d, step, theta)
         return d.w[index]
 
@@ -98,7 +98,7 @@ def make_follow_contacts(
 
     @kernel
     def measure_trends(d, step):
-        """At what rates each force and each sliding speed grow at the end of the step."""
+        """Measure the rates of each contact's force and sliding speed at the end of the step."""
         final = slope(d, last)
         for k in range(d.ny):
             d.y_stage[k] = d.y_new[k] - BACK * step * d.w[final + k]
@@ -112,7 +112,7 @@ def make_follow_contacts(
 
     @kernel
     def trends_matter(d):
-        """Whether some closed contact is compressing, or has regimes that a step may visit."""
+        """Return True when a closed contact is compressing or may change between sticking and slipping."""
         matter = False
         for c in range(d.n_contacts):
             watch = d.watch[c]
@@ -122,9 +122,9 @@ def make_follow_contacts(
 
     @kernel
     def may_peak(d, c, step, record):
-        """Whether a damped force may peak above the record within the step; a lossless one peaks where it is deepest.
+        """Return True when a damped force may peak above the record within the step.
 
-        Around its peak a force lies below its tangents.
+        A lossless force peaks at the largest penetration. Around its peak a force lies below its tangents.
         """
         watch = d.watch[c]
         damped = d.contact_numbers[c].damping > 0.0
@@ -135,7 +135,7 @@ def make_follow_contacts(
 
     @kernel
     def may_change_regime(d, c, step):
-        """Whether contact c passes, or may pass and return, the speed below which it sticks."""
+        """Return True when contact c crosses, or may cross and recross, the speed below which it sticks."""
         if not has_regimes(d, c):
             return False
         watch, level = d.watch[c], d.contact_numbers[c].stick_speed
@@ -144,7 +144,7 @@ def make_follow_contacts(
 
     @kernel
     def record_peak(d, step, c, rows, events):
-        """The largest force within the step, if that is a record of this contact."""
+        """Record the largest force within the step when it exceeds all earlier ones of this contact."""
         event = events[int(d.watch[c].event_row)]
         peak, where = maximum(d, step, touch_at(d, c, m.TOUCH.normal_force), 1.0)
         if peak > event[m.EVENT.peak_force]:
@@ -154,7 +154,7 @@ def make_follow_contacts(
 
     @kernel
     def record_compression(d, step, c, rows, events):
-        """The deepest point of this compression, as an event."""
+        """Record the event of maximum penetration."""
         watch, now = d.watch[c], d.touch[c]
         rate = touch_at(d, c, m.TOUCH.rate)
         theta = locate(d, step, rate, 0.0, 0.0, 0.0, 1.0, watch.rate0, watch.rate1)
@@ -168,7 +168,7 @@ def make_follow_contacts(
 
     @kernel
     def record_passage(d, step, c, a, b, fa, fb, rows, events):
-        """Sticking begins or ends between the shares a and b of the step, as an event."""
+        """Record the event that sticking begins or ends between the fractions a and b of the step."""
         slip = touch_at(d, c, m.TOUCH.slip)
         theta = locate(d, step, slip, d.contact_numbers[c].stick_speed, 0.0, a, b, fa, fb)
         kind = m.STICKING if fb < 0.0 else m.SLIPPING
@@ -177,7 +177,7 @@ def make_follow_contacts(
 
     @kernel
     def record_regimes(d, step, c, rows, events):
-        """One passage between the regimes, or there and back, as events."""
+        """Record one change between sticking and slipping, or two within the step."""
         watch, level = d.watch[c], d.contact_numbers[c].stick_speed
         first, second = watch.slip0 - level, watch.slip1 - level
         if first * second < 0.0:

@@ -68,7 +68,7 @@ A[15, [0, 5, 6, 7, 8, 12, 13, 14]] = (
     -0.42889630158379194, -4.697621415361164, 7.683421196062599, 4.06898981839711, 0.3567271874552811,
     -0.0013990241651590145, 2.9475147891527724, -9.15095847217987,
 )
-#: weights of the step, which are those of the stage at its end, and of its error estimates of third and fifth order
+#: weights of the step, equal to those of the stage at its end, and of the error estimates of third and fifth order
 B = A[STAGES, :STAGES].copy()
 E3 = np.array([
     -0.18980075407240762, 0.0, 0.0, 0.0, 0.0, 4.450312892752409, 1.8915178993145003, -5.801203960010585,
@@ -105,7 +105,7 @@ D[3, SEEN] = (
 
 @kernel
 def error(d, step):
-    """Norm of the local error, 1 at the tolerance."""
+    """Return the norm of the local error, 1 at the tolerance."""
     size, k = d.ny, slope(d, 0)
     five = three = 0.0
     for c in range(size):
@@ -126,7 +126,7 @@ extend_step, interpolate = make_dense(STAGES, D)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
-    """The method's kernels."""
+    """Build the method's kernels."""
     stage, proceed = make_stages(evaluate, A, B, C)
 
     @kernel

@@ -45,7 +45,7 @@ D = np.array(
 
 @kernel
 def error(d, step):
-    """Norm of the local error, 1 at the tolerance."""
+    """Return the norm of the local error, 1 at the tolerance."""
     total = 0.0
     for c in range(d.ny):
         weighted = 0.0
@@ -59,7 +59,7 @@ extend, interpolate = make_dense(STAGES, D)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
-    """The method's kernels."""
+    """Build the method's kernels."""
     _, proceed = make_stages(evaluate, A, B, C, ends=True)  # the error estimate needs the slope there
     return begin_afresh, proceed, error, extend, keep_nothing
 

@@ -1,4 +1,4 @@
-r"""Exponential Lobatto collocation of order 6: stiff modes are followed exactly, everything else by a cubic.
+r"""Exponential Lobatto collocation of order 6: stiff modes are integrated exactly, everything else by a cubic.
 
 The equations are split at every step, :math:`\dot y = A y + g(y)`: A holds the vibrations that the modal stiffness
 gives the mechanism in its present pose (`modal_basis`), g is the rest, without stiff modes. In
@@ -6,10 +6,10 @@ gives the mechanism in its present pose (`modal_basis`), g is the rest, without 
 .. math:: y(\theta h) = y_0 + \theta h\,\varphi_1(\theta h A)\,\dot y_0
           + h \sum_{k=1}^{3} k!\,\theta^{k+1}\varphi_{k+1}(\theta h A)\,d_k
 
-the :math:`d_k` are the coefficients of the cubic through g at Lobatto's nodes, minus its start; the nodes' states are
-found by iteration, which converges with h times the slope of g. So steps need not resolve the modes' vibrations, which
-keep their phases, and the solution between the nodes is dense output. A needs not be exact: what it lacks is in g.
-Without flexible bodies the method is Lobatto IIIA.
+the :math:`d_k` are the coefficients of the cubic through g at Lobatto's nodes, minus its start. Sweeps iterate the
+nodes' states; they converge with h times the slope of g. So steps need not resolve the modes' vibrations, which keep
+their phases, and the solution between the nodes is dense output. A need not be exact: g contains its error. Without
+flexible bodies the method is Lobatto IIIA.
 
 Source: Hochbruck & Ostermann, Exponential integrators, *Acta Numerica* 19 (2010), sec. 2.2 (collocation);
 Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.7 (Lobatto IIIA) and
@@ -40,13 +40,13 @@ NODES = 3
 C = np.array([(5.0 - np.sqrt(5.0)) / 10.0, (5.0 + np.sqrt(5.0)) / 10.0, 1.0])
 #: coefficient of theta^(k + 1) in the cubic that is zero at the start and 1 at node j alone
 CUBIC = np.linalg.inv(np.array([[c ** (k + 1) for k in range(NODES)] for c in C]))
-#: error estimates: what the cubic does that the parabola through all nodes but the second inner one does not, and the
+#: error estimates: differences of the cubic from the parabola through all nodes but the second inner one, and from the
 #: straight line through the ends; coefficients of theta to theta^3 for coefficients of the cubic
 CUBIC_OR_PARABOLA = np.array([C[0], -(1.0 + C[0]), 1.0])
 PARABOLA_OR_LINE, CUBIC_OR_LINE = np.array([-1.0, 1.0, 0.0]), np.array([-1.0, 0.0, 1.0])
-#: quadratures of the departures: up to each node, up to the share last asked for, and the error estimates
+#: quadratures of the departures: up to each node, up to the fraction last requested, and the error estimates
 ANYWHERE, THIRD, FOURTH, N_QUADRATURES = NODES, NODES + 1, NODES + 2, NODES + 3
-#: of each the coefficient of theta^(k + 1) for each departure
+#: of each quadrature the coefficient of theta^(k + 1) for each departure
 POLYNOMIALS = np.array(
     [
         *[CUBIC] * (NODES + 1),
@@ -56,16 +56,16 @@ POLYNOMIALS = np.array(
 )
 FACTORIALS = np.array([1.0 * factorial(k) for k in range(NODES + 2)])
 MOST_SWEEPS = 10
-#: how much of the slowest convergence is forgotten from step to step
+#: the slowest rate of convergence counts less by this factor from sweep to sweep
 FORGETTING = 0.3
-#: steps are so long that corrections fall by this factor per sweep, which goes with their square; no less is aimed at
+#: step lengths aim at corrections that fall by this factor per sweep, which goes with their square; the least rate used
 SWIFT, LEAST_CONTRACTION = 0.1, 0.01
 
-# What is kept between steps -------------------------------------------------------------------------------------------
-# floats: whether the oscillators are those of the present pose, whether there are any, step of the phi functions,
-# length of the step before (0: none), its rate of convergence, length of the step whose dense output is requested, the
-# slowest convergence within the last attempt; of the present one the norm of the last correction, and the slowest
-# convergence that is not forgotten
+# Memory between steps -------------------------------------------------------------------------------------------------
+# floats: whether the oscillators belong to the present pose, whether any are known, step of the phi functions, length
+# of the previous step (0: none), its rate of convergence, length of the step whose dense output is requested, the
+# slowest convergence within the last attempt; of the present attempt the norm of the last correction, and its faded
+# slowest convergence
 BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, CORRECTED, CONVERGING, FLOATS = range(10)
 #: vectors: departures of g from its start at the nodes, and those of the step before
 DEPARTURE, BEFORE, VECTORS = 0, NODES, 2 * NODES
@@ -77,16 +77,16 @@ SOURCES = NODES + 1
 
 @kernel
 def quadrature(d, j, i):
-    """Row of QUADRATURES of oscillator i in quadrature j."""
+    """Return the row of QUADRATURES of oscillator i in quadrature j."""
     return d.quadratures[d.nv * j + i]
 
 
 # Exponential quadrature -----------------------------------------------------------------------------------------------
 @kernel
 def find_phi(d, j, step, theta):
-    """The phi functions of all oscillators at a fraction of the step, for quadrature j, and what the sources add.
+    """Compute phi functions and source weights of all oscillators at a fraction of the step, for quadrature j.
 
-    Error estimates are of the whole step, as its last node is, whose functions they take.
+    Error estimates refer to the whole step, as its last node does, so they use the phi functions of that node.
     """
     tau, whole = theta * step, j >= THIRD
     slope_too = 0.0 if whole else 1.0
@@ -109,7 +109,7 @@ def find_phi(d, j, step, theta):
 
 @kernel
 def combine(d, j):
-    """What all sources add by quadrature j, as the pair TOTAL."""
+    """Sum the contributions of all sources by quadrature j in the pair TOTAL."""
     for i in range(count(d)):
         one, share, total = d.oscillators[i], quadrature(d, j, i).share, oscillation(d, TOTAL, i)
         if one.square == 0.0:
@@ -126,7 +126,7 @@ def combine(d, j):
 
 @kernel
 def plain_weight(theta, j, e):
-    """Weight of departure e in quadrature j without oscillators, in steps."""
+    """Return the weight of departure e in quadrature j without oscillators, in steps."""
     total, power = 0.0, theta
     for k in range(NODES):
         power *= theta
@@ -136,7 +136,7 @@ def plain_weight(theta, j, e):
 
 @kernel
 def add_departures(d, step, theta, j, out):
-    """Add what quadrature j makes of the departures, and of the slope, to what w holds from place out on."""
+    """Add quadrature j of the departures, and of the slope, to the state in w from index out on."""
     a, b, c = vector(d, DEPARTURE), vector(d, DEPARTURE + 1), vector(d, DEPARTURE + 2)
     wa, wb, wc = step * plain_weight(theta, j, 0), step * plain_weight(theta, j, 1), step * plain_weight(theta, j, 2)
     for i in range(d.ny):
@@ -147,7 +147,7 @@ def add_departures(d, step, theta, j, out):
 
 @kernel
 def advance_to(d, step, theta, j, out):
-    """State at a fraction of the step into w from place out, by quadrature j, whose phi functions are there."""
+    """Store the state at a fraction of the step in w from index out, by quadrature j, whose phi functions are known."""
     tau = step * theta
     for i in range(d.ny):
         d.w[out + i] = d.y[i] + tau * d.slopes[i]
@@ -157,7 +157,7 @@ def advance_to(d, step, theta, j, out):
 # Departures -----------------------------------------------------------------------------------------------------------
 @kernel
 def depart(d, step, e):
-    """Departure of g at node e from its start, by the node's state in Y_STAGE, its slope, and its pair TOTAL."""
+    """Compute the departure of g at node e from its start, from the node's state in Y_STAGE, slope and pair TOTAL."""
     departure, node = vector(d, DEPARTURE + e), slope(d, NODE)
     read(d, d.at_y_stage, SPARE)
     for i in range(count(d)):
@@ -173,7 +173,7 @@ def depart(d, step, e):
 
 @kernel
 def predict(d, step):
-    """Departures by the cubic of the step before; none without one."""
+    """Predict the departures by the cubic of the previous step; zeros without one."""
     length = d.memory[LAST_STEP]
     for e in range(NODES):
         departure, x = vector(d, DEPARTURE + e), 1.0 + C[e] * step / length if length > 0.0 else 1.0
@@ -189,20 +189,20 @@ def predict(d, step):
 
 @kernel
 def begin(d):
-    """Neither oscillators of this pose nor a step before are known."""
+    """Discard the oscillators and the previous step."""
     d.memory[BASIS_HOLDS] = d.memory[LAST_STEP] = 0.0
     d.memory[RATE] = 1.0
 
 
 @kernel
 def extend(d, step):
-    """The dense output is there."""
+    """Note the length of the step: the collocation polynomial is the dense output."""
     d.memory[LENGTH] = step
 
 
 @kernel
 def interpolate(d, theta, out):
-    """State at the share `theta` of the step, stored in w from `out`."""
+    """Store the state at the fraction `theta` of the step in w from `out`."""
     step = d.memory[LENGTH]
     find_phi(d, ANYWHERE, step, theta)
     advance_to(d, step, theta, ANYWHERE, out)
@@ -210,9 +210,9 @@ def interpolate(d, theta, out):
 
 @kernel
 def error(d, step):
-    """Norm of the local error, 1 at the tolerance: of fourth order, held up by one of third.
+    """Return the norm of the local error, 1 at the tolerance: of fourth order, bounded below by one of third.
 
-    The next step may be as much longer as its sweeps shall converge.
+    The next step grows at most so far that its sweeps converge.
     """
     out, size = slope(d, ESTIMATE), d.ny
     norms = (0.0, 0.0)
@@ -229,20 +229,20 @@ def error(d, step):
 
 
 def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, Any]) -> tuple:
-    """The method's kernels; whole: what leaves all of an evaluation, and the module that factors the mass matrix."""
+    """Build the method's kernels; whole: an evaluation with all intermediate results, and the module that factors M."""
     complete, tree = whole
     find_oscillators = modal_basis.make_find_oscillators(retract, tree)
 
     @kernel
     def renew(d):
-        """The oscillators of the state that has just been evaluated."""
+        """Compute the oscillators of the state evaluated last."""
         find_oscillators(d, d.memory[BASIS_KNOWN] > 0.0)
         d.jacobians += 1
         d.memory[BASIS_HOLDS], d.memory[BASIS_KNOWN], d.memory[PHI_STEP] = 1.0, 1.0, 0.0
 
     @kernel
     def prepare(d, step):
-        """Oscillators, phi functions, and what is read off the start of the step."""
+        """Compute oscillators, phi functions, and the oscillators' parts of state and slope at the step's start."""
         if d.memory[BASIS_HOLDS] == 0.0:
             complete(d.h, d.f, d.w, d.n, d.time, d.at_y, slope(d, NODE))
             d.evaluations += 1
@@ -258,13 +258,13 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
 
     @kernel
     def visit(d, step, e):
-        """Wait for the rates at node e."""
+        """Request the rates at node e."""
         advance_to(d, step, C[e], e, d.at_y_stage)
         return await_rates(d, d.time + C[e] * step, d.at_y_stage, slope(d, NODE))
 
     @kernel
     def correct(d, step):
-        """Y_NEW by the departures of a sweep: the norm of what that changes."""
+        """Compute Y_NEW from the departures of a sweep; return the norm of its change."""
         advance_to(d, step, 1.0, NODES - 1, d.at_y_stage)
         for c in range(d.ny):
             end = d.y_stage[c]
@@ -273,7 +273,7 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
 
     @kernel
     def converged(d, norm, k):
-        """What has come of the attempt after sweep k: AWAITS where another one is to follow."""
+        """Return the status of the attempt after sweep k: MADE, LOST, or AWAITS when another sweep follows."""
         enough, last_norm, rate = limit(d.rtol), d.memory[CORRECTED], d.memory[CONVERGING]
         if not norm <= 1e300:
             return LOST
@@ -293,7 +293,7 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
 
     @kernel
     def proceed(d, step):
-        """State Y_NEW after a step from Y, by new departures node after node; LOST when the iteration fails."""
+        """Step from Y to Y_NEW, by new departures node after node; LOST when the iteration fails."""
         if d.stage == 0:
             set_error_scales(d, d.at_y)
             prepare(d, step)
@@ -312,7 +312,7 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
 
     @kernel
     def keep(d, step):
-        """The cubic of an accepted step predicts the next one's; its end, where evaluated last, gives oscillators."""
+        """Store the cubic of an accepted step for the next prediction; renew oscillators if its end was evaluated."""
         for i in range(NODES * d.ny):
             d.w[vector(d, BEFORE) + i] = d.w[vector(d, DEPARTURE) + i]
         d.memory[LAST_STEP], d.memory[BASIS_HOLDS] = step, 0.0

@@ -1,4 +1,4 @@
-"""Steps of the length that the scene gives, shortened only to end on events, drive breaks, the run's end, and before
+"""Steps of the length that the scene gives, shortened only to end on events, drive breaks and the run's end, and before
 singular poses."""
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable, method: Any) -> tuple:
-    """The kernels first_step, error_norm, after_rejection and next_step of the stepper."""
+    """Build the stepper's kernels first_step, error_norm, after_rejection and next_step."""
 
     @kernel
     def first_step(d):
-        """All steps are alike."""
+        """Return the fixed length of all steps."""
         return d.fixed
 
     @kernel
     def error_norm(d, step):
-        """Every step that could be made is good; stiffness is measured in units of the tolerance."""
+        """Return 0: every step is accepted. Stiffness is measured in units of the tolerance."""
         set_error_scales(d, d.at_y_new)
         return 0.0
 
     @kernel
     def after_rejection(d, step, norm):
-        """There is no shorter step to try."""
+        """Give up: fixed steps are never shortened."""
         if d.evaluation == m.OK:
             d.status = m.NO_CONVERGENCE
         else:
@@ -36,7 +36,7 @@ def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable,
 
     @kernel
     def next_step(d, step, norm):
-        """All steps are alike."""
+        """Return the fixed length of all steps."""
         return d.fixed
 
     return first_step, error_norm, after_rejection, next_step

@@ -4,15 +4,15 @@ r"""Generalized-alpha: implicit structural integrator of second order that damps
           q_{n+1} = q_n \circ (h u_n + h^2[(\tfrac12-\beta)a_n + \beta a_{n+1}]),\quad
           u_{n+1} = u_n + h[(1-\gamma)a_n + \gamma a_{n+1}]
 
-with u' from the equations of motion, closures included: index reduction, so that no multiplier is an unknown; drift
-is left to the projection of every integrator. Rotations are composed (`retract`), not added. a belongs to the time
-t_n + (alpha_m - alpha_f) h, so it is started there and rescaled when the step changes. First-order variables z, which
-follow the speeds in the state (ledger, friction's own states), follow the trapezoidal rule, coupled.
+with u' from the equations of motion, closures included: after index reduction no multiplier is an unknown; projection
+removes the drift, as for every integrator. Rotations are composed (`retract`), not added. a belongs to the time
+t_n + (alpha_m - alpha_f) h, so it is initialised there and rescaled when the step changes. First-order variables z,
+which follow the speeds in the state (energy ledger, internal states of friction), obey the trapezoidal rule, coupled.
 
 The unknowns are the *rates* at the end of the step: a, then z'. Newton's matrix has rows (1 - alpha_m) -
 (1 - alpha_f) D for a and 1 - D / 2 for z', with D = gamma h d/du + beta h^2 d/dq for columns of u, and h d/dz for those
-of z. First a simplified iteration is made with the Jacobian that is there, then with a new one; with fixed steps at
-last a damped one with a new Jacobian at every iterate, where friction saturates within the step.
+of z. A simplified iteration uses the last Jacobian, then a new one; with fixed steps a damped iteration
+follows with a new Jacobian at every iterate, for friction that saturates within the step.
 
 The error estimate compares the step with the integral of the parabola through the last three slopes; its rates are
 passed through Newton's matrix, as otherwise damped modes would dictate the step.
@@ -37,40 +37,40 @@ from flexclear.pipeline.dynamics.integrate.newton import COLUMN_STEP, converged,
 from flexclear.pipeline.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.kernels import kernel
 
-# rows of SLOPES: start of the step, Newton's iterate, end of the step, estimates, search for events
+# rows of SLOPES: start of the step, Newton's iterate, end of the step, error estimates, search for events
 ITERATE, LAST, ESTIMATE, ROWS = 1, 2, 3, 5
-#: iterations of the simplified kind, and from which number on they ask for a new Jacobian at the next step
+#: simplified iterations at most, and the number from which on the next step computes a new Jacobian
 MOST_ITERATIONS, SLOW_FROM = 10, 4
-#: iterations of the damped kind, and halvings of one correction
+#: damped iterations at most, and halvings of one correction
 MOST_CORRECTIONS, MOST_HALVINGS = 30, 12
 
-# What is kept between steps ------------------------------------------------------------------------------------------
+# Memory between steps ------------------------------------------------------------------------------------------------
 # floats: step to which the stored accelerations belong, step of the factors, whether the Jacobian still holds, step
 # before
 A_STEP, FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(5)
 #: vectors of rates: accelerations at the start as stored, rates at the end, accelerations at the start for this step's
-#: length, displacement, residual, Newton's correction, row exchanges of the factors; then room for positions, and the
-#: slope at the start of the step before
+#: length, displacement, residual, Newton's correction, row exchanges of the factors; then storage for positions, and
+#: the slope at the start of the previous step
 OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, CORRECTION, PIVOTS, POSITIONS, SLOPE_BEFORE, VECTORS = range(10)
-#: matrices: change of the rates with speeds and z, with positions, and Newton's matrix
+#: matrices: derivatives of the rates by speeds and z, by positions, and Newton's matrix
 BY_STATE, BY_POSITION, NEWTON, MATRICES = range(4)
 
 
 @kernel
 def n_rates(d):
-    """Number of unknowns."""
+    """Return the number of unknowns."""
     return d.ny - d.nq
 
 
 # Coefficients and linear system --------------------------------------------------------------------------------------
 def parameter(solver: Any) -> float:
-    """Spectral radius at infinite frequency."""
+    """Return the spectral radius at infinite frequency."""
     return float(solver.rho_inf)
 
 
 @kernel
 def coefficients(d):
-    """alpha_m, alpha_f, beta and gamma for the spectral radius at infinity."""
+    """Return alpha_m, alpha_f, beta and gamma for the spectral radius at infinity."""
     r = d.parameter
     alpha_m, alpha_f = (2.0 * r - 1.0) / (r + 1.0), r / (r + 1.0)
     gamma = 0.5 - alpha_m + alpha_f
@@ -79,19 +79,19 @@ def coefficients(d):
 
 @kernel
 def own_weight(d, i):
-    """Weight of unknown i itself in its equation."""
+    """Return the weight of unknown i in its own equation."""
     return 1.0 - coefficients(d)[0] if i < d.nv else 1.0
 
 
 @kernel
 def gain(d, step, i):
-    """Change of speed or variable i at the end of the step with its rate there."""
+    """Return the derivative of speed or variable i at the end of the step by its rate there."""
     return coefficients(d)[3] * step if i < d.nv else step
 
 
 @kernel
 def factorise(d, step):
-    """Newton's matrix for a step, factorised; False when it is singular."""
+    """Factorise Newton's matrix for a step; return False when it is singular."""
     _, alpha_f, beta, _ = coefficients(d)
     size, nv = n_rates(d), d.nv
     S, by_state, by_position = matrix(d, NEWTON), matrix(d, BY_STATE), matrix(d, BY_POSITION)
@@ -109,13 +109,13 @@ def factorise(d, step):
 
 @kernel
 def solve(d, b):
-    """Solve Newton's system in place for the right-hand side from place b."""
+    """Solve Newton's system in place for the right-hand side at index b."""
     lu_solve(d.w, matrix(d, NEWTON), vector(d, PIVOTS), n_rates(d), b)
 
 
 @kernel
 def rates_norm(d, step, a):
-    """What rates from place a make of the state, in units of the tolerance."""
+    """Return the norm of the state's change by the rates at index a, in units of the tolerance."""
     total, count = 0.0, n_rates(d)
     for i in range(count):
         total += (gain(d, step, i) * d.w[a + i] / error_scale(d, d.nq + i)) ** 2
@@ -125,7 +125,7 @@ def rates_norm(d, step, a):
 # From step to step ---------------------------------------------------------------------------------------------------
 @kernel
 def predict(d, step):
-    """Accelerations at the start for a step of this length, and a first guess of the rates at its end."""
+    """Rescale the accelerations at the start to this step, and guess the rates at its end."""
     nq = d.nq
     share, on = step / d.memory[A_STEP], step / d.memory[LAST_STEP]
     for k in range(d.nv):
@@ -139,7 +139,7 @@ def predict(d, step):
 
 @kernel
 def keep(d, step):
-    """The end of an accepted step is the start of the next."""
+    """Make the end of an accepted step the start of the next."""
     for k in range(d.nv):
         d.w[vector(d, OLD) + k] = d.w[vector(d, NEW) + k]
     for c in range(d.ny):
@@ -149,7 +149,7 @@ def keep(d, step):
 
 @kernel
 def error(d, step):
-    """Norm of the local error, 1 at the tolerance."""
+    """Return the norm of the local error, 1 at the tolerance."""
     size, start, end, before = d.ny, slope(d, 0), slope(d, ITERATE), vector(d, SLOPE_BEFORE)
     out, length = slope(d, ESTIMATE), d.memory[LAST_STEP]
     for c in range(size):
@@ -164,12 +164,12 @@ def error(d, step):
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
-    """The method's kernels."""
+    """Build the method's kernels."""
     place_end, solve_step = make_newton(evaluate, retract)
 
     @kernel
     def begin(d):
-        """Accelerations at their own time, from a look ahead along the tangent."""
+        """Initialise the accelerations at their own time, from an evaluation a little ahead along the tangent."""
         alpha_m, alpha_f, _, _ = coefficients(d)
         size, first, step = d.ny, slope(d, 0), d.step
         ahead = slope(d, ITERATE)
@@ -189,7 +189,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
     @kernel
     def attempt(d, step):
-        """State Y_NEW after a step from Y; False when no iteration converges."""
+        """Step from Y to Y_NEW; return False when no iteration converges."""
         set_error_scales(d, d.at_y)
         if not solve_step(d, step):
             return False
@@ -200,12 +200,12 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 
 def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callable]:
-    """The kernels place_end(d, step, out) and solve_step(d, step)."""
+    """Build the kernels place_end(d, step, out) and solve_step(d, step)."""
     jacobian = make_jacobian(evaluate, retract)
 
     @kernel
     def place_end(d, step, out):
-        """State at the end of the step for the rates in NEW."""
+        """Store the state at the end of the step for the rates in NEW."""
         _, _, beta, gamma = coefficients(d)
         nq, nv, old, new, shift = d.nq, d.nv, vector(d, RESCALED), vector(d, NEW), vector(d, DISPLACEMENT)
         for k in range(nv):
@@ -218,7 +218,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def residual(d, step):
-        """What the rates in NEW leave of the method's equations, into RESIDUAL; False without a slope."""
+        """Store the residual of the method's equations at the rates NEW; False when the right-hand side fails."""
         alpha_m, alpha_f, _, _ = coefficients(d)
         nq, old, start, end = d.nq, vector(d, RESCALED), slope(d, 0), slope(d, ITERATE)
         place_end(d, step, d.at_y_new)
@@ -235,7 +235,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def iterate(d, step):
-        """Newton's iterations with the matrix as it is; their number, or 0 when they do not converge."""
+        """Iterate with the present Newton matrix; return the number of iterations, 0 when they do not converge."""
         left, last_norm = vector(d, RESIDUAL), 0.0
         for k in range(MOST_ITERATIONS):
             if not residual(d, step):
@@ -252,7 +252,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def line_search(d, step, norm):
-        """Take the correction, or the fraction of it that makes the residual less; what is left of it, or -1."""
+        """Apply the fraction of the correction that reduces the residual; return the residual's norm, or -1."""
         correction, new = vector(d, CORRECTION), vector(d, NEW)
         share, there = 1.0, 0.0
         for _ in range(MOST_HALVINGS):
@@ -268,7 +268,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def iterate_damped(d, step):
-        """Damped Newton iterations with a new matrix each: for friction that saturates within a step."""
+        """Iterate damped with a new Newton matrix each time: for friction that saturates within a step."""
         t, enough = d.time + step, limit(d.rtol)
         correction = vector(d, CORRECTION)
         if not residual(d, step):
@@ -290,9 +290,9 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def solve_step(d, step):
-        """Rates at the end of the step into NEW; False when no iteration converges.
+        """Solve for the rates NEW at the end of the step; return False when no iteration converges.
 
-        With chosen steps a shorter one is the better remedy, with fixed steps it is patience.
+        With adaptive steps a shorter step is the better remedy, with fixed steps further iterations are.
         """
         for _ in range(2):
             fresh = d.memory[JACOBIAN_HOLDS] == 0.0
@@ -317,11 +317,11 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
 
 def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
-    """The kernel jacobian(d, t, y, slope_there)."""
+    """Build the kernel jacobian(d, t, y, slope_there)."""
 
     @kernel
     def column(d, t, slope_there, k, change, target):
-        """Column k of a Jacobian of the rates, from the changed state in Y_STAGE."""
+        """Store column k of a Jacobian of the rates, from the changed state in Y_STAGE."""
         size, nq, near = n_rates(d), d.nq, slope(d, ESTIMATE)
         evaluate(d, t, d.at_y_stage, near)
         d.evaluations += 1
@@ -331,7 +331,7 @@ def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
 
     @kernel
     def jacobian(d, t, y, slope_there):
-        """Change of the rates with speeds and z, and with displacements, at the state in y; False without a slope."""
+        """Store the derivatives of the rates by speeds and z, and by displacements, at state y; False on failure."""
         nv, nq, shift = d.nv, d.nq, vector(d, DISPLACEMENT)
         for c in range(d.ny):
             d.y_stage[c] = d.w[y + c]

@@ -1,13 +1,13 @@
-"""Steps end on the guards of a mechanism: where what a force depends on passes a level, or reverses.
+"""Steps end on the guards of a mechanism: levels and reversals of the vectors on which forces depend.
 
-There the slope or the curvature of a friction law jumps, at sliding speeds that the law names, and loads on joints turn
-round, of which friction takes the magnitudes. A step over such a kink has less derivatives than its method and its
-error estimate ask for, so that what it errs is chance: at single tolerances ten times and more off the trend. Where an
-accepted step has passed a guard, it is made again with its end there, as close as the tolerance asks; both sides are
-smooth. Nothing begins afresh.
+There the slope or the curvature of a friction law jumps, at sliding speeds that the law names, and loads on joints
+reverse, of which friction takes the magnitudes. A step over such a kink has fewer derivatives than its method and its
+error estimate need, so its error is a matter of chance: at single tolerances ten times and more off the trend. When an
+accepted step has passed a guard, it is repeated to end there, as close as the tolerance demands; both sides are smooth.
+Integration does not restart.
 
-A guard watches a vector (`model.guards`), and takes it to go straight from the start of a step to its end. So a speed
-that is the same at both ends, as of a joint that is driven to and fro, still passes its levels in between.
+A guard watches a vector (`model.guards`), and assumes a straight path from the start of a step to its end. So the speed
+of a joint that reverses between two equal magnitudes still passes its levels in between.
 
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6
 (discontinuous equations).
@@ -26,15 +26,15 @@ from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, 
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
 
-#: how close to its level a guard ends a step, as a fraction of the guard's size over the root of the tolerance: what a
-#: step errs that ends so far beyond falls with the square of it
+#: how close to its level a guard ends a step, as a fraction of the guard's size over the root of the tolerance: the
+#: error of a step that ends so far beyond falls with the square of it
 LEVEL_DISTANCE = 0.1
-#: a vector reverses that passes zero within this fraction of its way: in a plane mechanism that is rounding
+#: a vector that passes zero within this fraction of its change reverses: in a plane mechanism the rest is rounding
 REVERSES = 1e-6
 MOST_REPEATS = 3
-#: a step that would be a smaller fraction of the tried one, or of the time reached, ends where it did
+#: a repeated step that would be a smaller fraction of the first one, or of the time reached, is not made
 SHORTEST_STEP = 1e-12
-#: what `first_passed` gives where a step passes no guard
+#: returned by `first_passed` when a step passes no guard
 NONE = (2.0, -1, 0.0, 1.0, 0.0, 0.0)
 
 
@@ -46,7 +46,7 @@ def length(v):
 
 @kernel
 def watched(d, g):
-    """Return what guard g watches, in the state just evaluated; a vector that ends with zeros."""
+    """Return the vector that guard g watches, in the state evaluated last, padded with zeros."""
     guard = d.guards[g]
     o = d.h[guard.table] + guard.offset
     return d.w[o], d.w[o + 1] if guard.components > 1 else 0.0, d.w[o + 2] if guard.components > 2 else 0.0
@@ -54,14 +54,14 @@ def watched(d, g):
 
 @kernel
 def note_start(d):
-    """Note what all guards watch where a segment starts."""
+    """Store the watched vectors at the start of a segment."""
     for g in range(d.n_guards):
         d.guarded[g].start = watched(d, g)
 
 
 @kernel
 def note_end(d):
-    """Note the same at the end of a step."""
+    """Store the watched vectors at the end of a step."""
     for g in range(d.n_guards):
         d.guarded[g].end = watched(d, g)
 
@@ -75,7 +75,7 @@ def accept(d):
 
 @kernel
 def beyond(d, g):
-    """Return how far what guard g watches is beyond its level; of a guard for reversal, its component along its way."""
+    """Return how far the vector of guard g is beyond its level; for a reversal, its component along its change."""
     level, v = d.guard_numbers[g].level, watched(d, g)
     if level > 0.0:
         return length(v) - level
@@ -85,7 +85,7 @@ def beyond(d, g):
 
 @kernel
 def closeness(d, g):
-    """Return how far from its level guard g counts as there; of one without a scale, by what the step changes."""
+    """Return the distance from its level at which guard g counts as reached, from its scale or the step's change."""
     numbers, bearing = d.guard_numbers[g], d.guards[g].bearing
     if bearing < 0 and numbers.scale == 0.0:
         return LEVEL_DISTANCE * np.sqrt(d.rtol) * length(sub(d.guarded[g].end, d.guarded[g].start))
@@ -140,15 +140,16 @@ def first_passed(d):
 
 
 def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable) -> Callable:
-    """The kernel end_on_guard(d, step, before, ready): length of the step that ends on a guard instead.
+    """Build the kernel end_on_guard(d, step, before, ready), which repeats a step to end on a guard.
 
-    0 without one before a fraction of the step; -1 when the step cannot be made again. ready: the dense output.
+    It returns the new length: 0 without a guard before that fraction of the step, -1 when the step cannot be repeated.
+    ready: whether the dense output is prepared.
     evaluate_at, repeat: of `within_step`.
     """
 
     @kernel
     def beyond_at(d, step, theta, g):
-        """How far beyond its level guard g is at a fraction of the step."""
+        """Return how far guard g is beyond its level at a fraction of the step."""
         evaluate_at(d, step, theta)
         return beyond(d, g)
 
@@ -156,7 +157,7 @@ def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable)
 
     @kernel
     def land(d, step, theta, g, close, before, off_before):
-        """Make the step end on the level, from a first guess: its length; -1 when it cannot be made.
+        """Repeat the step to end on the level, from a first guess; return its length, or -1 when that fails.
 
         before, off_before: another fraction of the step, and how far beyond the level it is.
         """
@@ -201,7 +202,7 @@ def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable)
 def make_resolve_events(
     evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any
 ) -> Callable:
-    """The kernel resolve_events of scenes with guards and without contacts (`contact_events.make_resolve_events`)."""
+    """Build the kernel resolve_events for guards without contacts (see `contact_events.make_resolve_events`)."""
     evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
     end_on_guard = make_end_on_guard(evaluate_at, extend, repeat)
 

@@ -15,7 +15,7 @@ ROWS = 4
 
 
 def make_extend(last: int) -> Callable:
-    """The kernel extend(d, step) of a method whose slope at the end is in row `last`."""
+    """Build the kernel extend(d, step) of a method whose slope at the end is in row `last`."""
 
     @kernel
     def extend(d, step):
@@ -33,7 +33,7 @@ def make_extend(last: int) -> Callable:
 
 @kernel
 def interpolate(d, theta, out):
-    """State at the share `theta` of the step, stored in w from `out` (after `extend`); any cubic in DENSE."""
+    """Store the state at the fraction `theta` of the step in w from `out`, from the cubic in DENSE (after `extend`)."""
     size, dense = d.ny, d.at_dense
     for c in range(size):
         v = d.w[dense + 3 * size + c] * theta + d.w[dense + 2 * size + c]

@@ -1,4 +1,4 @@
-"""What an integration method is to the stepper, and which variant of the stepper a scene wants."""
+"""The interface between an integration method and the stepper."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def slope(d, i):
-    """Where w holds row i of SLOPES, the slope of a state."""
+    """Return the index in w of row i of SLOPES, the slope of a state."""
     return d.at_slopes + d.ny * i
 
 
 @kernel
 def vector(d, i):
-    """Where w holds row i of VECTORS, of the state's length, which a method keeps."""
+    """Return the index in w of row i of VECTORS, a method's storage of the state's length."""
     return d.at_vectors + d.ny * i
 
 
 @kernel
 def matrix(d, i):
-    """Where w holds one of MATRICES, which a method keeps."""
+    """Return the index in w of one of MATRICES, a method's storage."""
     return d.at_matrices + d.ny * d.ny * i
 
 
-#: how far an attempt has come: it waits for rates, it is made, it cannot be made
+#: status of an attempt: it waits for rates, is complete, or has failed
 AWAITS, MADE, LOST = range(3)
 
 
 @kernel
 def await_rates(d, t, y, dy):
-    """Ask whoever lets the attempt proceed for the rates of the state in w from y at time t, into w from dy."""
+    """Request the rates of the state in w from y at time t, to be stored in w from dy; return AWAITS."""
     d.awaited_time, d.awaited, d.rates_in = t, y, dy
     d.stage += 1
     d.evaluations += 1
@@ -43,7 +43,7 @@ def await_rates(d, t, y, dy):
 
 
 def make_attempt(evaluate: Callable, proceed: Callable) -> Callable:
-    """The kernel attempt of a method that waits for its rates: it makes them itself."""
+    """Build the kernel attempt of a staged method, which evaluates the requested rates itself."""
 
     @kernel
     def attempt(d, step):
@@ -59,7 +59,7 @@ def make_attempt(evaluate: Callable, proceed: Callable) -> Callable:
 
 
 def make_at_once(attempt: Callable) -> Callable:
-    """The kernel proceed of a method that waits for nothing."""
+    """Build the kernel proceed of a method that is not staged."""
 
     @kernel
     def proceed(d, step):
@@ -70,40 +70,40 @@ def make_at_once(attempt: Callable) -> Callable:
 
 @kernel
 def begin_afresh(d):
-    """`begin` of a one-step method, which has nothing to forget."""
+    """Do nothing: `begin` of a one-step method without memory."""
 
 
 @kernel
 def keep_nothing(d, step):
-    """`keep` of a one-step method, which has nothing to remember."""
+    """Do nothing: `keep` of a one-step method without memory."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Method:
     """An integration method.
 
-    traits: what is known of it elsewhere.
-    room: what it needs of the work space; of SLOPES the first row is the slope where a step starts, the last is left to
+    traits: properties that scenes and other modules use. room: storage in the work array; the first row of SLOPES is
+    the slope at the start of a step, the last row belongs to
         the search for events.
     last: row of the slope at the step's end.
-    make_kernels: (evaluate, retract) -> kernels, with a third argument of methods that read more than rates
-        (`Traits.reads_all`): an evaluation of which everything is left, with the module that factors the mass matrix.
-        evaluate(d, t, y, dy), retract(d, y, displacement, out, scratch) take indices in w. They count their evaluations
-        themselves:
-        begin(d) after every restart, with the slope and the length of the first step known;
-        attempt(d, step) fills Y_NEW, False when it could not; of a `staged` method proceed(d, step) does so from one
-        evaluation to the next: AWAITS (`await_rates`), MADE or LOST, by d.stage, 0 at first;
-        error(d, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);
+    make_kernels: (evaluate, retract) -> kernels; methods that read more than rates (`Traits.reads_all`) take as third
+        argument an evaluation that leaves all intermediate results, with the module that factors the mass matrix.
+        evaluate(d, t, y, dy) and retract(d, y, displacement, out, scratch) take indices in w. The kernels count their
+        evaluations:
+        begin(d) is called after every restart, with the slope and the length of the first step known;
+        attempt(d, step) fills Y_NEW and returns False when it fails; for a `staged` method proceed(d, step) continues
+        to the next evaluation by d.stage, 0 at first, and returns AWAITS (`await_rates`), MADE or LOST;
+        error(d, step) returns the norm of the local error, 1 at the tolerance (None: fixed steps only);
         extend(d, step) prepares the dense output once the slope at the end is known;
-        keep(d, step) remembers an accepted step.
-    interpolate: (d, share of the step, out) the dense output.
+        keep(d, step) stores what the next step needs of an accepted one.
+    interpolate: (d, fraction of the step, out) evaluates the dense output.
     error_order: the error estimate falls with this power of the step plus one; 0 for methods without one.
-    staged: whether it gives `proceed` in place of `attempt`, so that several can proceed together.
-    ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
-    steady: a growth of the step below this is not worth another factorisation.
+    staged: whether it has `proceed` in place of `attempt`, so that several engines can step together.
+    ends: whether `attempt` leaves the work array evaluated at Y_NEW, its slope in row `last`.
+    steady: growth of the step below this factor does not justify another factorisation.
     parameter: the method's number in the scene's solver table, if it has one.
-    stability: reach of the region of stability along the negative real axis, of an explicit method whose last
-        stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
+    stability: extent of the stability region along the negative real axis, for an explicit method whose last stage is
+        at the step's end and leaves its argument in Y_STAGE; None: stiffness is not detected.
     """
 
     traits: Traits

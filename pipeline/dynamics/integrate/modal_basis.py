@@ -1,14 +1,13 @@
-r"""Vibrations that modal stiffness gives the constrained mechanism, in the state just evaluated.
+r"""Vibrations of the constrained mechanism under its modal stiffness, in the state evaluated last.
 
 With M the mass matrix, J the closures' Jacobian and K the modal stiffness, the modes' springs accelerate the
 coordinates by :math:`-P K q`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
 :math:`K^{1/2} P K^{1/2} = Q \Omega^2 Q^T` separates them into oscillators :math:`z = Q^T K^{1/2} q`, each with a shape
-over all coordinates and a fraction of the modal damping; the positions' rates and the drives' work follow linearly.
-What this leaves out (other forces, coupling by damping, the change of pose) is not stiff, contacts and steep friction
-excepted.
+over all coordinates and a fraction of the modal damping; the positions' rates and the drives' work follow linearly. The
+remainder (other forces, coupling by damping, the change of pose) is not stiff, contacts and steep friction excepted.
 
-A is the matrix of all that: :math:`A y = B \Lambda C y`, where C reads (z, z') off a state, B lifts them to one and
-:math:`C B = 1`, so that functions of A are functions of 2 x 2 matrices.
+These vibrations are linear in the state: :math:`A y = B \Lambda C y`, where C extracts (z, z') from a state, B maps
+them to a state and :math:`C B = 1`, so that functions of A are functions of 2 x 2 matrices.
 
 Source: Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), sec. 8.5 (Jacobi's method).
 """
@@ -26,38 +25,38 @@ from flexclear.pipeline.dynamics.equations.closures import add_spread, solve, ta
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot
 
-#: off-diagonal entries of this fraction of the diagonal ones' geometric mean are zero; sweeps, quadratically convergent
+#: off-diagonal entries below this fraction of the diagonal ones' geometric mean count as zero; most Jacobi sweeps
 OFF_DIAGONAL, SWEEPS = 1e-13, 20
-#: oscillators below this fraction of the largest frequency are not stiff, and left alone
+#: oscillators below this fraction of the largest frequency are not stiff, and are integrated with the rest
 NOT_STIFF = 1e-6
-#: largest change of a coordinate by which the positions' rates are asked for
+#: largest change of a coordinate in the finite differences of the positions' rates
 POSITION_CHANGE = 1e-9
 
 
 @kernel
 def lifting(d, i):
-    """Where w holds oscillator i's shape, of the state's length: rates of positions, speeds, and two of the work.
+    """Return the index in w of oscillator i's shape, of the state's length: rates of positions, speeds, two works.
 
-    Oscillating forces do work on drives whose speed changes within a step: the work at the start's speed, and its rate.
+    Oscillating forces work on drives whose speed changes within a step: the work at the start's speed, and its rate.
     """
     return d.at_lifting + d.ny * i
 
 
 @kernel
 def response(d, j):
-    """Where w holds what the root of spring j's stiffness accelerates, the drives' power then, and its rate."""
+    """Return the index in w of the accelerations by the root of spring j's stiffness, the drives' power, its rate."""
     return d.at_response + d.ny * j
 
 
 @kernel
 def oscillation(d, p, i):
-    """(z, z') of oscillator i, pair p of all oscillators."""
+    """Return (z, z') of oscillator i in pair p of all oscillators."""
     return d.oscillations[d.nv * p + i]
 
 
 @kernel
 def count(d):
-    """Number of modes, which is that of oscillators."""
+    """Return the number of oscillators, equal to that of the modes."""
     total = 0
     for k in range(d.n_flex):
         total += d.flexes[k].n_modes
@@ -67,7 +66,7 @@ def count(d):
 # Functions of the state -----------------------------------------------------------------------------------------------
 @kernel
 def read(d, state, p):
-    """C: pair p of what w holds for each variable from index `state` on."""
+    """Apply C: fill pair p from the variables in w from index `state` on."""
     for i in range(count(d)):
         e, z, rate = d.nv * i, 0.0, 0.0
         for k in range(d.n_flex):
@@ -82,7 +81,7 @@ def read(d, state, p):
 
 @kernel
 def lift(d, p, t, out):
-    """Add B, a time t after the pose, of pair p to what w holds for each variable from place `out` on."""
+    """Apply B, a time t after the pose: add pair p to the variables in w from index `out` on."""
     nq, nv = d.nq, d.nv
     for i in range(count(d)):
         if d.oscillators[i].square == 0.0:
@@ -98,7 +97,7 @@ def lift(d, p, t, out):
 
 @kernel
 def work_rate(d, p):
-    """Rate at which the work that belongs to pair p changes because the drives' speeds do."""
+    """Return the rate of pair p's work that is due to the drives' changing speeds."""
     total, rates = 0.0, d.nq + d.nv + 1
     for i in range(count(d)):
         pair = oscillation(d, p, i)
@@ -108,7 +107,7 @@ def work_rate(d, p):
 
 @kernel
 def turn(d, p):
-    """Lambda: (z, z') of pair p becomes (z', -omega^2 z - d z')."""
+    """Apply Lambda: (z, z') of pair p becomes (z', -omega^2 z - d z')."""
     for i in range(count(d)):
         one, pair = d.oscillators[i], oscillation(d, p, i)
         z, rate = pair.z, pair.rate
@@ -118,7 +117,7 @@ def turn(d, p):
 # Oscillators ----------------------------------------------------------------------------------------------------------
 @kernel
 def couple(d, i):
-    """Row i of the symmetric matrix: what the response of mode i's spring does along all modes."""
+    """Fill row i of the symmetric matrix: the response of mode i's spring along all modes."""
     j, b = 0, response(d, i) + d.nq
     for k in range(d.n_flex):
         for c in range(d.flexes[k].c0, d.flexes[k].c0 + d.flexes[k].n_modes):
@@ -128,7 +127,7 @@ def couple(d, i):
 
 @kernel
 def into_axes(d, n):
-    """The symmetric matrix S in the axes Q of the pose before, which are nearly its own: Q^T S Q, by way of READING."""
+    """Replace the symmetric matrix S by Q^T S Q, with the axes Q of the previous pose, nearly its own; uses READING."""
     nv, S, QtS, Qt = d.nv, d.coupling, d.reading, d.axes
     for i in range(n):
         for k in range(n):
@@ -146,7 +145,7 @@ def into_axes(d, n):
 
 @kernel
 def rotate(entries, a, b, stride, n, c, s):
-    """Turn n entries from a and from b on, `stride` entries from one to the next, into each other."""
+    """Rotate two rows or columns of n entries, from indices a and b on with a stride, by cosine c and sine s."""
     for k in range(0, stride * n, stride):
         x, y = entries[a + k], entries[b + k]
         entries[a + k], entries[b + k] = c * x - s * y, s * x + c * y
@@ -154,7 +153,7 @@ def rotate(entries, a, b, stride, n, c, s):
 
 @kernel
 def diagonalise(d, n):
-    """Jacobi's rotations until the symmetric matrix is diagonal, taken along by its axes."""
+    """Diagonalise the symmetric matrix by Jacobi's rotations, and rotate its axes along."""
     nv, S = d.nv, d.coupling
     for _ in range(SWEEPS):
         turned = False
@@ -178,7 +177,7 @@ def diagonalise(d, n):
 
 @kernel
 def damp(d, i):
-    """Damping of oscillator i by the modal damping: the part that does not couple it to others."""
+    """Return the damping of oscillator i by the modal damping, without its coupling to other oscillators."""
     total, e = 0.0, d.nv * i
     for k in range(d.n_flex):
         n = d.flexes[k].n_modes
@@ -191,12 +190,12 @@ def damp(d, i):
 
 
 def make_responses(tree: Any) -> Callable:
-    """The kernel responses(d); tree: what factors the mass matrix, the module `articulated` or `composite`."""
+    """Build the kernel responses(d); tree: the module that factors the mass matrix."""
     forward, backward, inertial_power = tree.forward, tree.backward, tree.drive_power
 
     @kernel
     def constrained(d, b):
-        """P applied to the forces in w from place b; needs the factors of an evaluation. Leaves the multipliers.
+        """Apply P to the forces in w from index b, by the factors of an evaluation; the multipliers remain stored.
 
         Modes are in the interface basis.
         """
@@ -210,7 +209,7 @@ def make_responses(tree: Any) -> Callable:
 
     @kernel
     def drive_power(d, b, motion):
-        """Power that the drives bring in at accelerations from place b and the multipliers that belong to them.
+        """Return the drives' power at the accelerations at index b and their multipliers.
 
         motion: U for the power, DU for the rate at which it grows with the drives' speeds.
         """
@@ -226,7 +225,7 @@ def make_responses(tree: Any) -> Callable:
 
     @kernel
     def respond(d, b):
-        """What the forces in w from place b do, in place; and the drives' power then, and its rate, added after it."""
+        """Replace the forces in w from index b by their accelerations, followed by the drives' power and its rate."""
         nv = d.nv
         constrained(d, b)
         d.w[b + nv] += drive_power(d, b, d.at_u)
@@ -235,7 +234,7 @@ def make_responses(tree: Any) -> Callable:
 
     @kernel
     def responses(d):
-        """Responses to the root of each mode's stiffness, and the symmetric matrix."""
+        """Compute the responses to the root of each mode's stiffness, and the symmetric matrix."""
         nq, nv, e = d.nq, d.nv, 0
         for i in range(count(d)):
             for k in range(nq, nq + nv + 2):
@@ -256,12 +255,12 @@ def make_responses(tree: Any) -> Callable:
 
 
 def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
-    """The kernel find_oscillators(d, known), at the state in Y or Y_NEW that has just been evaluated."""
+    """Build the kernel find_oscillators(d, known), for the state in Y or Y_NEW evaluated last."""
     responses = make_responses(tree)
 
     @kernel
     def shapes(d, state, n):
-        """Rows of C and shapes of B, from responses, axes and squares; slow oscillators have none."""
+        """Fill rows of C and shapes of B from responses, axes and squares; slow oscillators get none."""
         nq, nv, largest = d.nq, d.nv, 0.0
         for i in range(n):
             largest = max(largest, d.coupling[(nv + 1) * i])
@@ -280,7 +279,8 @@ def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
                 for c in range(nq, nq + nv + 2):
                     d.w[shape + c] += weight * d.w[part + c]
         for i in range(n):
-            # the responses are used up: room for a displacement, the positions that it leads to, and the change
+            # the responses are no longer needed: their storage serves a displacement, the resulting positions, and the
+            # change
             shape, spare, longest = lifting(d, i), response(d, 0), 0.0
             for c in range(nv):
                 longest = max(longest, abs(d.w[shape + nq + c]))
@@ -293,7 +293,7 @@ def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
 
     @kernel
     def find_oscillators(d, known):
-        """Fill the basis; known: whether it holds the axes of another pose."""
+        """Compute the oscillators; known: whether the axes of another pose are stored."""
         size = count(d)
         responses(d)
         if known:

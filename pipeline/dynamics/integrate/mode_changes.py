@@ -1,9 +1,9 @@
-"""Where a contact changes its mode within a step.
+"""Location of a contact's mode change within a step.
 
-The ends of a step tell gap and rate; between them a long step of free flight may hold more than one turn, so that the
-cubic through them is looked at, too. Where it leaves room for a mode change, the dense output is searched from its
-start on, in stretches so short that cubics describe the gap: a step of free bodies may be as long as their motion is
-smooth, in which a ball travels many times its clearance and its gap, a length, turns and turns again.
+The ends of a step give gap and rate. Between them a long step of free flight may contain several turning points of the
+gap, so the cubic through both ends is examined, too. If it permits a mode change, the dense output is searched from its
+start on, in intervals so short that cubics describe the gap: a step of free bodies is as long as their motion is
+smooth, in which a ball travels many times its clearance and its gap, a length, has many extremes.
 """
 
 from __future__ import annotations
@@ -20,50 +20,50 @@ from flexclear.pipeline.dynamics.vectors import dot, sub
 #: difference of the sites' positions has no digits below, which matters where clearances are of micrometres
 ZERO_GAP, FOUR_ROUNDINGS = 1e-12, 8.9e-16
 ROOT_ITERATIONS, TURN_ITERATIONS = 60, 40
-#: fraction of the step at which a contact changes its mode that does not
+#: returned in place of a fraction of the step when the mode does not change
 NO_CHANGE = 2.0
-#: the cubic through a step's ends is trusted to this fraction of its own departure from a straight line; in long steps
-#: of order 8 it is off by a tenth of that
+#: assumed error of the cubic through a step's ends, as a fraction of its departure from a straight line; in long steps
+#: of order 8 its error is a tenth of that
 TRUST = 0.2
-#: where it says that something may happen, the step is searched in stretches of at most this fraction; they are halved
-#: where the cubic through a stretch's ends misses its middle by more than this fraction of its departure, and of the
-#: distance from which the mode change is reached (what lies behind it may be thousands of times larger), and while the
-#: ball travels more than its clearance, of which the gap may tell nothing
+#: a step with a possible mode change is searched in intervals of at most this fraction. They are halved while the cubic
+#: through an interval's ends misses its middle by more than this fraction of its departure, and of the distance before
+#: the mode change (that behind it may be thousands of times larger), and while the ball travels more than its
+#: clearance, which the gap need not show
 WIDEST_STRETCH, FAITHFUL = 0.25, 0.05
 #: to this fraction: even the rate of a gap jumps where a ball passes the centre of its socket
 SHORTEST = 2.0**-13
-#: by more than a cubic, of this departure, may be lower between the quarters of its halves
+#: by more than this fraction of its departure, a cubic may be lower between the quarters of its halves
 DIP = 0.05
 
 
 @kernel
 def side(d, c):
-    """+1 for an open contact, whose gap falls to an event; -1 for a closed one, whose penetration does."""
+    """Return +1 for an open contact, whose gap falls to an event; -1 for a closed one, whose penetration does."""
     return 1.0 if d.mode[c] == 0 else -1.0
 
 
 @kernel
 def zero_gap(d, c):
-    """Size [m] below which the gap of contact c is zero."""
+    """Return the size [m] below which the gap of contact c counts as zero."""
     return ZERO_GAP * d.contact_numbers[c].clearance + FOUR_ROUNDINGS * d.length
 
 
 @kernel
 def distance_between(a, b):
-    """Distance of two points."""
+    """Return the distance of two points."""
     between = sub(a, b)
     return np.sqrt(dot(between, between))
 
 
 @kernel
 def cubic_middle(d0, d1, r0, r1):
-    """Hermite's cubic in the middle, from its values and rates (per length of the stretch) at both ends."""
+    """Return Hermite's cubic in the middle, from values and rates (per length of the interval) at both ends."""
     return 0.5 * (d0 + d1) + 0.125 * (r0 - r1)
 
 
 @kernel
 def cubic_least(d0, d1, r0, r1):
-    """The least of Hermite's cubic at the quarters."""
+    """Return the least value of Hermite's cubic at the quarters."""
     first = (54.0 * d0 + 10.0 * d1 + 9.0 * r0 - 3.0 * r1) / 64.0
     last = (10.0 * d0 + 54.0 * d1 + 3.0 * r0 - 9.0 * r1) / 64.0
     return min(cubic_middle(d0, d1, r0, r1), min(first, last))
@@ -71,20 +71,20 @@ def cubic_least(d0, d1, r0, r1):
 
 @kernel
 def cubic_departure(d0, d1, r0, r1):
-    """How far Hermite's cubic departs from a straight line."""
+    """Return how far Hermite's cubic departs from a straight line."""
     return abs(r0 - (d1 - d0)) + abs(r1 - (d1 - d0))
 
 
 @kernel
 def ends_tell(d, c):
-    """Whether the ends of a step show a mode change, or one turn that may hold one."""
+    """Return True when the ends of a step show a mode change, or a turning point that may contain one."""
     watch, s = d.watch[c], side(d, c)
     return s * watch.gap1 < 0.0 or (s * watch.rate0 > 0.0 and s * watch.rate1 <= 0.0)
 
 
 @kernel
 def cubic_tells(d, c, step):
-    """Whether the distance to the mode change may fall below zero inside the step, by the cubic through its ends."""
+    """Return True when the distance to the mode change may become negative inside, by the cubic through both ends."""
     watch, s = d.watch[c], side(d, c)
     d0, d1 = s * watch.gap0, s * watch.gap1
     r0, r1 = -s * watch.rate0 * step, -s * watch.rate1 * step
@@ -92,24 +92,24 @@ def cubic_tells(d, c, step):
 
 
 def make_locate_change(evaluate_at: Callable) -> Callable:
-    """The kernel locate_change(d, step, c), after `ends_tell` or `cubic_tells`.
+    """Build the kernel locate_change(d, step, c), for use after `ends_tell` or `cubic_tells`.
 
-    It gives the fraction of the step where contact c changes its mode: 0 at once, NO_CHANGE not at all.
+    It returns the fraction of the step where contact c changes its mode: 0 at once, NO_CHANGE not at all.
     evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step.
     """
 
     @kernel
     def distance_at(d, step, theta, c):
-        """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
+        """Return distance to the mode change (gap if open, penetration if closed) and its rate per step."""
         evaluate_at(d, step, theta)
         return side(d, c) * d.touch[c].gap, -side(d, c) * d.touch[c].rate * step
 
     @kernel
     def turning_point(d, step, c, sign, low, high):
-        """Fraction of the step where sign * distance is first least, or where it is seen to be negative at once.
+        """Return the fraction of the step at the first minimum of sign * distance, or at the first negative value met.
 
-        With sign -1 the distance rises from zero and is negative at the end: wherever it is seen negative, its first
-        rise and fall lie before, whatever it does after.
+        With sign -1 the distance rises from zero and is negative at the end: its first rise and fall lie before any
+        negative value.
         """
         zero, theta, last = zero_gap(d, c), low, 0
         at_low = at_high = 0.0  # rates there, zero while they are not known
@@ -133,7 +133,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
 
     @kernel
     def root(d, step, c, low, high):
-        """Fraction of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
+        """Return the fraction of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
         theta, enough = 0.5 * (low + high), 1e-3 * zero_gap(d, c)
         for _ in range(ROOT_ITERATIONS):
             value, rate = distance_at(d, step, theta, c)
@@ -149,7 +149,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
 
     @kernel
     def change_within(d, step, c, low, high, start, falling, end, rising):
-        """First mode change between two shares of the step with at most one turn between them, or NO_CHANGE.
+        """Return the first mode change between two fractions with at most one turning point between them, or NO_CHANGE.
 
         start, end: distances there; falling, rising: whether they fall at the first, and rise at the second.
         """
@@ -171,7 +171,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
 
     @kernel
     def search(d, step, c):
-        """First mode change in the step, stretch by stretch: 0 at once, NO_CHANGE not at all."""
+        """Return the first mode change in the step, interval by interval: 0 at once, NO_CHANGE not at all."""
         zero, room = zero_gap(d, c), d.contact_numbers[c].clearance
         d0, r0 = distance_at(d, step, 0.0, c)
         p0 = d.touch[c].offset

@@ -1,6 +1,6 @@
-"""What implicit methods share: the end of a simplified Newton iteration, and the small dense systems that it solves.
+"""Termination of simplified Newton iterations, and LU factors of small dense systems, for implicit methods.
 
-Matrices stand in the work space row by row, complex ones as a real and an imaginary matrix.
+Matrices are stored in the work array row by row, complex ones as a real and an imaginary matrix.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.8 (end of the
 iteration); Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), alg. 3.4.1 (LU factors with row exchanges).
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: what is left may be this fraction of the tolerance, or ten roundings if that is more
+#: the remaining error may be this fraction of the tolerance, or ten roundings if that is more
 TOLERANCE_FRACTION, TEN_ROUNDINGS = 1e-2, 2.2e-15
 #: a first correction this far below the limit needs no second one to know how fast they fall
 SMALL_CORRECTION = 1e-3
@@ -20,13 +20,13 @@ COLUMN_STEP = 1e-8
 
 @kernel
 def limit(rtol):
-    """Norm of what may be left, in units of the tolerance."""
+    """Return the norm of the admissible remaining error, in units of the tolerance."""
     return max(TOLERANCE_FRACTION, TEN_ROUNDINGS / rtol)
 
 
 @kernel
 def converged(k, norm, last_norm, rtol):
-    """1 when correction k (norm in units of the tolerance) was the last one, -1 when it is hopeless, else 0."""
+    """Return 1 when correction k (norm in units of the tolerance) was the last one, -1 on divergence, else 0."""
     enough = limit(rtol)
     if not norm <= 1e300:
         return -1
@@ -42,14 +42,14 @@ def converged(k, norm, last_norm, rtol):
 
 @kernel
 def exchange_rows(w, a, b, n):
-    """Exchange two stretches of w."""
+    """Exchange n entries of w from a with those from b."""
     for k in range(n):
         w[a + k], w[b + k] = w[b + k], w[a + k]
 
 
 @kernel
 def lu_factor(w, a, pivots, n):
-    """Overwrite the matrix from place a by its factors; False when it is singular or no number."""
+    """Overwrite the matrix at index a by its factors; return False when it is singular or not finite."""
     for k in range(n):
         best, row = abs(w[a + n * k + k]), k
         for i in range(k + 1, n):
@@ -72,7 +72,7 @@ def lu_factor(w, a, pivots, n):
 
 @kernel
 def lu_solve(w, a, pivots, n, b):
-    """Solve in place for the right-hand side from place b."""
+    """Solve in place for the right-hand side at index b."""
     for k in range(n):
         row = int(w[pivots + k])
         w[b + k], w[b + row] = w[b + row], w[b + k]
@@ -90,7 +90,7 @@ def lu_solve(w, a, pivots, n, b):
 
 @kernel
 def lu_factor_complex(w, a, pivots, n):
-    """`lu_factor` for a complex matrix: real part from place a, imaginary part n n further."""
+    """Apply `lu_factor` to a complex matrix: real part at index a, imaginary part n n further."""
     c = a + n * n
     for k in range(n):
         best, row = -1.0, k
@@ -119,7 +119,7 @@ def lu_factor_complex(w, a, pivots, n):
 
 @kernel
 def lu_solve_complex(w, a, pivots, n, b, d):
-    """Solve in place for a right-hand side with its real part from place b, its imaginary part from d."""
+    """Solve in place for a right-hand side with its real part at index b, its imaginary part at d."""
     c = a + n * n
     for k in range(n):
         row = int(w[pivots + k])

@@ -1,10 +1,10 @@
-"""Sizes of states and errors in units of the tolerance.
+"""Norms of states and errors in units of the tolerance.
 
-Variables stand in groups, such as the components of one velocity. A group's scale is the tolerance times its floor plus
-the length of its vector; the length, not the largest component, which would depend on the axes of a scene.
+Variables form groups, such as the components of one velocity. A group's scale is the tolerance times its floor plus
+the length of its vector; the largest component would depend on the axes of a scene.
 
 Independent mechanisms in one scene have floors of their own sizes, and the square of the norm is the sum of the squares
-of what their norms would be alone: each is at least as accurate as without the others.
+of their separate norms: each is at least as accurate as without the others.
 
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.4.
 """
@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def set_error_scales(d, y):
-    """Scale of each group from the states at both ends of the step: in Y and from place y of w."""
+    """Set the scale of each group from the states at both ends of the step: in Y and at index y of w."""
     scales, o = d.at_magnitude, d.at_y
     for g in range(d.n_groups):
         d.w[scales + g] = 0.0
@@ -33,13 +33,13 @@ def set_error_scales(d, y):
 
 @kernel
 def error_scale(d, c):
-    """Error of variable c that the tolerance allows."""
+    """Return the error of variable c that the tolerance allows."""
     return d.magnitude[d.groups[c].group]
 
 
 @kernel
 def scaled_norm(d, a):
-    """Root mean square, in units of the scales, of what w holds for each variable from place a on."""
+    """Return the root mean square, in units of the scales, of the variables in w from index a on."""
     total = 0.0
     for c in range(d.ny):
         share = d.w[a + c] / error_scale(d, c)
@@ -49,7 +49,7 @@ def scaled_norm(d, a):
 
 @kernel
 def finite(d, a):
-    """Whether w holds numbers only, for each variable, from place a on."""
+    """Return True when the variables in w from index a on are finite."""
     result = True
     for c in range(d.ny):
         result &= abs(d.w[a + c]) <= 1e300

@@ -30,7 +30,7 @@ INVERSE_FACTORIALS = np.array([1.0 / factorial(k) for k in range(PHI_COUNT + TER
 
 @kernel
 def decaying(w, out, x):
-    """phi_0(-x), phi_1(-x), ... for a number x >= 0 into every second place of w from place out."""
+    """Store phi_0(-x), phi_1(-x), ... for a number x >= 0 in every second entry of w from index out."""
     value = 0.0
     if x < SERIES_LIMIT:
         for k in range(PHI_COUNT + TERMS - 1, -1, -1):
@@ -46,7 +46,7 @@ def decaying(w, out, x):
 
 @kernel
 def apart(w, out, a, b, root):
-    """As `phi_functions`, of eigenvalues that are real and 2 root apart: by those of each alone."""
+    """Do as `phi_functions` for real eigenvalues with a distance of 2 root, by the phi functions of each."""
     fast = 0.5 * b + root
     slow = a / fast
     decaying(w, out, slow)
@@ -59,9 +59,9 @@ def apart(w, out, a, b, root):
 
 @kernel
 def phi_functions(w, out, a, b):
-    """alpha_0, beta_0, alpha_1, ... into w from place out; a = (omega tau)^2 and b = d tau, neither below 0.
+    """Store alpha_0, beta_0, alpha_1, ... in w from index out; a = (omega tau)^2 and b = d tau, neither below 0.
 
-    Good to some ten thousand roundings of 1/k!, and mostly to a few.
+    Their error is at most some ten thousand roundings of 1/k!, and mostly a few.
     """
     if a + b < SERIES_LIMIT:
         alpha, beta = INVERSE_FACTORIALS[PHI_COUNT - 1 + TERMS], 0.0

@@ -1,8 +1,8 @@
 r"""Radau IIA of order 5: implicit, L-stable, for stiff friction, stiff contacts and stiff modes.
 
-The displacements Z of the three stages are found by a simplified Newton iteration. Transformed by the eigenvectors of
-the inverse Butcher matrix, its linear systems are parted into a real and a complex one, :math:`(\mu/h) I - J`; the
-Jacobian J is made by finite differences and kept while iterations converge fast. The error estimate is filtered by the
+A simplified Newton iteration computes the displacements Z of the three stages. Transformed by the eigenvectors of the
+inverse Butcher matrix, its linear systems split into a real and a complex one, :math:`(\mu/h) I - J`. Finite
+differences give the Jacobian J, which serves as long as iterations converge fast. The error estimate is filtered by the
 real system; dense output is the collocation polynomial.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.5 (table 5.6) and IV.8.
@@ -62,14 +62,14 @@ P = np.array(
     ]
 )
 MOST_ITERATIONS = 7
-#: corrections that fall slower than this ask for a new Jacobian at the next step
+#: corrections that fall slower than this request a new Jacobian at the next step
 SLOW_CONVERGENCE = 0.3
 
-# What is kept between steps ------------------------------------------------------------------------------------------
+# Memory between steps ------------------------------------------------------------------------------------------------
 # floats: step of the factors, whether the Jacobian still holds, length of the step before (0: none)
 FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(4)
-#: vectors: three each of Z, of Z transformed and of Newton's corrections of that, four of the polynomial of the step
-#: before; row exchanges of the factors of a real and of a complex system
+#: vectors: three each of Z, of the transformed Z and of its Newton corrections, four of the previous step's polynomial;
+#: row exchanges of the factors of a real and of a complex system
 Z, TRANSFORMED, CORRECTION, POLYNOMIAL = range(0, 12, 3)
 REAL_PIVOTS, COMPLEX_PIVOTS, VECTORS = range(POLYNOMIAL + 4, POLYNOMIAL + 7)
 #: matrices: the Jacobian, and the factors of both systems, the complex one's imaginary part last
@@ -79,7 +79,7 @@ JACOBIAN, REAL, COMPLEX, MATRICES = 0, 1, 2, 4
 # Linear systems ------------------------------------------------------------------------------------------------------
 @kernel
 def factorise(d, step):
-    """Factors of both systems for a step; False when one is singular."""
+    """Factorise both systems for a step; return False when one is singular."""
     size, jacobian, real, rest = d.ny, matrix(d, JACOBIAN), matrix(d, REAL), matrix(d, COMPLEX)
     for i in range(size):
         for o in range(size * i, size * (i + 1)):
@@ -95,21 +95,21 @@ def factorise(d, step):
 
 @kernel
 def solve_real(d, b):
-    """Solve the real system in place for the right-hand side from place b."""
+    """Solve the real system in place for the right-hand side at index b."""
     lu_solve(d.w, matrix(d, REAL), vector(d, REAL_PIVOTS), d.ny, b)
 
 
 # Collocation polynomial ----------------------------------------------------------------------------------------------
 @kernel
 def coefficient(d, c, k):
-    """Coefficient of theta^(k + 1) for state variable c."""
+    """Return the coefficient of theta^(k + 1) for state variable c."""
     z, size = vector(d, Z), d.ny
     return P[0, k] * d.w[z + c] + P[1, k] * d.w[z + size + c] + P[2, k] * d.w[z + 2 * size + c]
 
 
 @kernel
 def write_polynomial(d, out):
-    """The polynomial of the present step into four vectors from place out."""
+    """Store the polynomial of the present step in four vectors from index out."""
     for c in range(d.ny):
         d.w[out + c] = d.y[c]
         for k in range(3):
@@ -118,27 +118,27 @@ def write_polynomial(d, out):
 
 @kernel
 def extend(d, step):
-    """Prepare the dense output: the polynomial, a cubic."""
+    """Prepare the dense output: the collocation polynomial, a cubic."""
     write_polynomial(d, d.at_dense)
 
 
 @kernel
 def keep(d, step):
-    """The polynomial of an accepted step predicts the stages of the next."""
+    """Store the polynomial of an accepted step, which predicts the stages of the next."""
     write_polynomial(d, vector(d, POLYNOMIAL))
     d.memory[LAST_STEP] = step
 
 
 @kernel
 def begin(d):
-    """No polynomial is known; the Jacobian holds until the iteration says otherwise, whatever the contacts' modes."""
+    """Discard the polynomial; the Jacobian serves until iterations converge slowly, whatever the contacts' modes."""
     d.memory[LAST_STEP] = 0.0
 
 
 # Newton's iteration --------------------------------------------------------------------------------------------------
 @kernel
 def transform(d, T, source, target):
-    """Three vectors of one kind as combinations T of those of another."""
+    """Store three vectors at target as combinations T of three vectors at source."""
     for c in range(d.ny):
         a = d.w[vector(d, source) + c]
         b = d.w[vector(d, source + 1) + c]
@@ -149,10 +149,11 @@ def transform(d, T, source, target):
 
 @kernel
 def predict(d, step):
-    """Stages from the polynomial of the step before; without one, positions move on with their rates at the start.
+    """Predict the stages by the polynomial of the previous step; without one, positions advance at their start's rates.
 
-    Not speeds, whose rates at the start may be far from those of a stiff step. Positions must: at rest where a contact
-    begins the first iterate would not touch, and the force, seen by the second one only, would look like divergence.
+    Speeds do not: their rates at the start may be far from those of a stiff step. Positions must: without this the
+    first iterate at a contact's begin would have no penetration, and the force in the second would look like
+    divergence.
     """
     length, o, size = d.memory[LAST_STEP], vector(d, POLYNOMIAL), d.ny
     for i in range(3):
@@ -167,7 +168,7 @@ def predict(d, step):
 
 @kernel
 def residuals(d, step):
-    """Right-hand sides of the systems, from the stages' slopes."""
+    """Compute the right-hand sides of the systems from the stages' slopes."""
     size, first = d.ny, slope(d, 1)
     for c in range(size):
         a, b, e = d.w[first + c], d.w[first + size + c], d.w[first + 2 * size + c]
@@ -187,7 +188,7 @@ def residuals(d, step):
 
 @kernel
 def correct(d):
-    """Add the corrections; their norm in units of the tolerance."""
+    """Add the corrections; return their norm in units of the tolerance."""
     total = 0.0
     for c in range(d.ny):
         scale = error_scale(d, c)
@@ -201,7 +202,7 @@ def correct(d):
 
 @kernel
 def estimate(d, step, start):
-    """Norm of the filtered error, left in row ESTIMATE, from a slope at (or near) the start of the step."""
+    """Return the norm of the filtered error (stored in row ESTIMATE), from a slope at or near the start of the step."""
     out = slope(d, ESTIMATE)
     for c in range(d.ny):
         bent = 0.0
@@ -213,11 +214,11 @@ def estimate(d, step, start):
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
-    """The method's kernels."""
+    """Build the method's kernels."""
 
     @kernel
     def jacobian(d):
-        """Change of all rates with all variables, at the start of the step; works and losses change none."""
+        """Compute the derivatives of all rates by all variables at the step's start; works and losses have none."""
         size, near, J = d.ny, slope(d, 1), matrix(d, JACOBIAN)
         works = d.nq + d.nv
         states = works + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * d.n_contacts
@@ -244,7 +245,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
     @kernel
     def iterate(d, step):
-        """Newton's iterations: rate at which the corrections fell, or -1 when they did not."""
+        """Iterate; return the rate at which the corrections fell, or -1 when they did not."""
         size, last_norm, rate = d.ny, 0.0, 0.0
         for k in range(MOST_ITERATIONS):
             for i in range(3):
@@ -269,7 +270,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
     @kernel
     def attempt(d, step):
-        """State Y_NEW after a step from Y; False when Newton's iteration fails with a fresh Jacobian too."""
+        """Step from Y to Y_NEW; return False when Newton's iteration fails with a new Jacobian, too."""
         set_error_scales(d, d.at_y)
         for _ in range(2):
             fresh = d.memory[JACOBIAN_HOLDS] == 0.0
@@ -291,7 +292,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
     @kernel
     def error(d, step):
-        """Norm of the local error, 1 at the tolerance; what is too large is filtered twice."""
+        """Return the norm of the local error, 1 at the tolerance; an error that is too large is filtered twice."""
         norm, out, near = estimate(d, step, slope(d, 0)), slope(d, ESTIMATE), slope(d, 1)
         if norm > 1.0:
             for c in range(d.ny):

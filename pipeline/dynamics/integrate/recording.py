@@ -1,7 +1,7 @@
 """The record of a run: rows of its motion at output times and events, and rows of its events.
 
-A row of the motion holds the time, the contacts' modes and impact rates, and the state; modes are those within the
-step, also where its end changes one.
+A row of the motion contains the time, the contacts' modes and impact rates, and the state; modes are those within the
+step, also when its end changes one.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: recorded states are projected to this fraction of rtol times the mechanism's size; to more of a loose rtol, up to the
-#: second fraction, as it grows by so many times rtol: what a run left open itself need not cost an evaluation in every
-#: row
+#: recorded states are projected to this fraction of rtol times the mechanism's size; it grows by so many times rtol, up
+#: to the second fraction: a residual that the run itself left needs no evaluation in every row
 RECORD_SHARE, MOST_SHARE, LOOSER_FACTOR = 1e-3, 0.1, 1e3
 
 
 class Record(NamedTuple):
-    """Rows of the record by what they hold, all views.
+    """Columns of the record, all views.
 
     time: [s], shape (rows,).  modes, latched: 1 of closed contacts and 0 of open ones, and their impact rates [m/s];
     shape (rows, contacts).  state: shape (rows, NY).
@@ -34,18 +33,18 @@ class Record(NamedTuple):
 
 
 def record(rows: np.ndarray, contacts: int) -> Record:
-    """Rows of the record, shape (rows, columns), by what they hold."""
+    """Return the columns of rows of the record, shape (rows, columns), by name."""
     mode, latched, state = m.columns_of_record(contacts)
     return Record(rows[:, 0], rows[:, mode:latched], rows[:, latched:state], rows[:, state:])
 
 
 def empty_record(rows: int, contacts: int, ny: int) -> np.ndarray:
-    """Rows of the record, all zero, shape (rows, columns)."""
+    """Return rows of the record, all zero, shape (rows, columns)."""
     return np.zeros((rows, m.columns_of_record(contacts)[-1] + ny))
 
 
 def record_share(rtol: float) -> float:
-    """Fraction of rtol times the mechanism's size to which the loops of recorded states are closed."""
+    """Return the fraction of rtol times the mechanism's size to which the loops of recorded states are closed."""
     return min(MOST_SHARE, max(RECORD_SHARE, LOOSER_FACTOR * rtol))
 
 
@@ -54,7 +53,7 @@ share_of_records = kernel(record_share)
 
 @kernel
 def hold_modes(d):
-    """Keep the modes and impact rates that hold within the step, which its end may change."""
+    """Store the modes and impact rates of the step before an event at its end changes them."""
     for c in range(d.n_contacts):
         watch = d.watch[c]
         watch.mode0, watch.latched0 = d.mode[c], d.latched[c]
@@ -62,7 +61,7 @@ def hold_modes(d):
 
 @kernel
 def snapshot(d, rows, t, y):
-    """Append a row of the motion: time, modes and impact rates of the contacts as held, state."""
+    """Append a row of the motion: time, modes and impact rates of the contacts as stored, state."""
     row, (mode, latched, state) = rows[d.n_recorded], m.record_columns(d.n_contacts)
     row[0] = t
     for c in range(d.n_contacts):
@@ -76,7 +75,7 @@ def snapshot(d, rows, t, y):
 
 @kernel
 def add_event(d, events, c, kind, t):
-    """Append a row to the events, of contact c; its number."""
+    """Append an event of contact c; return its number."""
     row = d.n_events
     event = events[row]
     event[m.EVENT.time], event[m.EVENT.contact], event[m.EVENT.kind] = t, c, kind
@@ -85,11 +84,11 @@ def add_event(d, events, c, kind, t):
 
 
 def make_record_outputs(extend: Callable, interpolate: Callable) -> Callable:
-    """The kernel record_outputs(d, step, ready, outputs, rows, t_end)."""
+    """Build the kernel record_outputs(d, step, ready, outputs, rows, t_end)."""
 
     @kernel
     def record_outputs(d, step, ready, outputs, rows, t_end):
-        """Snapshots at the output times up to t_end, from the dense output, which may be ready."""
+        """Append rows at the output times up to t_end, from the dense output; ready: whether it is prepared."""
         t = d.time
         while d.next_output < outputs.shape[0] and outputs[d.next_output] <= t_end:
             t_output = outputs[d.next_output]

@@ -22,7 +22,7 @@ C = np.array([0.0, 0.5, 0.5, 1.0])
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
-    """The method's kernels; it has no error estimate."""
+    """Build the method's kernels; the method has no error estimate."""
     _, proceed = make_stages(evaluate, A, B, C)
     return begin_afresh, proceed, None, hermite.make_extend(STAGES), keep_nothing
 

@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 def make_stages(
     evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray, *, ends: bool = False
 ) -> tuple[Callable, Callable]:
-    """The kernels stage(d, step, i) and proceed(d, step).
+    """Build the kernels stage(d, step, i) and proceed(d, step).
 
     A, B, C: Butcher's tableau; stages beyond len(B) serve error estimates and dense output.
     Row i of SLOPES is the slope of stage i, row 0 that at the start of the step.
@@ -24,7 +24,7 @@ def make_stages(
 
     @kernel
     def combine(d, step, i):
-        """Argument of stage i, from the slopes of all earlier ones, in Y_STAGE."""
+        """Store the argument of stage i, from the slopes of all earlier stages, in Y_STAGE."""
         size, y, stage_y = d.ny, d.at_y, d.at_y_stage
         for c in range(size):
             d.w[stage_y + c] = d.w[y + c]
@@ -37,14 +37,14 @@ def make_stages(
 
     @kernel
     def stage(d, step, i):
-        """Slope of stage i from those of all earlier ones."""
+        """Compute the slope of stage i from those of all earlier stages."""
         combine(d, step, i)
         evaluate(d, d.time + C[i] * step, d.at_y_stage, slope(d, i))
         d.evaluations += 1
 
     @kernel
     def proceed(d, step):
-        """State Y_NEW after a step from Y, by the next stage; LOST when one has no slope."""
+        """Continue the step from Y to Y_NEW by the next stage; LOST when the right-hand side fails."""
         size, i = d.ny, d.stage + 1
         if i > 1 and d.evaluation != m.OK:
             return LOST
@@ -68,7 +68,8 @@ def make_stages(
 
 
 def make_dense(last: int, D: np.ndarray) -> tuple[Callable, Callable]:
-    """The kernels extend(d, step) and interpolate(d, theta, out) of dense output in products of theta and 1 - theta.
+    """Build the kernels extend(d, step) and interpolate(d, theta, out): dense output in products of theta and 1 -
+    theta.
 
     last: row of the slope at the end.  D: weights of the slopes in each coefficient beyond those of Hermite's cubic.
     Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6.
@@ -94,7 +95,7 @@ def make_dense(last: int, D: np.ndarray) -> tuple[Callable, Callable]:
 
     @kernel
     def interpolate(d, theta, out):
-        """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
+        """Store the state at the fraction `theta` of the step in w from `out` (after `extend`)."""
         size, dense, s = d.ny, d.at_dense, 1.0 - theta
         for c in range(size):
             v = d.w[dense + (3 + more) * size + c]

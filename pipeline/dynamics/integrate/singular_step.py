@@ -1,12 +1,12 @@
-r"""Singular poses of the closures are foreseen, and passed in one step along a polynomial that lies ready.
+r"""Singular poses of the closures: prediction, and passage in one step along a prepared polynomial.
 
-In a singular pose the closure rows depend on each other, and another branch of the motion crosses. Next to it a closure
-that is violated by C holds a state at :math:`C/\sigma` from its branch, :math:`\sigma` being how independent the rows
-are. So what an integrator may err grows as the pose comes near: its steps shrink like the distance, never reach it, and
-at last rounding chooses the branch. What is smooth there is the motion itself, on its branch. So no method steps near
-the pose: where the zero of :math:`\sigma` is ahead the stepper stops, `run.singular_poses.collocation` lays the motion
-over the pose from states that are closed on both sides, and the stepper goes along that polynomial in one step,
-whatever the method and its tolerance. Contacts are searched on it as on any dense output.
+In a singular pose the closure rows are linearly dependent, and another branch of the motion crosses. Near it, with
+:math:`\sigma` the independence of the rows, a closure residual C displaces the state by :math:`C/\sigma` from its
+branch. So errors of an integrator grow as the pose approaches: its steps shrink like the distance, never reach the
+pose, and at last rounding chooses the branch. The motion itself is smooth on its branch. So no method steps near the
+pose. When a zero of :math:`\sigma` is ahead, the stepper stops, `run.singular_poses.collocation` fits a polynomial over
+the pose to states with closed loops on both sides, and the stepper follows that polynomial in one step, whatever the
+method and its tolerance. Contacts are searched on it as on any dense output.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from flexclear.pipeline.dynamics.equations.projection import BLIND
 from flexclear.pipeline.dynamics.kernels import kernel
 
 NEVER = 1e300
-#: steps ahead within which the zero of a row's independence is looked for more closely; so it is, however short the
-#: steps, once a row has only this fraction left of the most that it had
+#: number of steps ahead within which the zero of a row's independence is predicted more closely; below the second
+#: number, a row's independence over its largest so far, it is whatever the length of the steps
 STEPS_AHEAD, LOW = 4.0, 0.05
-#: the polynomial begins, and ends, where a row has this fraction left of the most that it had or, where that is more,
-#: of half of its own length: near enough for one polynomial, so far that rounding is blown up little
+#: the polynomial begins, and ends, where a row's independence is this fraction of its largest so far or, if that is
+#: more, of half of its own length: near enough for one polynomial, far enough for little amplification of rounding
 FROM, HALF = 0.3, 0.5
-#: a row that has less than this fraction left cannot be stepped from, predicted or not
+#: no step starts where a row's independence is less than this fraction of its largest so far
 TOO_LITTLE = 2e-4
-#: steps up to there end this fraction of the way before it short; the time of the pose is known better from nearer
+#: steps towards that point end short of it by this fraction of the way: nearer, the time of the pose is known better
 POSE_MARGIN, NEARER = 0.1, 0.7
-#: fraction of a step over which a slope is taken: the state there comes from the slope at the end
+#: fraction of a step for the finite difference of the slope: the state there comes from the slope at the end
 SLOPE_FRACTION = 1e-4
 #: fraction of the mechanism's size to which closures are closed where the polynomial ends
 TIGHTLY = 1e-15
@@ -40,13 +40,13 @@ TIGHTLY = 1e-15
 
 @kernel
 def pivot(d, r):
-    """How far kept row r is from depending on those before it, in the state just evaluated: a length in M^-1."""
+    """Return the independence of selected row r from the rows before it, after an evaluation: a length in M^-1."""
     return 1.0 / abs(d.w[base(d.h, d.at_closure_envelope, d.at_schur, r) + r])
 
 
 @kernel
 def note(d):
-    """Remember how independent the closure rows are in the state just evaluated."""
+    """Store the independence of the closure rows in the state evaluated last."""
     for r in range(d.n_kept_rows):
         d.independence[r].now = pivot(d, r)
     d.sigma = np.sqrt(max(d.last_pivot, 0.0))
@@ -54,7 +54,7 @@ def note(d):
 
 @kernel
 def left(d):
-    """Least fraction that a row has of the most that it had, in what has been noted."""
+    """Return the least ratio of a row's stored independence to its largest so far."""
     least = 1.0
     for r in range(d.n_kept_rows):
         row = d.independence[r]
@@ -65,7 +65,7 @@ def left(d):
 
 @kernel
 def stand(d, t):
-    """Take what has been noted at time t for the start of the next step."""
+    """Make the independence stored at time t that of the next step's start."""
     for r in range(d.n_kept_rows):
         row = d.independence[r]
         row.past, row.most = row.now, max(row.most, row.now)
@@ -74,7 +74,7 @@ def stand(d, t):
 
 @kernel
 def zero_ahead(sigma, fall, before, span):
-    """How far ahead the parabola with this value and falling slope, and with the value before, reaches zero."""
+    """Return the time to the zero of the parabola with this value and falling slope, and with the value before."""
     bend = 2.0 * (before - sigma - fall * span) / (span * span)
     if bend >= 0.0:
         return sigma / fall
@@ -83,17 +83,17 @@ def zero_ahead(sigma, fall, before, span):
 
 @kernel
 def full(d, r):
-    """How independent row r is away from singular poses."""
+    """Return the independence of row r far from singular poses."""
     o = d.at_row_scale + r
     return max(d.independence[r].most, HALF * np.sqrt(max(d.w[o], d.w[o + d.n_closure_rows])))
 
 
 def make_foresee(evaluate: Callable) -> Callable:
-    """The kernel foresee(d, t)."""
+    """Build the kernel foresee(d, t)."""
 
     @kernel
     def soonest(d, span):
-        """Row that is first to depend on those before it, and when, by straight lines; -1 when that is far."""
+        """Return the row that becomes dependent first, and when, by linear extrapolation; -1 when none does soon."""
         horizon, first, which = STEPS_AHEAD * max(span, d.step), NEVER, -1
         for r in range(d.n_kept_rows):
             row = d.independence[r]
@@ -105,9 +105,9 @@ def make_foresee(evaluate: Callable) -> Callable:
 
     @kernel
     def foresee(d, t):
-        """Time of the next singular pose, from the ends of the step that has been accepted at t.
+        """Return the time of the next singular pose, predicted from the step that was accepted at t.
 
-        Roughly from both ends; when that is near, from the slope at t, by one evaluation a little earlier.
+        The ends of the step give a rough time; if that is soon, an evaluation shortly before t gives the slope there.
         """
         span = t - d.past_time
         which, rough = soonest(d, span)
@@ -138,7 +138,7 @@ def make_foresee(evaluate: Callable) -> Callable:
 
 @kernel
 def steer(d, t):
-    """The next step from t; 0 where a polynomial must be laid over a singular pose."""
+    """Return the next step from t; 0 when a polynomial over a singular pose is needed first."""
     step, ahead, reach = d.step, d.pass_time - t, d.reach
     if d.most_reach > 0.0 and (ahead <= reach or d.left < TOO_LITTLE):
         return 0.0
@@ -149,7 +149,7 @@ def steer(d, t):
 
 @kernel
 def follow(d, share, out):
-    """State at a fraction of the polynomial, a Chebyshev series in 2 share - 1, into w from `out`."""
+    """Store the state at a fraction of the polynomial, a Chebyshev series in 2 share - 1, in w from `out`."""
     size, last, x = d.ny, m.COLLOCATION_ROWS - 1, 2.0 * share - 1.0
     for c in range(size):
         a = b = 0.0
@@ -160,7 +160,7 @@ def follow(d, share, out):
 
 @kernel
 def follow_slope(d, share, out):
-    """Its slope there: with T_k' = k U_{k-1}."""
+    """Store the polynomial's slope at a fraction of it, with T_k' = k U_{k-1}."""
     size, last, x = d.ny, m.COLLOCATION_ROWS - 1, 2.0 * share - 1.0
     length = d.collocated
     for c in range(size):
@@ -172,20 +172,20 @@ def follow_slope(d, share, out):
 
 @kernel
 def ready(d):
-    """Whether the present step goes along the polynomial."""
+    """Return True when the present step follows the polynomial."""
     return d.collocated > 0.0
 
 
 @kernel
 def done(d, t):
-    """The polynomial has been gone along, up to time t."""
+    """Discard the polynomial, which the motion has followed up to time t."""
     d.collocated = 0.0
     if t >= d.pass_time:
         d.pass_time = d.most_reach = NEVER
 
 
 def make_along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callable, Callable, Callable]:
-    """The method's kernels attempt, extend and interpolate, for steps along the polynomial as well."""
+    """Return the method's kernels attempt, extend and interpolate, extended to steps along the polynomial."""
     interpolate, last = method.interpolate, method.last
 
     @kernel
@@ -214,12 +214,12 @@ def make_along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callab
 
 
 def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method: Any) -> Callable:
-    """The kernel arrive(d, step, t_new)."""
+    """Build the kernel arrive(d, step, t_new)."""
     last = method.last
 
     @kernel
     def arrive(d, step, t_new):
-        """To the end of the polynomial, or of a fraction of it; closed there unless that is too near to the pose."""
+        """Step to the end of the polynomial, or of a fraction of it; close the loops unless the pose is too near."""
         attempt(d, step)
         evaluate(d, t_new, d.at_y_new, d.at_slopes + d.ny * last)
         d.evaluations += 1

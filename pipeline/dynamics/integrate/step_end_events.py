@@ -1,7 +1,7 @@
-"""Contacts whose begin and end are noticed at step ends only, as in the paper; the impact rate is latched there.
+"""Contacts whose begin and end are detected at step ends only, as in the paper; the impact rate is latched there.
 
-Nothing is located: the step that ends deep in the wall, or past it, stands, and the next one starts with the
-contact's other mode. Kept to show what this costs in accuracy (Wang & Wang 2019, sec. 6.1, steps 5 and 6).
+No event is located: a step that ends deep in the wall, or past it, is accepted, and the next one starts with the
+contact's other mode. This shows the cost in accuracy (Wang & Wang 2019, sec. 6.1, steps 5 and 6).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def mode_differs(d, c):
-    """Whether contact c has come to have the other mode."""
+    """Return True when contact c must change its mode."""
     return (d.watch[c].gap1 < 0.0) != (d.mode[c] == 1)
 
 
 @kernel
 def watch_end(d, events):
-    """Gaps and rates at the step's end, peaks of the closed contacts; whether some mode changes."""
+    """Store gaps, rates and peaks of the contacts at the step's end; return True when a mode changes."""
     changes = False
     for c in range(d.n_contacts):
         watch, now = d.watch[c], d.touch[c]
@@ -40,7 +40,7 @@ def watch_end(d, events):
 def make_resolve_events(
     evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any
 ) -> Callable:
-    """The kernel resolve_events(d, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
+    """Build the kernel resolve_events(d, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
     last = method.last
 
     @kernel

@@ -1,8 +1,8 @@
 """Steps of an integration method from event to event, with projection and a record.
 
-One call advances to the end of a segment between two drive breaks, or until its budget of
-evaluations is used, so that the caller can report progress and be interrupted. How long a step is
-`adaptive` or `fixed` says; what a step is, the method.
+One call advances to the end of a segment between two drive breaks, or until its budget of evaluations is used, so that
+the caller can report progress and be interrupted. `adaptive` or `fixed` choose the length of a step; the method makes
+it.
 """
 
 from __future__ import annotations
@@ -25,13 +25,12 @@ from flexclear.pipeline.dynamics.integrate.recording import (
 from flexclear.pipeline.dynamics.integrate.stiffness import make_detect_stiffness
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: what `resolve` returns for an event after which integration starts afresh; another positive number only
-#: records it
+#: returned by `resolve` for an event after which integration restarts; other positive numbers: the event is only
+#: recorded
 RESTART = 1
-#: for a step of chosen length that cannot be made with its end on the event found in it; other negative numbers end the
-#: run
+#: returned for a step of given length that cannot end on the event inside it; other negative numbers end the run
 AGAIN = -2
-#: fraction of the planned step below which a step has been cut short
+#: a step below this fraction of the planned one has been cut short
 CUT = 0.9
 #: such a step is tried again with this fraction of its length
 RETRY_FRACTION = 0.3
@@ -39,9 +38,10 @@ RETRY_FRACTION = 0.3
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
 FAILED = 1e9
-#: in place of an error norm: the attempt waits for rates that others make (`run.evaluation.batched_evaluation`)
+#: in place of an error norm: the attempt waits for rates from a batched evaluation
+#: (`run.evaluation.batched_evaluation`)
 PENDING = -1.0
-#: stage of an attempt that is made and waits for the rates at its end
+#: stage of a complete attempt that waits for the rates at its end
 ENDING = 1 << 30
 #: a step below this fraction of the time reached cannot be distinguished from rounding
 SMALLEST_STEP = 4e-16
@@ -49,24 +49,24 @@ SMALLEST_STEP = 4e-16
 
 @kernel
 def plan(d, step, following):
-    """The step to try next; one that was cut short says little about how long it may be."""
+    """Return the next step to attempt; a step that was cut short does not limit it."""
     least = d.step if step < CUT * d.step else 0.0
     d.step = max(following, least)
 
 
 @kernel
 def never(d):
-    """No contact is closed."""
+    """Return False: without contacts none is closed."""
     return False
 
 
 @kernel
 def watch_nothing(d):
-    """Do nothing: neither contacts nor guards are there."""
+    """Do nothing: the scene has neither contacts nor guards."""
 
 
 def make_end_nowhere(evaluate_at: Callable, extend: Callable, repeat: Callable) -> Callable:
-    """The kernel end_on_guard of scenes without guards (`guards.make_end_on_guard`)."""
+    """Build the kernel end_on_guard of scenes without guards (see `guards.make_end_on_guard`)."""
 
     @kernel
     def end_on_guard(d, step, before, ready):
@@ -77,7 +77,7 @@ def make_end_nowhere(evaluate_at: Callable, extend: Callable, repeat: Callable) 
 
 @kernel
 def resolve_nothing(d, step, t_new, rows, events):
-    """`resolve` of a stepper that looks for no events."""
+    """Return no event: `resolve` of a stepper without events."""
     return 0, False, t_new, step
 
 
@@ -90,8 +90,8 @@ NO_CONTACTS = (watch_nothing, None, never)
 class Stepping(NamedTuple):
     """The kernels of a method (`method.Method`), with steps over singular poses where there are loops.
 
-    begin, proceed, error, keep: of the method alone.  attempt, extend: of both.  dense: the method with the
-    interpolation of both.
+    begin, proceed, error, keep: of the method.  attempt, extend: extended to the polynomial.  dense: the method with
+    the extended interpolation.
     """
 
     begin: Callable
@@ -106,7 +106,7 @@ class Stepping(NamedTuple):
 def make_stepping(
     evaluate: Callable, retract: Callable, method: Any, poses: Any = None, complete: tuple[Callable, Any] | None = None
 ) -> Stepping:
-    """The kernels that steps, and the events in them, are made with; arguments as of `make_advance`."""
+    """Build the kernels of steps, which event resolution also uses; arguments as of `make_advance`."""
     given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
     begin, step, error, extend, keep = method.make_kernels(*given)
     proceed = step if method.staged else make_at_once(step)
@@ -126,9 +126,9 @@ def make_resolution(
     poses: Any = None,
     complete: tuple[Callable, Any] | None = None,
 ) -> Callable:
-    """The kernel resolution(d, step, t_new, rows, events) -> event?, which notes the rest of what `resolve` returns.
+    """Build the kernel resolution(d, step, t_new, rows, events) -> event?, which stores the other results of `resolve`.
 
-    It is compiled next to the steps, and takes as long. Arguments as of `make_advance`.
+    It is compiled concurrently with the steps, and takes as long. Arguments as of `make_advance`.
     """
     stepping = make_stepping(evaluate, retract, method, poses, complete)
     _, make_resolve_events, _ = events
@@ -154,16 +154,15 @@ def make_advance(
     poses: Any = None,
     complete: tuple[Callable, Any] | None = None,
 ) -> Callable:
-    """The kernel advance(h, f, w, n, outputs, rows, events).
+    """Build the kernel advance(h, f, w, n, outputs, rows, events).
 
-    The kernels that it is made of take `d`, the arrays with named fields (`fields`), instead of h, f, w and n.
+    Its parts take `d`, the arrays with named fields (`fields`), instead of h, f, w and n.
 
-    complete: what evaluates like `evaluate` and leaves all of the evaluation, and the module that factors the mass
-    matrix; given to methods that read more than rates.
-    stepping: the module `adaptive` or `fixed`.  poses: `singular_step`, of mechanisms with loops; trees compile none of
-        it.
-    events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
-    resolve: (d, step, t_new, rows, events) -> (event?, dense output ready?, end, step), of an accepted step
+    complete: an `evaluate` that leaves all intermediate results, and the module that factors the mass matrix; given to
+    methods that read more than rates. stepping: the module `adaptive` or `fixed`.  poses: `singular_step` for
+    mechanisms with loops; trees do not compile it. events: watch_start, make_resolve_events and any_closed of
+    `contact_events` or `step_end_events`. resolve: (d, step, t_new, rows, events) -> (event?, dense output ready?, end,
+    step), for an accepted step
         (`make_resolution`).
     """
     made = make_stepping(evaluate, retract, method, poses, complete)
@@ -180,7 +179,7 @@ def make_advance(
 
     @kernel
     def must_stop(d, outputs, rows, events):
-        """Whether to return now, with the reason in `status`."""
+        """Return True when the stepper must return to its caller; the reason is in `status`."""
         waiting = outputs.shape[0] - d.next_output
         room = m.ROOM + m.EVENTS_OF_A_CONTACT * d.n_contacts
         if d.time >= d.end:
@@ -201,10 +200,10 @@ def make_advance(
 
     @kernel
     def open_loops(d, outputs, t_new):
-        """How far the loops may be open at the end of a step that reaches t_new.
+        """Return the tolerance of the loops' residuals at the end of a step that reaches t_new.
 
-        Drift grows from step to step. Where a step holds several outputs, closing its end as tightly as they are closed
-        when they are observed costs less than closing each of them.
+        Drift grows from step to step. When a step contains several outputs, closing its end as tightly as outputs are
+        closed when they are observed costs less than closing each of them.
         """
         second = d.next_output + 1
         several = second < outputs.shape[0] and outputs[second] <= t_new
@@ -212,7 +211,7 @@ def make_advance(
 
     @kernel
     def finish(d, t_new, tolerance):
-        """Y_NEW, which has been evaluated, with the loops closed to a tolerance; False when they cannot be."""
+        """Close the loops of the evaluated state Y_NEW to a tolerance; return False when that fails."""
         slope = d.at_slopes + d.ny * last
         if d.evaluation != m.OK:
             return False
@@ -232,7 +231,7 @@ def make_advance(
 
     @kernel
     def carry_on(d, step, t_new, outputs):
-        """The step to Y_NEW up to the next evaluation: PENDING, or what `try_step` gives."""
+        """Continue the step to Y_NEW up to the next evaluation; return PENDING, or the result of `try_step`."""
         if d.stage < ENDING:
             come = proceed(d, step)
             if come == AWAITS:
@@ -257,7 +256,7 @@ def make_advance(
 
     @kernel
     def try_step(d, step, t_new, outputs):
-        """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made, or PENDING."""
+        """Return the error norm of the step to Y_NEW, 1 at the tolerance; FAILED when the step fails, or PENDING."""
         if loops and poses.ready(d):
             arrive(d, step, t_new)
             return 0.0
@@ -279,7 +278,7 @@ def make_advance(
 
     @kernel
     def start(d):
-        """Begin at the start of a segment or after an event; False when the equations have no solution there."""
+        """Initialise a segment, or the motion after an event; return False when the equations have no solution."""
         evaluate(d, d.time, d.at_y, d.at_slopes)
         d.evaluations += 1
         along = loops and poses.ready(d)
@@ -300,7 +299,7 @@ def make_advance(
 
     @kernel
     def choose_step(d, t):
-        """Length of the step to try from t; 0, with the reason in `status`, when none can be."""
+        """Return the length of the step to attempt from t; 0, with the reason in `status`, when no step is possible."""
         step = d.step
         if loops:
             step = d.collocated if poses.ready(d) else poses.steer(d, t)
@@ -319,9 +318,9 @@ def make_advance(
 
     @kernel
     def advance(h, f, w, n, outputs, rows, events):
-        """Step to the end of the segment or of the budget; `status` says why it came back.
+        """Step to the end of the segment or of the budget; the reason of the return is in `status`.
 
-        True where an attempt waits for rates (`method.await_rates`): it is to be called again when they are there.
+        Return True when an attempt waits for rates (`method.await_rates`): the caller computes them and calls again.
         """
         d = data(h, f, w, n)
         while d.stage > 0 or not must_stop(d, outputs, rows, events):

@@ -1,4 +1,4 @@
-"""Whether a step of an explicit method is limited by stability, not by accuracy.
+"""Detection of steps of an explicit method that stability limits, not accuracy.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.2.
 """
@@ -16,13 +16,13 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 #: changes of state below this fraction of the tolerance are rounding, from which no rate can be computed
 LEAST_CHANGE = 1e-2
-#: where stability limits them, steps of chosen length swing about its limit: from this fraction of it on they count
+#: adaptive steps oscillate about the stability limit: from this fraction of it on they count as limited
 SWINGING = 0.7
 
 
 @kernel
 def difference(d, first, count, a, b):
-    """Norm of the difference of two states or slopes at places a and b of w, variables `first` on, by tolerance."""
+    """Return the norm of the difference of states or slopes at a and b in w, from variable `first` on, by tolerance."""
     total = 0.0
     for k in range(first, first + count):
         change = (d.w[a + k] - d.w[b + k]) / error_scale(d, k)
@@ -32,11 +32,11 @@ def difference(d, first, count, a, b):
 
 @kernel
 def steepness(d, last):
-    """Largest rate [1/s] that the equations show between the last stage and the end of the step.
+    """Return the largest rate [1/s] of the equations, from the last stage and the end of the step.
 
-    Both are at the same time; the change of slope over the change of state estimates the spectral radius. Taken of the
-    speeds alone it explodes where an oscillation's speeds happen to agree, so that it is at most the geometric mean
-    with that of the positions, which an oscillation makes its frequency.
+    Both are at the same time; the change of slope over the change of state estimates the spectral radius. From the
+    speeds alone it diverges where an oscillation's speeds happen to agree. So the result is at most the geometric mean
+    with the estimate from the positions, which for an oscillation is its frequency.
     """
     end, stage = slope(d, last), slope(d, last - 1)
     speeds = difference(d, d.nq, d.nv, d.at_y_new, d.at_y_stage)
@@ -51,18 +51,18 @@ def steepness(d, last):
 
 @kernel
 def detect_nothing(d, step):
-    """`detect_stiffness` of an implicit method, or of one whose stages do not tell."""
+    """Do nothing: `detect_stiffness` of an implicit method, or of one without suitable stages."""
 
 
 def make_detect_stiffness(method: Any) -> Callable:
-    """The kernel detect_stiffness(d, step), after an accepted step."""
+    """Build the kernel detect_stiffness(d, step), for accepted steps."""
     if method.stability is None:
         return detect_nothing
     last, reach = method.last, method.stability
 
     @kernel
     def detect_stiffness(d, step):
-        """Note the step's steepness, and count the step if that limits it."""
+        """Store the step's largest rate, and count the step if stability limits it."""
         rate = steepness(d, last)
         d.steepest = max(d.steepest, rate)
         share = 1.0 if d.fixed > 0.0 else SWINGING

@@ -1,4 +1,4 @@
-"""Looking into a step by its dense output, and making it again: what events and kinks of friction are located with.
+"""Evaluation inside a step, its repetition, roots and maxima: the tools that locate events and kinks of friction.
 
 Source: Brent (1973), *Algorithms for Minimization without Derivatives*, ch. 5 (maxima); Dowell & Jarratt (1971), *BIT*
 11, 168-174 (the Illinois rule).
@@ -12,15 +12,15 @@ from typing import Any
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: a root's last correction, as a fraction of the step: what is left is its square, nearly; a maximum's, since it is
-#: flat
+#: last correction of a root as a fraction of the step (the remaining error is about its square), and of a maximum,
+#: which is flat
 ROOT_CORRECTION, MAXIMUM_CORRECTION = 1e-8, 1e-6
 GOLDEN = 0.3819660112501051
 MOST_LOOKS = 60
 
 
 def make_evaluate_at(evaluate: Callable, method: Any) -> Callable:
-    """The kernel evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step."""
+    """Build the kernel evaluate_at(d, step, theta), which evaluates the dense output at a fraction of the step."""
     interpolate, spare = method.interpolate, method.room.slopes - 1  # a row of SLOPES that no stage uses
 
     @kernel
@@ -33,12 +33,12 @@ def make_evaluate_at(evaluate: Callable, method: Any) -> Callable:
 
 
 def make_repeat(evaluate: Callable, attempt: Callable, project: Callable, method: Any) -> Callable:
-    """The kernel repeat(d, step): the step again with another length; False when it cannot be made."""
+    """Build the kernel repeat(d, step), which repeats the step with another length; it returns False on failure."""
     last = method.last
 
     @kernel
     def repeat(d, step):
-        """Make the step again with another length, loops closed at its end."""
+        """Repeat the step with another length, and close the loops at its end."""
         d.evaluations += 1
         if not attempt(d, step):
             return False
@@ -52,16 +52,16 @@ def make_repeat(evaluate: Callable, attempt: Callable, project: Callable, method
 
 
 def make_locate(value_at: Callable) -> Callable:
-    """The kernel locate(d, step, which, level, enough, a, b, fa, fb) -> fraction of the step.
+    """Build the kernel locate(d, step, which, level, enough, a, b, fa, fb) -> fraction of the step.
 
     value_at(d, step, theta, which): evaluates the dense output at a fraction of the step, and gives a value there.
     """
 
     @kernel
     def locate(d, step, which, level, enough, a, b, fa, fb):
-        """Fraction of the step in (a, b) where a value reaches a level, off by fa and fb at the ends (Illinois rule).
+        """Return the fraction of the step in (a, b) where a value reaches a level (Illinois rule).
 
-        A value no further from the level than `enough` has reached it.
+        fa, fb: its differences from the level at a and b. A difference of at most `enough` counts as reached.
         """
         side, theta = 0, b
         for _ in range(MOST_LOOKS):
@@ -84,11 +84,11 @@ def make_locate(value_at: Callable) -> Callable:
 
 
 def make_maximum(evaluate_at: Callable) -> Callable:
-    """The kernel maximum(d, step, place, sign) -> largest sign * w[place] within the step, and where."""
+    """Build the kernel maximum(d, step, place, sign) -> largest sign * w[place] within the step, and where."""
 
     @kernel
     def maximum(d, step, place, sign):
-        """Largest sign * w[place] within the step, and where: parabolas through the best three, or golden sections."""
+        """Return the largest sign * w[place] within the step, and where, by parabolas or golden sections."""
         a, b, move, e = 0.0, 1.0, 0.0, 0.0
         x = second = third = GOLDEN
         evaluate_at(d, step, x)

@@ -1,5 +1,5 @@
-"""Joint types. To add one: a module here that is called like the type, and that type in core/scene/parts; the family
-tests pick it up.
+"""Joint types. To add one: a module here named like the type, and that type in core/scene/parts; the family tests
+include it automatically.
 
 Each is a module, or an object of `turn_and_slide`, with the kernels
 - ``motion(w, x, u, S) -> R_FG, p_FG, bias``: pose of the second frame in the first, motion subspace and bias
@@ -11,19 +11,19 @@ and with
 - ``TRANSLATIONS``: axes of the first frame along which a closure forbids displacement;
 - ``ROTATIONS``: pairs (axis of the first frame, axis of the second) that a closure keeps perpendicular;
 - ``COORDINATES``: its freedoms by name, in the order of the speeds, where drives and loads may act on them;
-  turning and sliding them one after the other, from the first frame on, is its motion (see `coordinate`);
-- ``coordinates(R, p)``: joint positions of a relative pose, for the start.
+  its motion applies these turns and slides one after the other, from the first frame on (see `coordinate`);
+- ``coordinates(R, p)``: joint positions of a relative pose, for the start pose.
 """
 
 from flexclear.pipeline.core.scene.parts import IDEAL
 from flexclear.pipeline.core.scene.registry import module_name
 
 KIND = "joint type"
-#: paths alone make a joint that no scene can name
+#: prescribed paths alone create a joint type that no scene can name, the rotation vector
 NAMES = {name: module_name(name) for name in (*IDEAL, "rotation-vector")}
 NAMES |= {n: f"turn_and_slide:{n.upper()}" for n in ("fixed", "revolute", "prismatic", "cylindrical", "planar")}
-#: joints that are always one link; others may become chains of those in CHAIN (see `model.chain`)
+#: joints that are always one link; others may become chains of joints in CHAIN (see `model.chain`)
 WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
 CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
-#: the ideal joint that a clearance joint keeps next to its contact
+#: the ideal joint that a clearance joint keeps in addition to its contact
 HELD = {"clearance-revolute": "planar", "clearance-slot": "planar"}

@@ -1,4 +1,4 @@
-"""Six free motions: how a body that no joint holds moves against the ground."""
+"""Free joint: six free motions of a body that no joint connects to the ground."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexclear.pipeline.dynamics.vectors import ZERO, at, from_quaternion, put, 
 
 @kernel
 def motion(w, x, u, S):
-    """Motion of frame G in frame F: quaternion and position from x, 7 numbers (see `spherical.motion`).
+    """Compute the motion of frame G in frame F: quaternion and position from x, 7 numbers (see `spherical.motion`).
 
     u: angular velocity, then velocity of G's origin, components in F, 6 numbers.
     """
@@ -25,7 +25,7 @@ def motion(w, x, u, S):
 
 @kernel
 def position_rate(w, x, u, rate):
-    """Rates of quaternion and position."""
+    """Store the rates of quaternion and position."""
     quaternion_rate(w, x, u, rate)
     put(w, rate + 4, at(w, u + 3))
 
@@ -37,5 +37,5 @@ COORDINATES: tuple[Coordinate, ...] = ()
 
 
 def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Quaternion and position, shape (7,)."""
+    """Return quaternion and position, shape (7,)."""
     return np.concatenate([matrix_to_quaternion(R), p])

@@ -1,4 +1,4 @@
-r"""Rotation by a vector, as a prescribed path may give it: R_FG = exp(x~), its rate being dx/dt.
+r"""Rotation by a rotation vector x, as a prescribed path may give it: R_FG = exp(x~), with the rate dx/dt.
 
 .. math:: \omega = T(x)\dot x, \quad T = 1 + a\,\tilde x + b\,\tilde x\tilde x, \quad
           a = \frac{1 - \cos\phi}{\phi^2},\; b = \frac{\phi - \sin\phi}{\phi^3}
@@ -15,13 +15,13 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, about, add, at, cross, dot, put, scale
 
-#: angle^2 below which the functions are taken from their series; their next terms are below rounding there
+#: angle^2 below which the functions come from their series; their next terms are below rounding there
 SERIES_ANGLE = 1e-2
 
 
 @kernel
 def _functions(s):
-    """sin/angle, a, b and the derivatives of a and b by s = angle^2."""
+    """Return sin/angle, a, b and the derivatives of a and b by s = angle^2."""
     if s < SERIES_ANGLE:
         c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)))
         a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
@@ -38,7 +38,7 @@ def _functions(s):
 
 @kernel
 def motion(w, x, u, S):
-    """Motion of frame G in frame F: the rotation vector stored from x (see `spherical.motion`)."""
+    """Compute the motion of frame G in frame F: rotation vector from x (see `spherical.motion`)."""
     v, r = at(w, x), at(w, u)
     c, a, b, da, db = _functions(dot(v, v))
     for k in range(3):
@@ -53,7 +53,7 @@ def motion(w, x, u, S):
 
 @kernel
 def position_rate(w, x, u, rate):
-    """The vector's rate is the speed."""
+    """Store the rate of the vector, which is the speed."""
     put(w, rate, at(w, u))
 
 
@@ -64,7 +64,7 @@ COORDINATES: tuple[Coordinate, ...] = ()
 
 
 def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Rotation vector [rad] of an angle up to pi, shape (3,)."""
+    """Return the rotation vector [rad] of an angle up to pi, shape (3,)."""
     q = matrix_to_quaternion(R)
     half = np.linalg.norm(q[1:])
     return q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)

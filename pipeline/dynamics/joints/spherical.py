@@ -12,11 +12,11 @@ from flexclear.pipeline.dynamics.vectors import ZERO, from_quaternion, quaternio
 
 @kernel
 def motion(w, x, u, S):
-    """Pose and motion subspace of frame G in frame F, components in F: R_FG, p_FG, and the bias S' u.
+    """Compute pose and motion subspace of frame G in frame F; return R_FG, p_FG and the bias S' u, all in axes of F.
 
-    All arguments after w are places in it.  x: quaternion of R_FG (4).  u: angular velocity [rad/s] (3).
-    S: filled with a twist (angular velocity; velocity of G's origin) per unit speed, so that the relative twist is
-    S u and its rate S u' + bias; the bias is returned as its angular and its linear part.
+    All arguments after w are indices in w.  x: quaternion of R_FG (4).  u: angular velocity [rad/s] (3). S: receives a
+    twist (angular velocity; velocity of G's origin) per unit speed, so that the relative twist is S u and its rate S u'
+    + bias; the bias has an angular and a linear part.
     """
     for k in range(18):
         w[S + k] = 0.0
@@ -27,7 +27,7 @@ def motion(w, x, u, S):
 
 @kernel
 def position_rate(w, x, u, rate):
-    """Rates of the positions x at the speeds u, all indices in w."""
+    """Store the rates of the positions x at the speeds u; all arguments are indices in w."""
     quaternion_rate(w, x, u, rate)
 
 
@@ -38,5 +38,5 @@ COORDINATES: tuple[Coordinate, ...] = ()
 
 
 def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Quaternion of R_FG, shape (4,); the offset p is the closure's business."""
+    """Return the quaternion of R_FG, shape (4,); closure constraints treat the offset p."""
     return matrix_to_quaternion(R)

@@ -1,4 +1,4 @@
-"""Joints that turn about z of the first frame, slide along its axes, or do both: each by its coordinates alone."""
+"""Joints that rotate about z of the first frame, slide along its axes, or do both; their coordinates define them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.vectors import IDENTITY, ZERO, about_z
 
 @dataclass(frozen=True)
 class Joint:
-    """What the family asks of a joint type (see `joints`), with kernels made for its coordinates."""
+    """Interface of a joint type (see `joints`), with kernels made for its coordinates."""
 
     COORDINATES: tuple[Coordinate, ...]
     POSITIONS: str
@@ -31,19 +31,19 @@ class Joint:
     position_rate: Callable
 
     def coordinates(self, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Angles about z [rad] in (-pi, pi] and displacements [m] of a relative pose, as many as coordinates."""
+        """Return angles about z [rad] in (-pi, pi] and displacements [m] of a relative pose, one per coordinate."""
         return np.array([angle_about_z(R) if one.turning else p[one.axis] for one in self.COORDINATES])
 
 
 def joint(*coordinates: Coordinate) -> Joint:
-    """The joint that leaves these free, one of which at most turns."""
+    """Build the joint that leaves these coordinates free, at most one of which is an angle."""
     count, places = len(coordinates), {-1 if one.turning else one.axis: k for k, one in enumerate(coordinates)}
     turn, x, y, z = (places.get(place, -1) for place in (-1, 0, 1, 2))
     ones = (*(6 * k + (2 if one.turning else 3 + one.axis) for k, one in enumerate(coordinates)), 0)
 
     @kernel
     def motion(w, q, u, S):
-        """Motion of frame G in frame F (see `spherical.motion`); eqs. (30), (31) where it slides along one axis."""
+        """Compute the motion of G in F (see `spherical.motion`); eqs. (30), (31) for a slide along one axis."""
         for k in range(6 * count):
             w[S + k] = 0.0
         for k in range(count):
@@ -58,7 +58,7 @@ def joint(*coordinates: Coordinate) -> Joint:
     return Joint(coordinates, letters, letters, held, perpendicular, motion, rates_are_speeds(count))
 
 
-#: met in the tree only where one of the two bodies is flexible
+#: in the tree only where one of the two bodies is flexible
 FIXED = joint()
 REVOLUTE, PRISMATIC, CYLINDRICAL = joint(ROTATION), joint(TRANSLATION), joint(ROTATION, TRANSLATION)
 PLANAR = joint(Coordinate("x", False, axis=0), Coordinate("y", False, axis=1), ROTATION)

@@ -1,4 +1,4 @@
-"""Cardan joint: turning about x of the first frame, then about y of the frame so turned."""
+"""Cardan joint: rotation about x of the first frame, then about y of the rotated frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.vectors import ZERO, cross, put, scale
 
 @kernel
 def motion(w, x, u, S):
-    """Motion of frame G in frame F: R_FG = R_x(x0) R_y(x1) (see `spherical.motion`)."""
+    """Compute the motion of frame G in frame F: R_FG = R_x(x0) R_y(x1) (see `spherical.motion`)."""
     ca, sa, cb, sb = np.cos(w[x]), np.sin(w[x]), np.cos(w[x + 1]), np.sin(w[x + 1])
     first, second = (1.0, 0.0, 0.0), (0.0, ca, sa)
     put(w, S, first)
@@ -34,5 +34,5 @@ COORDINATES = (
 
 
 def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Angles about x of the first and y of the second frame [rad] in (-pi, pi], shape (2,)."""
+    """Return the angles about x of the first and y of the second frame [rad] in (-pi, pi], shape (2,)."""
     return np.array([np.arctan2(R[2, 1], R[1, 1]), np.arctan2(R[0, 2], R[0, 0])])

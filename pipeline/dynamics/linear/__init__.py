@@ -1,5 +1,5 @@
-"""Static equilibrium of a mechanism, and the small motions about it.
+"""Static equilibrium and steady motion of a mechanism, and small motions about them.
 
 All numbers come from the compiled right-hand side that also integrates the motion: its generalised forces, its mass
-matrix and the Jacobian of its closures. Nothing here is compiled.
+matrix and the Jacobian of its closure constraints. This package compiles nothing itself.
 """

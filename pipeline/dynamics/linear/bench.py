@@ -1,4 +1,4 @@
-"""A mechanism on the bench: its drives held, its free coordinates wherever they are put."""
+"""Test bench for poses: an engine with held drives, evaluated at any free coordinates."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ from flexclear.pipeline.dynamics.run.run import begun, driven
 
 Pose = TypeVar("Pose")
 
-#: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
+#: drives reach the requested pose in steps of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
-#: shortest stride, as a fraction of the whole way, before the pose counts as out of reach
+#: smallest step, as a fraction of the whole way, before the pose counts as out of reach
 SHORTEST_STRIDE = 1e-4
 
 
 @dataclass(frozen=True)
 class Bench:
-    """An engine with its drives held. drives: position and speed of each, in the tree's sense; shape (known, 2).
+    """An engine with held drives. drives: position and speed of each, in the tree's sense; shape (known, 2).
 
-    internal: states of parts, such as angles beyond half a turn [rad]; the one thing that changes, with the pose.
+    internal: internal states, such as angles beyond half a turn [rad]; the only attribute that changes with the pose.
     """
 
     scene: Scene
@@ -51,12 +51,12 @@ class Bench:
 
     @property
     def model(self) -> Model:
-        """What is on the bench."""
+        """Model of the engine."""
         return self.engine.model
 
     @property
     def units(self) -> np.ndarray:
-        """What counts as far for each drive: a radian, or the mechanism's size [m]; shape (known,)."""
+        """Reference size of each drive: a radian, or the mechanism's size [m]; shape (known,)."""
         return np.array([1.0 if p.dimension == "angle" else self.model.length for p in prescribed(self.model.scene)])
 
     @property
@@ -67,11 +67,11 @@ class Bench:
 
 @dataclass(frozen=True)
 class Balance:
-    """What acts on the coordinates in a state: M dv/dt + bias = J^T multipliers.
+    """Forces on the coordinates in a state: M dv/dt + bias = J^T multipliers.
 
-    bias: generalised forces with their sign turned, shape (nv,).  mass: (nv, nv).
+    bias: negative generalised forces, shape (nv,).  mass: (nv, nv).
     jacobian: rows solved for, (rows, nv).
-    slip: rates at which the loops open along them, shape (rows,).
+    slip: rates at which the loops open along these rows, shape (rows,).
     """
 
     bias: np.ndarray
@@ -88,10 +88,10 @@ def hold(
     drives: Mapping[str, float] | None,
     moving: bool,
 ) -> tuple[Bench, np.ndarray]:
-    """The bench of a scene with its drives as they are at a time, or at given values, and its positions there.
+    """Return the bench of a scene with its drives at a time, or at given positions, and its closed positions there.
 
     time: [s], the scene's start when None.  drives: positions [m or rad] by name, instead of the law's.
-    moving: whether the drives keep the speed they have at that time.
+    moving: True when the drives keep their speed at that time.
     Raises InputError for unknown drives, SolverError when the loops cannot be closed there.
     """
     moved, given = driven(begun(scene, bundles, progress)[0], bundles, progress)
@@ -112,13 +112,13 @@ def hold(
     first[:, 1] = 0.0
     bench = Bench(scene, engine, at, first, np.zeros(arrays.size(m.N_INTERNAL)))
     set_drives(bench, first)
-    q = carry(bench, closed(bench, start[: model.nq]), last[:, 0])
+    q = move_drives(bench, close(bench, start[: model.nq]), last[:, 0])
     set_drives(bench, last)
     return replace(bench, drives=last), q
 
 
 def drive_number(model: Model, name: str) -> int:
-    """Number of a drive; InputError where there is none of this name."""
+    """Return the index of a drive; raise InputError for an unknown name."""
     if name not in model.drives:
         remedy = suggestion(name, list(model.drives)) if model.drives else "the scene has no drives"
         raise InputError(f"drive '{name}'", "there is no such drive", remedy)
@@ -126,15 +126,15 @@ def drive_number(model: Model, name: str) -> int:
 
 
 def drive_state(engine: Engine, time: float) -> np.ndarray:
-    """Position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
+    """Return position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
     engine.select_pieces_after(time)
-    # the laws say so on their way to any evaluation; the pose does not matter
+    # every evaluation stores the laws' values; the pose does not matter
     closure_rows.evaluate(engine, initial.start_state(engine.model), time)
     return np.stack([engine.view(m.X)[engine.model.nq :], engine.view(m.U)[engine.model.nv :]], axis=1)
 
 
 def set_drives(bench: Bench, drives: np.ndarray) -> None:
-    """Replace every drive's law by the straight one through a position, with a speed, at the bench's time."""
+    """Replace every drive's law by a linear one with this position and speed at the bench's time."""
     arrays = bench.model.arrays
     for (first, count), (position, speed) in zip(arrays.table(m.LAWS), drives, strict=False):
         straight = np.zeros(1, dtype=m.row_type(m.PIECES))
@@ -144,8 +144,8 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
     bench.engine.select_pieces_after(bench.time)
 
 
-def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Positions after the drives have gone to `target` in strides, the loops closed after each."""
+def move_drives(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return the positions after the drives have moved to `target` in steps, with loops closed after each."""
     if not bench.model.closures:
         return q
     origin = bench.drives[:, 0]
@@ -153,15 +153,15 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     def at(fraction: float, start: np.ndarray) -> np.ndarray:
         set_drives(bench, np.stack([origin + fraction * (target - origin), 0.0 * target], axis=1))
-        return closed(bench, start)
+        return close(bench, start)
 
     return in_strides(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, SHORTEST_STRIDE)
 
 
 def in_strides(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:
-    """The pose at the end of a way, from that at its start, by `at` of fractions of the way and the pose before.
+    """Return the pose at the end of a way by steps of at(fraction of the way, pose before) from the pose at its start.
 
-    A stride is halved where `at` raises SolverError; that is raised where one of the shortest is still too long.
+    A step is halved where `at` raises SolverError, which is re-raised below the shortest step.
     """
     fraction = 0.0
     while fraction < 1.0:
@@ -179,7 +179,7 @@ def in_strides(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, sh
 
 
 def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarray:
-    """State vector with positions q and speeds v (at rest when None)."""
+    """Return the state vector with positions q and speeds v (at rest when None)."""
     y = np.zeros(bench.model.ny)
     y[: bench.model.nq] = q
     if v is not None:
@@ -189,17 +189,17 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
 
 
 def rows(bench: Bench, states: np.ndarray) -> np.ndarray:
-    """Rows of the record for states; contacts act as they are."""
+    """Return rows of the record for states, with all contacts in mode 1: a contact acts where it penetrates."""
     return observation.rows_of(bench.engine, states, bench.time, 1.0, NO_IMPACT)
 
 
 def observe(bench: Bench, states: np.ndarray) -> Observed:
-    """What the engine records of states, loops closed first."""
+    """Return the engine's observation of states, after closing the loops."""
     return observation.observe(bench.engine, rows(bench, states), after=True)
 
 
-def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
-    """Positions with the loops closed, loads following their angles; SolverError when that fails."""
+def close(bench: Bench, q: np.ndarray) -> np.ndarray:
+    """Return the positions with closed loops and update internal angles; raise SolverError when closing fails."""
     seen = observe(bench, state(bench, q)[None, :])
     if seen.status[0] != m.OK:
         raise SolverError(f"at t = {bench.time:.6g} s: the loops cannot be closed in the pose of the drives")
@@ -212,43 +212,44 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
 
 
 def displacement_map(bench: Bench, q: np.ndarray) -> np.ndarray:
-    """Change of the positions per small displacement of each coordinate, shape (nq, nv)."""
+    """Return the change of the positions per small displacement of each coordinate, shape (nq, nv)."""
     nq, nv = bench.model.nq, bench.model.nv
     changes = [closure_rows.evaluate(bench.engine, state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]
     return np.array(changes).T.reshape(nq, nv)
 
 
 def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance:
-    """Forces, mass and closures in a state; SolverError where the equations are singular."""
+    """Return forces, mass and closure rows in a state; raise SolverError where forces are not finite."""
     engine = bench.engine
     closure_rows.evaluate(engine, state(bench, q, v), bench.time)
     forces = bias(engine)
     if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")
-    slip = engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)]
+    slip = engine.view(m.RESIDUAL_RATE)[selection.selected_indices(engine.model, engine.h)]
     return Balance(modes_of(engine.model.arrays) @ forces, *inertia(engine), slip)
 
 
 def inertia(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
-    """Mass and Jacobian of the rows solved for in the state evaluated last, shapes (nv, nv) and (rows, nv)."""
+    """Return mass and closure Jacobian in the state evaluated last, shapes (nv, nv) and (rows, nv)."""
     modes = modes_of(engine.model.arrays)
     L = modes @ mass_factor(engine)
     return L @ L.T, engine.rows(m.JACOBIAN) @ modes.T
 
 
 def balancing(bench: Bench) -> float:
-    """Size of the forces that balance each other in the state evaluated last, as moments [N m].
+    """Return the size of the forces that balance each other in the state evaluated last, as moments [N m].
 
-    What is left of them along the free coordinates says nothing: in balance that is rounding.
+    Their sum along the free coordinates is no measure: in balance it is rounding.
     """
     return float(np.max(np.abs(acting(bench)), initial=0.0))
 
 
 def acting(bench: Bench) -> np.ndarray:
-    """Forces of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and
+    """Return wrenches of inertia, gravity, loads and contacts on each link with its subtree, and those of each load and
     contact alone, in the state evaluated last, as moments [N m]."""
     moments, forces = carried_wrenches(bench.engine)
     loads, touch = (bench.engine.table(table) for table in (m.LOAD, m.TOUCH))
     length = bench.model.length
-    pushes = [length * forces, length * loads["force"], touch["force"] * (length / arms(bench.model))[:, None]]
+    reach = length / arms(bench.model.mechanism)  # ends of angles have torques
+    pushes = [length * forces, length * loads["force"], reach[:, None] * touch["force"]]
     return np.concatenate([v.ravel() for v in [*pushes, moments, loads["moment"]]])

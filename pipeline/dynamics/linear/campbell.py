@@ -1,7 +1,7 @@
-r"""Vibrations over the speed of a drive: a Campbell diagram, its branches followed by the shapes of the vibrations.
+r"""Vibrations over the speed of a drive: a Campbell diagram whose branches follow the mode shapes.
 
-A vibration of frequency nu in axes that turn at Omega is seen from fixed axes at Omega + nu where it goes round with
-them, at Omega - nu where it goes round against them: a backward whirl where that is negative. With the displacements
+A vibration of frequency nu in axes that turn at Omega has the frequency Omega + nu in fixed axes where it whirls with
+them, Omega - nu where it whirls against them: a backward whirl where that is negative. With the displacements
 (x, y) across the axis of turning, in complex numbers, the first has the part x + i y alone, the second x - i y.
 
 Source: Genta (2005), Dynamics of Rotating Systems, sec. 2.4 and 4.5.
@@ -27,7 +27,7 @@ from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium, steady_n
 from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
 
-#: fraction of a vibration's displacements, or of its energy, that decides what it is
+#: fraction of a vibration's displacements, or of its energy, that classifies the vibration
 DECISIVE = 0.8
 WHIRLS = ("backward", "", "forward")
 
@@ -36,8 +36,8 @@ WHIRLS = ("backward", "", "forward")
 class Point:
     """Vibrations at one speed.
 
-    omega: of the turning axes of each vibration [rad/s].  sense: +1, -1 where it goes round with or against them; 0
-    where it does not whirl, NaN where its displacements do not say.  heavy: mass times shapes, shape (nv, n).
+    omega: speed of the turning axes of each vibration [rad/s].  sense: +1, -1 for whirls with or against them; 0
+    for no whirl, NaN where the displacements do not decide.  heavy: mass times shapes, shape (nv, n).
     parts: body with most of the energy of each.  frames: origins of all frames [m], shape (frame, 3).
     """
 
@@ -49,7 +49,7 @@ class Point:
     frames: np.ndarray
 
     def whirls(self, k: int) -> np.ndarray:
-        """Angular frequencies that vibration k may have in fixed axes, backward negative [rad/s]; none without."""
+        """Return possible frequencies of vibration k in fixed axes, backward negative [rad/s]; none without whirl."""
         nu, omega, sense = abs(self.small.value[k].imag), self.omega[k], self.sense[k]
         return np.array(
             [] if sense == 0.0 else [omega + s * nu for s in ((1.0, -1.0) if np.isnan(sense) else (sense,))]
@@ -58,21 +58,21 @@ class Point:
 
 @dataclass
 class Branch:
-    """Vibrations of one kind. places: number of the speed, what is there, which vibration; whirls: their frequencies in
-    fixed axes, NaN where none."""
+    """Vibrations of one kind. places: index of the speed, point, and index of the vibration; whirls: their frequencies
+    in fixed axes, NaN where none."""
 
     places: list[tuple[int, Point, int]]
     whirls: list[float]
 
     @property
     def expected(self) -> float:
-        """Whirl frequency at the next speed, on a straight line."""
+        """Whirl frequency at the next speed, by linear extrapolation."""
         last = self.whirls[-2:]
         return float(last[-1] if len(last) < 2 or np.isnan(last[0]) else 2.0 * last[1] - last[0])
 
     @property
     def lowest(self) -> float:
-        """Whirl frequency at the lowest speed, or that of the vibration there."""
+        """Whirl frequency at the lowest speed, or the frequency of the vibration there."""
         _, point, k = self.places[-1]
         return self.whirls[-1] if np.isfinite(self.whirls[-1]) else abs(point.small.value[k].imag)
 
@@ -86,10 +86,10 @@ def campbell(
     time: float | None = None,
     drives: Mapping[str, float] | None = None,
 ) -> xr.Dataset:
-    """Vibrations about steady motion over the speed of a drive [rad/s or m/s] (schema CAMPBELL).
+    """Return vibrations about steady motion over the speed of a drive [rad/s or m/s] (schema CAMPBELL).
 
-    drive: its name; the only one that moves when None.  time, drives: as of `pipeline.dynamics.analyses.equilibrium`.
-    A speed without steady motion, as a critical one, has no numbers.  Raises InputError, or SolverError where none has.
+    drive: its name; the only moving one when None.  time, drives: see `pipeline.dynamics.analyses.equilibrium`.
+    Speeds without steady motion, such as critical ones, have NaN.  Raises InputError; SolverError when all have.
     """
     bench, start = hold(scene, bundles, progress, time, drives, True)
     which = _drive(bench, drive)
@@ -130,7 +130,7 @@ def _drive(bench: Bench, name: str | None) -> int:
 
 
 def _axis(bench: Bench, q: np.ndarray, which: int) -> np.ndarray:
-    """Unit vector about which the drive turns the mechanism, shape (3,); zero where it turns nothing."""
+    """Return the unit vector about which the drive turns the mechanism, shape (3,); zero for a translation."""
     drives = np.stack([bench.drives[:, 0], np.zeros(len(bench.drives))], axis=1)
     drives[which, 1] = bench.model.drive_signs[which]
     set_drives(bench, drives)
@@ -142,12 +142,12 @@ def _axis(bench: Bench, q: np.ndarray, which: int) -> np.ndarray:
 
 
 def _point(bench: Bench, rest: Equilibrium, small: Vibrations, axis: np.ndarray) -> Point:
-    """What the vibrations at one speed are."""
+    """Classify the vibrations at one speed."""
     seen = observe(bench, state(bench, rest.at.q)[None, :])
     turning = seen.links["omega"][0] @ axis
     model, heavy = bench.model, rest.at.mass @ small.shape
     energy = np.abs(np.real(small.shape.conj() * heavy))
-    # the coordinates of a link turn with the one that carries it, those of its deformation with the link itself
+    # coordinates of a link turn with its inboard link, coordinates of its deformation with the link itself
     own = np.zeros(len(heavy))
     for i, link in enumerate(model.links[1:], start=1):
         assert link.inboard is not None
@@ -167,7 +167,7 @@ def _point(bench: Bench, rest: Equilibrium, small: Vibrations, axis: np.ndarray)
 
 
 def _sense(moved: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Sense of whirling of each vibration; moved: displacements and rotations, complex, shape (n, frame, 3)."""
+    """Return the sense of whirl of each vibration; moved: complex displacements and rotations, shape (n, frame, 3)."""
     if not np.any(axis):
         return np.zeros(len(moved))
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
@@ -182,7 +182,7 @@ def _sense(moved: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def _followed(points: Sequence[Point | None]) -> list[Branch]:
-    """The branches of all vibrations, from the last speed down: there whirls have separated most."""
+    """Return the branches of all vibrations, from the last speed down: there whirls are separated most."""
     branches: list[Branch] = []
     for s, point in reversed(list(enumerate(points))):
         if point is None:
@@ -203,7 +203,7 @@ def _followed(points: Sequence[Point | None]) -> list[Branch]:
 
 
 def _misfit(branch: Branch, point: Point, k: int) -> tuple[float, float]:
-    """How little vibration k continues a branch, by shape and frequency, and its whirl frequency there."""
+    """Return how badly vibration k continues a branch, by shape and frequency, and its whirl frequency."""
     _, before, other = branch.places[-1]
     w, heavy = before.small.shape[:, other], point.heavy[:, k]
     unlike = 1.0 - min(1.0, max(abs(np.vdot(w, heavy)), abs(np.dot(w, heavy))))
@@ -251,7 +251,7 @@ def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Poin
 
 
 def _crossing(speeds: np.ndarray, over: np.ndarray) -> float:
-    """The lowest speed at which a whirl is as fast as what turns, on a straight line between speeds; NaN if none."""
+    """Return the lowest speed at which a whirl is synchronous with the turning axes, interpolated; NaN if none."""
     known = np.isfinite(over) & (speeds != 0.0)
     x, y = speeds[known], over[known]
     for k in np.flatnonzero(np.sign(y[:-1]) * np.sign(y[1:]) < 0.0):

@@ -1,16 +1,16 @@
-r"""What play in joints does to the pose of a mechanism, to first order about its ideal motion.
+r"""First-order effect of joint clearance on the pose of a mechanism, about its ideal motion.
 
-Joints and drives hold the links: a small opening e of what they demand moves them by x with
+Joints and drives hold the links: a small opening e of their constraints moves the links by x with
 
 .. math:: G\,x = -e, \qquad x = -G^{+} e
 
-where G holds the rates of all joints' residuals. Of what is asked for, s x, only the adjoint solution
+where G holds the rates of all joints' residuals. For a watched quantity, s x, only the adjoint solution
 :math:`\lambda^T = s G^{+}` is needed, which is one solve for all openings of all joints: the reactions of the joints to
-a unit load there. Clearance lets two points separate by up to its radius (and the depth to
+a unit load on it. Clearance lets two points separate by up to its radius (and the depth to
 which the joint's force presses them), in any direction: its bound is the largest singular value of the map from there
-to the body that is asked for. That holds where joints and drives leave the body asked for no freedom; elsewhere masses
-decide, and there is no bound (infinite). A body that bends opens the joints by what its ends move (`openings`); what
-follows is in `response`.
+to the watched body. That holds where joints and drives leave that body no freedom; elsewhere masses
+decide, and no bound exists (infinite). A bending body opens the joints by the motion of its ends (`openings`); the
+consequences are in `response`.
 
 Source: the closure equations of `pipeline.dynamics.model.closing`, differentiated.
 """
@@ -39,7 +39,7 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import (
-    Acting,
+    FrameWrench,
     Wrench,
     joint_wrenches,
     on_frames,
@@ -48,21 +48,21 @@ from flexclear.pipeline.dynamics.record.wrenches import (
 )
 from flexclear.pipeline.dynamics.run.run import Run
 
-#: the motion is examined so often
+#: number of poses of the motion at which bounds are computed
 BOUND_TIMES = 32
-#: squared singular values of the joints' rates far below this fraction of the largest are zero, and what is shown may
-#: be free by this: where a pose comes within some 3e-4 of a singular one there is no bound
+#: squared singular values of the joints' rates far below this fraction of the largest are zero, and a watched quantity
+#: with up to this freedom counts as held: within some 3e-4 of a singular pose no bound exists
 SQUARED_RANK, FREE = 1e-13, 1e-6
-#: the force that presses a joint with clearance together is at least so many times the ideal one when it has been open
+#: assumed force on a joint with clearance after separation, as a multiple of the ideal force
 KNOCK = 10.0
-#: quantities that the pose decides
+#: quantities that follow from the pose
 OF_POSE = ("position", "orientation")
 
 
 def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Mapping[str, float]]:
-    """Largest influences of a scene's clearances over its motion, in SI, by joint, of each quantity.
+    """Return the largest effects of a scene's clearances over its motion, in SI, by joint, of each quantity.
 
-    run: of its ideal mechanism.  Of `chosen` those that the pose decides are bounded.
+    run: of its ideal mechanism.  Only those of `chosen` that follow from the pose are bounded.
     """
     model, seen = run.model, run.observed
     loose = [name for name in full.contacts() if name in model.scene.joint]
@@ -72,30 +72,30 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Ma
     rows = np.unique(np.linspace(0, len(seen.state) - 1, BOUND_TIMES).astype(int))
     clearance = {name: {q.name: 0.0 for q in asked} for name in loose}
     joints = constraints(model.mechanism)
-    whole = is_whole(model)
+    whole = knows_all_joints(model)
     for row in rows if asked else ():
         poses = [Placement(frame["origin"], frame["axes"]) for frame in seen.links[row]]
-        lever = lever_of(model, joints, poses)
+        lever = opening_map(model, joints, poses)
         for q in asked:
-            adjoint, free = lever.adjoint(shown(model, poses, q.owner, turning=q.kind == "orientation"))
+            adjoint, free = lever.adjoint(body_motion(model, poses, q.owner, turning=q.kind == "orientation"))
             if not whole or free > FREE:
                 for bound in clearance.values():
                     bound[q.name] = np.inf
                 continue
             for name in loose:
-                reach = lever.clearance(name, adjoint) * _play(full.contacts()[name], load[name])
+                reach = lever.clearance(name, adjoint) * _separation(full.contacts()[name], load[name])
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
     return clearance
 
 
-def is_whole(model: Model) -> bool:
-    """Whether all joints between links are known here: gears, for instance, are not."""
+def knows_all_joints(model: Model) -> bool:
+    """Return True when this module knows all constraints between links; it does not know gears, for instance."""
     tree = sum(link.branch.edge is not None and not link.massless for link in model.mechanism.links)
     return not model.scene.gear and len(constraints(model.mechanism)) == tree + len(model.mechanism.closures)
 
 
-def _play(joint: Clearance, force: float) -> float:
-    """How far the points may separate [m]: the clearance, and how deep a force presses the surfaces."""
+def _separation(joint: Clearance, force: float) -> float:
+    """Return how far the points may separate [m]: the clearance, and the penetration under a force."""
     law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
     exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
     stiffness = lookup(SURFACES, joint.type, where="[joint]").stiffness(joint, exponent)
@@ -103,12 +103,12 @@ def _play(joint: Clearance, force: float) -> float:
 
 
 @dataclass(frozen=True)
-class Lever:
-    """How openings of the joints move the links, in one pose.
+class OpeningMap:
+    """Map from openings of the joints to motions of the links, in one pose.
 
-    gradient: rates of all joints' residuals, (rows, 6 (links - 1)).  normal: of the least-squares solution, factored.
-    joints: of each joint, where its demands begin, and the wrenches of these and of its driven coordinates, in units of
-    the residuals.  length: by which openings are reported as fractions.
+    gradient: rates of all joints' residuals, (rows, 6 (links - 1)).  normal: factored normal equations.
+    joints: of each joint, its range of rows, and the wrenches of its constraints and driven coordinates, in units of
+    the residuals.  length: unit of the openings [m].
     """
 
     gradient: sparse.csc_array
@@ -116,25 +116,25 @@ class Lever:
     joints: Mapping[str, tuple[Constraint, slice, np.ndarray]]
     length: float
 
-    def adjoint(self, shown: np.ndarray) -> tuple[np.ndarray, float]:
-        """The adjoint solution of what is shown, (3, 6 (links - 1)): what unit loads on it do in the joints.
+    def adjoint(self, watched: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return the adjoint solution of `watched`, (3, 6 (links - 1)): the joints' reactions to unit loads on it.
 
-        As motion of what is shown per opening, (3, rows); and by how much joints and drives leave it free.
+        It is the motion of `watched` per opening, (3, rows); also return the freedom that joints and drives leave it.
         """
-        dual = self.normal.solve(np.ascontiguousarray(shown.T))
+        dual = self.normal.solve(np.ascontiguousarray(watched.T))
         rows = self.gradient @ dual
-        return -rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0))
+        return -rows.T, float(np.abs(watched - (self.gradient.T @ rows).T).max(initial=0.0))
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
-        """Largest motion of what an adjoint solution describes, per metre of separation of a joint's points."""
+        """Return the largest motion that an adjoint solution gives per metre of separation of a joint's points."""
         constraint, mine, _ = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
         first = rows[:, mine][:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
 
 
-def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
-    """The joints' rates in a pose of all links, and what solves with them."""
+def opening_map(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> OpeningMap:
+    """Return the joints' rates in a pose of all links, with their factored normal equations."""
     G = sparse.csc_array(misfit(model.mechanism, list(joints), poses).gradient())
     normal = (G.T @ G).tocsc()
     least = SQUARED_RANK * float(normal.diagonal().max(initial=1.0))
@@ -145,18 +145,18 @@ def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placeme
         unit = np.where(np.any(wrenches[:, 3:] != 0.0, axis=1), 1.0 / length, 1.0)
         where[joint.name] = joint, slice(row, row + len(wrenches)), unit[:, None] * wrenches
         row += len(wrenches)
-    return Lever(G, factored, where, length)
+    return OpeningMap(G, factored, where, length)
 
 
 def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
-    """Wrenches of all rows that a joint has in `misfit`: its demands, then its driven coordinates."""
+    """Return the wrenches of a joint's rows in `misfit`: constraints, then driven coordinates."""
     A, B = joint.frames(poses)
     demanded = demands(joint.edge.kind, A, B)[1]
     return np.vstack([demanded, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
 
 
-def shown(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
-    """Motion of a body, (3, 6 (links - 1)): of its centre of mass [m], or its turn [rad]."""
+def body_motion(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
+    """Return the motion of a body, (3, 6 (links - 1)): of its centre of mass [m], or its rotation [rad]."""
     i = model.mechanism.link_of[body]
     matrix = np.zeros((3, 6 * (len(poses) - 1)))
     if i == 0:
@@ -174,16 +174,16 @@ def shown(model: Model, poses: Sequence[Placement], body: str, *, turning: bool)
 
 
 def centre(model: Model, poses: Sequence[Placement], body: str) -> np.ndarray:
-    """Where a body's centre of mass is."""
+    """Return the position of a body's centre of mass."""
     i, part = model.mechanism.link_of[body], model.scene.body[body]
     com = np.array(part.com) if isinstance(part, RigidBody) else np.zeros(3)
     return np.asarray(poses[i].of(model.mechanism.links[i].places[body].of(Placement(com))).p)
 
 
 def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[str, Wrench]) -> np.ndarray:
-    r"""Forces of all that acts on a body along its elastic coordinates in a rigid motion, shape (rows, mode) [N].
+    r"""Return all forces on a body along its elastic coordinates in a rigid motion, shape (rows, mode) [N].
 
-    joints: wrenches of its joints, as `joint_wrenches` gives them.  Inertia and gravity act in its volume,
+    joints: wrenches of its joints, from `joint_wrenches`.  Inertia and gravity act in its volume,
     :math:`-\int \rho\,S^T (a - g + A x)`, :math:`A = \tilde\alpha + \tilde\omega\tilde\omega`, at the points x of its
     own frame; on a motion of the body as a whole the sum is zero.
     """
@@ -205,9 +205,9 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
     return np.asarray(forces)
 
 
-def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[Acting]:
-    """What acts on a body at its frames: joints, paths, loads; moments about the kernels' origin."""
-    model, acting = motions.model, list[Acting]()
+def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
+    """Return the wrenches of joints, paths and loads on a body's frames; moments about the kernels' origin."""
+    model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
         moment, force = joints[joint]
         second = motions.positions([model.scene.joint[joint].between[1]])[:, 0]
@@ -217,11 +217,11 @@ def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[A
 
 
 def openings(
-    model: Model, poses: Sequence[Placement], lever: Lever, name: str, bundle: Labelled
+    model: Model, poses: Sequence[Placement], lever: OpeningMap, name: str, bundle: Labelled
 ) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
-    """How the elastic coordinates of a body open the joints, shape (rows, mode), and move the bodies fixed to it.
+    """Return the openings of joints per elastic coordinate of a body, (rows, mode), and motions of bodies fixed to it.
 
-    These by the turn of their axes and the shift of their centres of mass, world axes, shape (3, mode).
+    These are rotation and displacement of the centre of mass, world axes, shape (3, mode).
     """
     i = model.mechanism.link_of[name]
     placement = poses[i].of(model.mechanism.links[i].places[name])
@@ -238,14 +238,14 @@ def openings(
         twist = np.vstack([theta, u - np.cross(theta, at, axisa=0, axisb=0).T])
         for constraint, rows, wrenches in lever.joints.values():
             for end, sign in ((constraint.edge.frame_a, -1.0), (constraint.edge.frame_b, 1.0)):
-                # a frame moves with what is carried: a body, or one frame of the flexible body itself
+                # a frame moves with the carried part: a body, or one frame of the flexible body itself
                 if body in (end, end.partition(".")[0]):
                     matrix[rows] += sign * (wrenches @ twist)
     return matrix, carried
 
 
 def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:
-    """The joints of a body: frame of the body, and the sign of the wrench that acts on it."""
+    """Return the joints of a body: frame of the body, and sign of the wrench on the body."""
     ports = {}
     for joint, part in scene.joint.items():
         for end, sign in zip(part.between, (-1.0, 1.0), strict=True):
@@ -256,7 +256,7 @@ def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:
 
 
 def _carried(scene: Scene, name: str) -> dict[str, str]:
-    """Bodies fixed to a body, by its frame that carries them; the body itself by each frame with another joint."""
+    """Return the frame that carries each body fixed to a body, and the body itself by each frame with another joint."""
     fixed = [part.between for part in scene.joint.values() if part.type == "fixed"]
     pairs = [(a.partition(".")[0], b.partition(".")[0]) for a, b in fixed]
     beyond, carriers = [pair for pair in pairs if name not in pair], dict[str, str]()

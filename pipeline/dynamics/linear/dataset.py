@@ -1,4 +1,4 @@
-"""The dataset of an equilibrium, and of the vibrations about it (schemas EQUILIBRIUM and LINEAR)."""
+"""Datasets of an equilibrium and of the vibrations about it (schemas EQUILIBRIUM and LINEAR)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PARTS = ("real", "imaginary")
 
 
 def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
-    """The pose and what holds it (schema EQUILIBRIUM)."""
+    """Return the pose with its forces and reactions (schema EQUILIBRIUM)."""
     seen = observe(bench, state(bench, rest.at.q)[None, :])
     contacts, none = len(bench.model.contacts), m.named(m.EVENT, np.zeros((0, m.EVENT.size)))[:, 0]
     once = Trajectory(rows(bench, seen.state), none, contacts, {}, ((bench.time, bench.engine.selected.copy()),))
@@ -48,7 +48,7 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
 
 
 def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> xr.Dataset:
-    """The equilibrium with its natural vibrations (schema LINEAR)."""
+    """Return the equilibrium with its natural vibrations (schema LINEAR)."""
     still = equilibrium(bench, rest, moving)
     value, w = small.value, small.shape
     translation, rotation, energy = motions(bench, rest, w)
@@ -83,7 +83,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
 
 
 def motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Motion of every named frame in each vibration, and the fraction of every body in its kinetic energy.
+    """Return motions of every named frame in each vibration, and each body's fraction of the kinetic energy.
 
     Translations and rotations: world axes, complex, shape (n, frame, 3).
     """
@@ -104,7 +104,7 @@ def motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray,
 
 
 def _phase(translation: np.ndarray, rotation: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Factor per vibration that makes its largest component real and positive: of the frames, else of the speeds."""
+    """Return a factor per vibration that makes its largest component real and positive, of frames, else of speeds."""
     phases = []
     for k in range(w.shape[1]):
         shown = translation[k].ravel() if np.abs(translation[k]).max(initial=0.0) > 0.0 else rotation[k].ravel()
@@ -115,15 +115,15 @@ def _phase(translation: np.ndarray, rotation: np.ndarray, w: np.ndarray) -> np.n
 
 
 def _split(values: np.ndarray) -> np.ndarray:
-    """Complex values (vibration, ...) as real and imaginary part along a second dimension."""
+    """Return complex values (vibration, ...) as real and imaginary part along a second dimension."""
     return np.stack([values.real, values.imag], axis=1)
 
 
 def _energies(motions: Motions) -> dict[str, np.ndarray]:
-    """Twice the kinetic energy of every moving body in states, by name, shape (rows - 1,) each.
+    """Return twice the kinetic energy of every moving body in states, by name, shape (rows - 1,) each.
 
-    motions: of the pose with its drives' motion alone, which is taken off, then with the speeds of vibrations.
-    The shortening of bent beams, which is of second order here, is left out.
+    motions: first row: the drives' motion alone, which is subtracted; then those with the speeds of vibrations.
+    Shortening of bent beams is of second order here and neglected.
     """
     energies = {name: _rigid(body, motions.body(name)) for name, body in motions.model.scene.rigid().items()}
     for i in motions.model.numbering.flexible:
@@ -134,7 +134,7 @@ def _energies(motions: Motions) -> dict[str, np.ndarray]:
 
 
 def _relative(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity and angular velocity in body axes, the first row's taken off."""
+    """Return velocity and angular velocity in body axes, relative to those of the first row."""
     parts = (motion.v[1:] - motion.v[0], motion.omega[1:] - motion.omega[0])
     return parts[0] @ motion.R[0], parts[1] @ motion.R[0]
 
@@ -145,7 +145,7 @@ def _rigid(body: RigidBody, motion: Motion) -> np.ndarray:
 
 
 def _flexible(bundle: Labelled, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Twice the kinetic energy of a modally reduced body whose frame moves; see `bodies.flexible`."""
+    """Return twice the kinetic energy of a modally reduced body whose frame moves; see `bodies.flexible`."""
     v, omega = _relative(frame)
     E, F, C = (bundle[n].values for n in ("position_mode_moment", "mode_mode_moment", "modal_first_moment"))
     P = E + np.einsum("klij,i->klj", F, q)

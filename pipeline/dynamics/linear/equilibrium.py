@@ -2,12 +2,12 @@ r"""Poses in balance: static equilibrium, where the forces along all free motion
 balance, those of inertia included, while the drives keep their speed.
 
 Static equilibrium by Newton's method in the metric of the mass. The stiffness enters by the magnitude of its
-eigenvalues, so that a step goes downhill also where a mechanism is about to tip over; it is limited in length, and a
-line search on the power of the unbalanced force along the step halves it until it no longer shoots far past the
-balance. The power, not an energy, because a force need not have a potential; a ball finds the floor of its socket,
-where the stiffness jumps from nothing to 1e8 N/m, in some thirty steps.
+eigenvalues, so that a step also descends where a mechanism is about to tip over; its length is limited, and a
+line search on the power of the unbalanced force along the step halves it until it no longer overshoots the
+balance. It uses the power, not an energy, because a force need not have a potential. A ball reaches its socket's floor,
+where the stiffness jumps from zero to 1e8 N/m, in some thirty steps.
 
-Steady motion by full steps, because it need not be a minimum of anything: above its critical speed an unbalanced rotor
+Steady motion by full steps, because it need not be a minimum: above its critical speed an unbalanced rotor
 is held by gyroscopic forces in a pose from which the forces alone push away (self-centring). Where a single start does
 not lead there, the speed grows in strides from rest, each starting from the pose before; a stride may pass a critical
 speed, at which an undamped rotor has no steady motion. Stability is judged afterwards, by the eigenvalues.
@@ -29,33 +29,33 @@ from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, closed, hold, in_strides, set_drives
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, close, hold, in_strides, set_drives
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, magnitude, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, vibrations
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import row_units
 
-#: iterations before giving up
+#: largest number of iterations
 MOST_MOVES = 200
 #: longest step, as a fraction of the mechanism's size or of a radian
 LONGEST_MOVE = 0.2
-#: balanced: unbalanced force below this fraction of those in balance (or of the weight), or a step too short to matter
+#: balanced: unbalanced force below this fraction of the balancing forces (or of the weight), or step below this length
 BALANCED, SHORT_MOVE = 1e-12, 1e-14
-#: what rounding may leave when iterations no longer gain
+#: relative unbalanced force that counts as rounding when iterations stop improving
 STALLED = 1e-8
-#: eigenvalues of the stiffness below this fraction of the largest hold nothing
-LIMP = 1e-12
-#: a step may end with this fraction of the starting power turned against it
+#: eigenvalues of the stiffness below this fraction of the largest count as zero
+NO_STIFFNESS = 1e-12
+#: largest fraction of the starting power that may act against the step at its end
 OVERSHOOT = 0.5
-#: corrections of one pose; each is at most this fraction of the one before, else a stride has to be shorter
+#: corrections of one pose; each must be at most this fraction of the one before, else the step of the speed is halved
 CORRECTIONS, CONTRACTION = 20, 0.5
-#: corrections below this fraction of the mechanism's size, or of a radian, that shrink no more are rounding
+#: corrections below this fraction of the mechanism's size, or of a radian, that stop shrinking are rounding
 STALLED_CORRECTION = 1e-8
-#: shortest stride, as a fraction of the drives' speed: narrow against the way between two critical speeds
+#: smallest step, as a fraction of the drives' speed: narrow compared to the distance of two critical speeds
 SHORTEST = 1.0 / 256.0
-#: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
+#: relative speeds of the loops, and relative change of the forces along the drives' motion, that steady motion may have
 STEADY = 1e-9
-#: how far the drives are moved to see whether the forces stay the same, in radians or fractions of the mechanism's size
+#: motion of the drives that tests whether the forces stay constant, in radians or fractions of the mechanism's size
 PROBE = 0.1
 
 
@@ -69,7 +69,7 @@ class Equilibrium:
 
 
 def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
-    """The equilibrium close to positions q (loops closed); SolverError when there is none, or the search fails."""
+    """Return the equilibrium close to positions q (loops closed); raise SolverError when the search fails."""
     at = tangent(bench, q)
     best, since = np.inf, 0
     for iteration in range(MOST_MOVES):
@@ -92,23 +92,23 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
 
 
 def weight(bench: Bench) -> float:
-    """Norm of gravity's force in the metric of the mass, as if all bodies fell [kg^0.5 m/s^2]."""
+    """Return the norm of gravity's force in the metric of the mass, as if all bodies fell [kg^0.5 m/s^2]."""
     mass = sum(link.mass for link in bench.model.links)
     return float(np.sqrt(mass) * np.linalg.norm(bench.model.gravity))
 
 
 def residual(bench: Bench, at: Tangent) -> float:
-    """Largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
+    """Return the largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
     forces = at.mass @ at.Z @ at.unbalanced
     return float(np.max(np.abs(forces) * bench.model.speed_scales, initial=0.0)) / bench.model.length
 
 
 def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
-    """Displacement along the free motions, towards balance."""
+    """Return the displacement along the free motions, towards balance."""
     K, _ = stiffness(bench, at, at.Z)
     k, axes = np.linalg.eigh(0.5 * (K + K.T))
     force = axes.T @ at.unbalanced
-    floor = max(LIMP * float(np.max(np.abs(k))), 1e-30)
+    floor = max(NO_STIFFNESS * float(np.max(np.abs(k))), 1e-30)
     along = np.where(np.abs(force) > negligible / len(k), -force / np.maximum(np.abs(k), floor), 0.0)
     size = bench.model.speed_scales[:, None]
     reach = np.max(np.abs(at.Z @ axes) / size, axis=0)
@@ -118,12 +118,12 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
 
 
 def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
-    """The pose after the step or a part of it."""
+    """Return the pose after the step or a part of the step."""
     direction = at.Z @ step
     fraction, power = 1.0, -float(step @ at.unbalanced)
     for _ in range(80):
         try:
-            new = tangent(bench, closed(bench, at.q + fraction * (at.moves @ direction)))
+            new = tangent(bench, close(bench, at.q + fraction * (at.moves @ direction)))
         except SolverError:
             fraction *= 0.5
             continue
@@ -134,7 +134,7 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
 
 
 def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
-    """What has most of the kinetic energy of a motion: a joint, a body held by none, or the deformation of one.
+    """Name the joint, body without joint, or deformation with most of the kinetic energy of a motion.
 
     motion: speeds, shape (nv,).
     """
@@ -157,9 +157,9 @@ def balanced(
     drives: Mapping[str, float] | None = None,
     moving: bool = False,
 ) -> tuple[Bench, Equilibrium, Vibrations | None]:
-    """The bench of a scene, its equilibrium or steady motion, and of the latter the vibrations about it.
+    """Return the bench of a scene, its equilibrium or steady motion, and for the latter the vibrations about it.
 
-    Arguments as of `pipeline.dynamics.analyses.equilibrium`.
+    For the arguments see `pipeline.dynamics.analyses.equilibrium`.
     """
     bench, q = hold(scene, bundles, progress, time, drives, moving)
     progress(None, f"Computing the {'steady motion' if moving else 'equilibrium'}")
@@ -167,13 +167,13 @@ def balanced(
 
 
 def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
-    """The steady motion near positions q (loops closed), and the vibrations about it.
+    """Return the steady motion near positions q (loops closed), and the vibrations about it.
 
-    Where the one that Newton's method reaches is unstable, a stable one that the forces lead to is preferred, as of a
-    governor whose arms rise.  Raises SolverError where there is none, or the motion is not steady.
+    Where Newton's method reaches an unstable one, a stable one from the equilibrium search is preferred, as for a
+    governor whose arms rise.  Raises SolverError when none is found, or when the motion is not steady.
     """
     reached, failure = list[tuple[Equilibrium, Vibrations]](), None
-    # angles with their turns, which the search follows, belong to the pose
+    # angles with their full turns, which the search tracks, belong to the pose
     internal, kept = bench.internal.copy(), list[np.ndarray]()
     for find in (_continued, descend) if np.any(bench.drives[:, 1]) else (descend,):
         bench.internal[:] = internal
@@ -198,7 +198,7 @@ def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
 
 
 def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
-    """The steady motion by Newton's method, at once or with the drives' speed growing from rest."""
+    """Return the steady motion by Newton's method, at once or with the drives' speed increased from rest."""
     internal = bench.internal.copy()
     try:
         return newton(bench, q)
@@ -222,7 +222,7 @@ def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
 
 
 def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
-    """The pose in balance that full steps of Newton's method reach from q; SolverError where they do not contract."""
+    """Return the pose that full Newton steps reach from q; raise SolverError where they do not contract."""
     at, last, iteration = tangent(bench, q), np.inf, 0
     size = bench.model.speed_scales
     for iteration in range(1, CORRECTIONS + 1):
@@ -233,7 +233,7 @@ def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
             return Equilibrium(at, residual(bench, at), iteration)
         if not length <= min(LONGEST_MOVE, CONTRACTION * last):
             break
-        at, last = tangent(bench, closed(bench, at.q + at.moves @ step)), length
+        at, last = tangent(bench, close(bench, at.q + at.moves @ step)), length
     raise SolverError(
         f"at t = {bench.time:.6g} s: no steady motion was reached from this pose in {iteration} corrections; a force "
         f"of {residual(bench, at):.3g} N stays unbalanced"
@@ -241,11 +241,11 @@ def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
 
 
 def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
-    """Newton's step of all coordinates, shape (nv,); motions that nothing drives back stay where they are."""
+    """Return Newton's step of all coordinates, shape (nv,), without motions that have no stiffness."""
     if not at.Z.shape[1]:
         return np.zeros(len(at.bias))
     first, _ = stiffness(bench, at, at.Z)
-    # along the principal motions soft ones are not lost in the rounding of stiff ones
+    # along the principal motions, rounding of stiff ones does not hide soft ones
     motions = at.Z @ np.linalg.svd(first)[2].T
     K, error = stiffness(bench, at, motions)
     size, forces = np.linalg.norm(K, axis=0), motions.T @ at.bias
@@ -260,7 +260,7 @@ def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
 
 
 def _require_steady(bench: Bench, at: Tangent) -> None:
-    """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
+    """Raise SolverError unless balance and closed loops persist while the drives move on."""
     fastest = bench.fastest
     if fastest == 0.0:
         return
@@ -286,7 +286,7 @@ def _require_steady(bench: Bench, at: Tangent) -> None:
 
 
 def _rounding(bench: Bench, at: Tangent) -> float:
-    """What rounding of positions does to stiff forces along the free motions that balance, as moments [N m]."""
+    """Return the effect of position rounding on stiff balancing forces along the free motions, as moments [N m]."""
     K, _ = stiffness(bench, at, at.Z)
     forces = at.mass @ at.Z @ K @ at.Z.T @ at.mass
     size = bench.model.speed_scales
@@ -294,7 +294,7 @@ def _rounding(bench: Bench, at: Tangent) -> float:
 
 
 def _require_turning_frames(bench: Bench) -> None:
-    """SolverError for a body that only a bushing connects to others: its coordinates do not move with the drives."""
+    """Raise SolverError for a body with bushings only: its coordinates do not move with the drives."""
     loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.places}
     for name, load in bench.scene.forces().items():
         mounted = loose & {frame.partition(".")[0] for frame in load.between} if isinstance(load, Bushing) else ()

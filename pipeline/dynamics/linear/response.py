@@ -1,17 +1,17 @@
-r"""What bending of bodies does to first order along the ideal motion: to positions, rates and the forces of joints.
+r"""First-order effect of flexible bodies along the ideal motion: on positions, rates and the forces of joints.
 
-Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint
+Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that keep all joints closed
 (`clearance_response`):
 
 .. math:: G x + B q = 0, \qquad M\,(\ddot x, \ddot q) + K q = f(t), \qquad M = \sum_b J_b^T M_b J_b
 
-with the forces f that joints, loads, inertia and gravity bring on deformations in the ideal motion, and the links' mass
-moved along. Its vibrations are the assembled mechanism's; from rest each coordinate of them is the quasi-static one and
-a vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
-undamped). Rates are the vibrations' own; forces of joints hold the accelerations, by the adjoint solution of the joint.
+with the forces f of joints, loads, inertia and gravity on deformations in the ideal motion, and the mass of the moving
+links. The vibrations are those of the assembled mechanism. From rest, each of their coordinates is quasi-static plus a
+vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
+undamped). Rates are those of the vibrations; joint forces follow from accelerations, by the joint's adjoint solution.
 
-The pose is held where it is, so that several of the motion are examined. The result is the sum of all amplitudes,
-which is at least what the vibrations do.
+Each evaluation holds the pose fixed, so several poses of the motion are examined. The result sums all amplitudes,
+which bounds the effect of the vibrations from above.
 
 Source: Craig and Kurdila, *Fundamentals of Structural Dynamics*, ch. 5 and 11.
 """
@@ -35,26 +35,26 @@ from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
 
-#: poses at which the vibrations are examined
+#: number of poses at which the vibrations are computed
 RESPONSE_POSES = 8
-#: kinds of quantities by what of the elastic coordinates makes them
-PLACES, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
+#: kinds of quantities by their dependence on elastic coordinates, rates or accelerations
+POSITIONS, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
 TURNS = ("orientation", "angular_velocity")
-#: singular values below this fraction of the largest are none; squared frequencies below this fraction are of free
-#: motions
-FOLLOWED, LIMP = 1e-9, 1e-12
-#: fraction of the largest force that loads of their size could have on a vibration, from which on they excite it; of
-#: loads along a rod 2e-14 are left across it
-FELT = 1e-10
+#: singular values below this fraction of the largest count as zero; squared frequencies below this fraction belong to
+#: free motions
+FOLLOWED, NO_STIFFNESS = 1e-9, 1e-12
+#: least force on an excited vibration, as a fraction of the largest that loads of this size could have; loads along a
+#: rod leave 2e-14 across the rod
+EXCITED = 1e-10
 
 
 @dataclass(frozen=True)
 class Response:
-    """Of all flexible bodies together. first: lowest frequency of the assembled mechanism [Hz].
+    """Response of all flexible bodies together. first: lowest frequency of the assembled mechanism [Hz].
 
-    excited: lowest frequency of a vibration that the motion's loads excite [Hz], nan where they excite none.
-    amplification: largest fraction of its quasi-static value that the coordinate of this vibration reaches.
-    influence: of each quantity, at most [SI]; infinite where it is not known.
+    excited: lowest frequency of a vibration that the motion's loads excite [Hz], NaN where they excite none.
+    amplification: largest ratio of this vibration's coordinate to its quasi-static value.
+    influence: upper bound of the effect on each quantity [SI]; infinite where unknown.
     """
 
     first: float
@@ -68,13 +68,13 @@ def response(
     bundles: Mapping[str, Labelled],
     chosen: Sequence[Quantity],
 ) -> Response:
-    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid version."""
+    """Return the response of flexible bodies to the ideal motion of their mechanism, the run of its rigid version."""
     model, time = run.model, run.trajectory.time
     motions = Motions(model, run.observed)
     unknown = Response(np.nan, np.nan, np.nan, {q.name: np.inf for q in chosen})
-    if not bundles or not clearance_response.is_whole(model):
+    if not bundles or not clearance_response.knows_all_joints(model):
         return unknown
-    once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both its sides
+    once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both sides
     time = time[once]
     held = [
         n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
@@ -84,30 +84,30 @@ def response(
     joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
-        assembled = _assembled(model, clearance_response.lever_of(model, joints, poses), poses, bundles)
+        assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
         responses.append(_at(assembled, forces, time, chosen))
     worst = {q.name: max(r.influence[q.name] for r in responses) for q in chosen}
-    felt = [r for r in responses if np.isfinite(r.excited)]
-    excited = min((r.excited for r in felt), default=np.nan)
+    responding = [r for r in responses if np.isfinite(r.excited)]
+    excited = min((r.excited for r in responding), default=np.nan)
     return Response(
-        min(r.first for r in responses), excited, max((r.amplification for r in felt), default=np.nan), worst
+        min(r.first for r in responses), excited, max((r.amplification for r in responding), default=np.nan), worst
     )
 
 
 @dataclass(frozen=True)
 class _Assembled:
-    """The elastic mechanism in a pose, its small motions in motions of the links and elastic coordinates, (x, q).
+    """The elastic mechanism in a pose, with its small motions in terms of link motions and elastic coordinates, (x, q).
 
     omega: frequencies, ascending [rad/s].  modes: (x, q) of each, M-orthonormal, shape (6 (links - 1) + n, modes).
-    free: motions without stiffness, likewise.  own: what bodies move next to their link, per q.  momenta: of all
+    free: motions without stiffness, likewise.  own: motion of bodies relative to their link, per q.  momenta: of all
     bodies, as wrenches on the links, per (x, q).
     """
 
     model: Model
     poses: Sequence[Placement]
-    lever: clearance_response.Lever
+    lever: clearance_response.OpeningMap
     omega: np.ndarray
     modes: np.ndarray
     free: np.ndarray
@@ -115,15 +115,15 @@ class _Assembled:
     momenta: np.ndarray
 
     def moved(self, body: str, *, turning: bool) -> np.ndarray:
-        """Motion of a body per (x, q), shape (3, 6 (links - 1) + n)."""
-        shown = clearance_response.shown(self.model, self.poses, body, turning=turning)
-        return np.hstack([shown, self.own[body][0 if turning else 1]])
+        """Return the motion of a body per (x, q), shape (3, 6 (links - 1) + n)."""
+        rigid = clearance_response.body_motion(self.model, self.poses, body, turning=turning)
+        return np.hstack([rigid, self.own[body][0 if turning else 1]])
 
 
 def _assembled(
-    model: Model, lever: clearance_response.Lever, poses: Sequence[Placement], bundles: Mapping[str, Labelled]
+    model: Model, lever: clearance_response.OpeningMap, poses: Sequence[Placement], bundles: Mapping[str, Labelled]
 ) -> _Assembled | None:
-    """The elastic mechanism in a pose; None where no motion is left."""
+    """Return the elastic mechanism in a pose; None without any vibration."""
     first = np.concatenate([[0], np.cumsum([int(b.sizes["mode"]) for b in bundles.values()])])
     opened = np.zeros((lever.gradient.shape[0], first[-1]))
     own = {name: (np.zeros((3, first[-1])), np.zeros((3, first[-1]))) for name in model.scene.body}
@@ -140,7 +140,7 @@ def _assembled(
         squares, shapes = scipy.linalg.eigh(inner.T @ K @ inner, Z.T @ M @ Z)
     except np.linalg.LinAlgError:
         return None
-    firm = squares > LIMP * squares.max(initial=0.0)
+    firm = squares > NO_STIFFNESS * squares.max(initial=0.0)
     if not firm.any():
         return None
     modes = Z @ shapes
@@ -154,7 +154,7 @@ def _mass(
     first: np.ndarray,
     own: Mapping[str, tuple[np.ndarray, np.ndarray]],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mass of links and elastic coordinates, (x, q) by (x, q), and momenta of all as wrenches on the links."""
+    """Return mass of links and elastic coordinates, (x, q) by (x, q), and momenta of all as wrenches on the links."""
     m = 6 * (len(poses) - 1)
     M, momenta = np.zeros((m + first[-1], m + first[-1])), np.zeros((m, m + first[-1]))
     for name, body in model.scene.body.items():
@@ -164,7 +164,7 @@ def _mass(
             model.mechanism.links[model.mechanism.link_of[name]].places[name]
         )
         inertia = placement.R @ np.array(body.inertia) @ placement.R.T
-        rigid = [clearance_response.shown(model, poses, name, turning=turning) for turning in (True, False)]
+        rigid = [clearance_response.body_motion(model, poses, name, turning=turning) for turning in (True, False)]
         turn, shift = (np.hstack(parts) for parts in zip(rigid, own[name], strict=True))
         spin, push = inertia @ turn, body.mass * shift
         M += turn.T @ spin + shift.T @ push
@@ -183,7 +183,7 @@ def _mass(
 
 
 def _momenta(bundle: Labelled, placement: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Linear momentum of a body's deformation, and its moment about a point, per rate of q, world axes, (3, mode)."""
+    """Return momentum of a body's deformation, and its moment about a point, per rate of q, world axes, (3, mode)."""
     push = placement.R @ bundle["modal_first_moment"].values
     P = bundle["position_mode_moment"].values
     about_frame = placement.R @ np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
@@ -191,7 +191,7 @@ def _momenta(bundle: Labelled, placement: Placement, centre: np.ndarray) -> tupl
 
 
 def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Sequence[Quantity]) -> Response:
-    """The response with the vibrations of one pose."""
+    """Return the response with the vibrations of one pose."""
     omega = assembled.omega
     f = forces @ assembled.modes[-forces.shape[1] :]
     still = f / omega**2
@@ -199,17 +199,17 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
     rate = np.gradient(still, time, axis=0) if len(time) > 1 else np.zeros(still.shape)
     influence = {}
     for q in chosen:
-        if q.kind in (*PLACES, *RATES) and q.owner in assembled.model.mechanism.link_of:
+        if q.kind in (*POSITIONS, *RATES) and q.owner in assembled.model.mechanism.link_of:
             moved = assembled.moved(q.owner, turning=q.kind in TURNS)
             if np.abs(moved @ assembled.free).max(initial=0.0) > FOLLOWED * np.abs(moved @ assembled.modes).max():
-                influence[q.name] = np.inf  # masses decide what it does along a freedom of its own
+                influence[q.name] = np.inf  # masses decide its effect along a freedom of its own
                 continue
-            shown = moved @ assembled.modes
-            size = np.linalg.norm(shown, axis=0)
-            if q.kind in PLACES:
-                sizes = np.linalg.norm(still @ shown.T, axis=1) + amplitude @ size
+            per_vibration = moved @ assembled.modes
+            size = np.linalg.norm(per_vibration, axis=0)
+            if q.kind in POSITIONS:
+                sizes = np.linalg.norm(still @ per_vibration.T, axis=1) + amplitude @ size
             else:
-                sizes = np.linalg.norm(rate @ shown.T, axis=1) + amplitude @ (size * omega)
+                sizes = np.linalg.norm(rate @ per_vibration.T, axis=1) + amplitude @ (size * omega)
             influence[q.name] = float(sizes.max())
         elif q.kind in FORCES and q.owner in assembled.lever.joints:
             size = np.linalg.norm(_reaction(assembled, q.owner), axis=0)
@@ -225,24 +225,24 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
 
 
 def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
-    """Number of the first vibration that forces on elastic coordinates excite; None where they excite none.
+    """Return the index of the first vibration that forces on elastic coordinates excite; None without any.
 
-    forces: (rows, n).  shapes: (n, vibrations).  A vibration's force is a sum of n products; of one at right angles to
-    all forces, as bending across the plane of a planar mechanism is, their rounding is left, and that of the loads: no
+    forces: (rows, n).  shapes: (n, vibrations).  A vibration's force is a sum of n products. For one orthogonal to
+    all forces, such as bending across the plane of a planar mechanism, only rounding of products and loads remains: no
     fraction of it has any meaning.  By Schwarz' inequality the sum is at most the product of both lengths, so that what
-    is below `FELT` of that, over all rows, is nothing.
+    is below `EXCITED` of that, over all rows, counts as zero.
     """
     size = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     most = np.abs(forces @ shapes).max(axis=0, initial=0.0)
-    felt = np.flatnonzero(most > FELT * size * np.linalg.norm(shapes, axis=0))
-    return int(felt[0]) if len(felt) else None
+    excited = np.flatnonzero(most > EXCITED * size * np.linalg.norm(shapes, axis=0))
+    return int(excited[0]) if len(excited) else None
 
 
 def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
-    r"""Amplitudes of the vibrations about the quasi-static motion, from rest, shape (rows, vibrations).
+    r"""Return amplitudes of the vibrations about the quasi-static motion, from rest, shape (rows, vibrations).
 
-    f: forces per modal mass, (rows, vibrations), straight between the rows.  With the deviation
-    :math:`d = \eta - f/\omega^2` it vibrates freely between the rows, and its rate jumps where the slope of f does.
+    f: forces per modal mass, (rows, vibrations), linear between the rows.  The deviation
+    :math:`d = \eta - f/\omega^2` vibrates freely between the rows, and its rate jumps where the slope of f does.
     """
     still = f / omega**2
     steps = np.diff(time)
@@ -259,7 +259,7 @@ def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 
 def _reaction(assembled: _Assembled, joint: str) -> np.ndarray:
-    """Force of a joint per acceleration of each vibration, (3, vibrations): what holds the momenta that it moves."""
+    """Return the force of a joint per acceleration of each vibration, (3, vibrations), from the momenta beyond it."""
     lever = assembled.lever
     multipliers = lever.gradient @ lever.normal.solve(assembled.momenta @ assembled.modes)
     _, rows, wrenches = lever.joints[joint]

@@ -1,12 +1,12 @@
-r"""The motions that closures leave free, and forces along them.
+r"""Free motions under the closure constraints, and forces along them.
 
 With :math:`Z` such that :math:`JZ = 0` and :math:`Z^TMZ = 1`, small motions are :math:`Z z`, and the loops' multipliers
 do no work on them. The stiffness is the derivative of :math:`Z^T(\mathrm{bias} - J^T\lambda)` at fixed
 :math:`\lambda`: forces in the loops stiffen or weaken a mechanism as the tension of a string does.
 
-Changes of forces are exact: the kernels of the right-hand side, run on numbers with their derivatives. Forces of one
+Changes of forces are exact: the kernels of the right-hand side run on dual numbers. Forces of one
 mechanism change over lengths from a millimetre (gravity, springs) to a nanometre (a contact that is just closed). No
-step width fits all, and none is needed.
+step width would fit all.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias
 from flexclear.pipeline.dynamics.specialise import dual
 
-#: singular values of the closures below this fraction of the largest are redundant rows
+#: relative singular values of the closure rows below which rows are redundant
 REDUNDANT_ROW = 1e-9
 #: rounding of a sum of some dozens of terms
 EPSILON = 1e-15
@@ -50,7 +50,7 @@ class Tangent:
 
     q: positions.  Z: speeds per free motion, shape (nv, mobility).  moves: positions per coordinate, (nq, nv).
     bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.
-    forces: that balance (`bench.balancing`).
+    forces: size of the balancing forces (`bench.balancing`).
     """
 
     q: np.ndarray
@@ -64,12 +64,12 @@ class Tangent:
 
     @property
     def unbalanced(self) -> np.ndarray:
-        """Forces along the free motions that nothing balances, with their sign turned, shape (mobility,)."""
+        """Negative unbalanced forces along the free motions, shape (mobility,)."""
         return self.Z.T @ self.bias
 
 
 def tangent(bench: Bench, q: np.ndarray) -> Tangent:
-    """The free motions at positions q whose loops are closed; SolverError where these are far beyond any real pose."""
+    """Return the free motions at closed positions q; raise SolverError at deformations beyond any real pose."""
     b, forces = balance(bench, q), balancing(bench)
     try:
         Z, lower, spread = free_motions(b.mass, b.jacobian)
@@ -85,7 +85,7 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 
 
 def free_motions(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Z, shape (nv, mobility); the mass' factor L, and J L^-T.
+    """Return Z, shape (nv, mobility); the Cholesky factor L of the mass, and J L^-T.
 
     Raises LinAlgError for a mass that is not positive definite.
     """
@@ -101,7 +101,7 @@ def free_motions(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces per displacement along motions (columns), shape (n, n) [1/s^2], and what rounding does to each column."""
+    """Return forces per displacement along motions (columns), shape (n, n) [1/s^2], and rounding errors of columns."""
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, : len(at.q)] = (at.moves @ motions).T
     changes = force_changes(bench, at.q, directions, at.multipliers)
@@ -109,7 +109,7 @@ def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarra
 
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces per speed along motions (columns), gyroscopic ones included, shape (n, n) [1/s], and rounding likewise."""
+    """Return forces per speed along motions, with gyroscopic ones, shape (n, n) [1/s], and rounding errors likewise."""
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, bench.model.speeds] = motions.T
     changes = force_changes(bench, at.q, directions, np.zeros_like(at.multipliers))
@@ -117,7 +117,7 @@ def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray,
 
 
 def _by_turning(bench: Bench, at: Tangent) -> float:
-    """What the motion of the drives adds to the forces that balance, per speed of the fastest; 0 where all rest."""
+    """Return the contribution of the drives' motion to the balancing forces, per speed of the fastest; 0 at rest."""
     if not bench.fastest:
         return 0.0
     moving, drives = acting(bench), bench.drives
@@ -127,14 +127,14 @@ def _by_turning(bench: Bench, at: Tangent) -> float:
         resting = acting(bench)
     finally:
         set_drives(bench, drives)
-    balance(bench, at.q)  # what follows reads the moving state
+    balance(bench, at.q)  # later code reads the moving state
     return float(np.max(np.abs(moving - resting), initial=0.0)) / bench.fastest
 
 
 def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: float) -> np.ndarray:
-    """What rounding does to changes of forces along motions, by the size of all that is summed up, shape (n,).
+    """Return the rounding error of changes of forces along motions, by the size of all summands, shape (n,).
 
-    forces: that balance, as moments, per displacement or speed: what they leave may itself be rounding.
+    forces: balancing forces, as moments, per displacement or speed: their sum may itself be rounding.
     """
     reach = np.max(np.abs(motions) / bench.model.speed_scales[:, None], axis=0, initial=0.0)
     terms = np.linalg.norm(np.abs(motions).T @ np.abs(changes).T, axis=0)
@@ -142,23 +142,23 @@ def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: fl
 
 
 def magnitude(motions: np.ndarray, bias: np.ndarray) -> float:
-    """Size of the terms of which the forces along motions are sums."""
+    """Return the size of the summands of the forces along motions."""
     return float(np.linalg.norm(np.abs(motions).T @ np.abs(bias)))
 
 
 def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-    """Changes of bias - J^T multipliers at rest in positions q, along directions; shape (directions, nv).
+    """Return changes of bias - J^T multipliers at rest in positions q, along directions; shape (directions, nv).
 
     directions: changes of the state, (directions, NY).  multipliers: constant, (rows,).  Raises SolverError where the
     equations are singular.
     """
     engine, model, count = bench.engine, bench.model, len(directions)
     y = state(bench, q)
-    # leaves the laws of time, and what each stretch holds, in the work space
+    # stores the laws of time, and all work arrays, in the work space
     closure_rows.evaluate(engine, y, bench.time)
     h, w = engine.h.tolist(), list(engine.w)
     w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
-    with np.errstate(all="ignore"):  # as in compiled code, what is not used may be infinite
+    with np.errstate(all="ignore"):  # as in compiled code, unused values may be infinite
         _rates(model.parts)(h, list(model.arrays.f), w, engine.n.tolist(), h[m.Y], h[m.SLOPES])
 
     o = h[m.JACOBIAN]

@@ -1,9 +1,10 @@
-"""Loads. To add one: a module here that is called like its type, and its parameters in core/scene/loads. One whose
-effect takes more, as states between steps, is in the effect's folder.
+"""Loads. To add one: a module here named like its type, and its parameters in core/scene/loads. A load whose effect
+needs more, such as states between steps, is in the effect's folder.
 
-Each module but that of gravity, which is a field, has
-- ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: what it acts on
-  and with (see `row.Row`); ValueError, in words, for values that cannot be;
+Each module except that of gravity, which is a field, has
+
+- ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: the row of the load (see `row.Row`);
+  raises ValueError, in words, for invalid values;
 - ``apply(d, k)``: kernel that applies load k by `fields.act`.
 """
 

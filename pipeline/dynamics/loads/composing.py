@@ -1,4 +1,4 @@
-"""All loads by one kernel: kind after kind, each kind's in a row."""
+"""Composition of all loads in one kernel, kind after kind."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def make_loads(kinds: tuple[Callable, ...], first: int = 0) -> Callable:
-    """The kernel loads(d) that applies the loads of all kinds from the first on, given their kernels `apply`."""
+    """Build the kernel loads(d) that applies all loads of these kinds, from index `first` on; kinds: kernels
+    `apply`."""
     if not kinds:
         return nothing
     head, tail = kinds[0], make_loads(kinds[1:], first + 1)

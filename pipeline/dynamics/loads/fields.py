@@ -1,6 +1,6 @@
-"""Positions of loads in the tables, and the common kernels of loads: measuring and pushing.
+"""Access to the tables of loads, and the common kernels of loads: measuring and applying forces.
 
-A load between two sites acts on both by one wrench, with opposite signs: it leaves no force and no moment over.
+A load between two sites applies one wrench to both, with opposite signs: total force and moment are zero.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from flexclear.pipeline.dynamics.vectors import ZERO, cross, dot, scale, sub, tu
 
 @kernel
 def number(d, k, which):
-    """A number of load k."""
+    """Return number `which` of load k."""
     return d.load_numbers[d.loads[k].number0 + which].value
 
 
 @kernel
 def law(d, k, which):
-    """Present value of a law of load k."""
+    """Return the present value of law `which` of load k."""
     return d.law[d.loads[k].law0 + which].value
 
 
 @kernel
 def laws(d, k):
-    """Present values of three laws of load k, as a vector."""
+    """Return the present values of three laws of load k, as a vector."""
     return (law(d, k, 0), law(d, k, 1), law(d, k, 2))
 
 
 @kernel
 def law_rate(d, k, which):
-    """Its present rate [1/s of it]."""
+    """Return the present rate of law `which` of load k [1/s of its value]."""
     return d.law[d.loads[k].law0 + which].rate
 
 
 @kernel
 def act(d, k, moment, force, value, rate, stored, power, loss):
-    """Apply the wrench of load k on b and against it on a; note what it does, and book power and loss."""
+    """Apply the wrench of load k to b and its opposite to a; store the results; add power and loss to the ledger."""
     load, now = d.loads[k], d.load[k]
     now.force, now.moment, now.value, now.rate = force, moment, value, rate
     now.stored, now.power, now.loss = stored, power, loss
@@ -55,15 +55,15 @@ def act(d, k, moment, force, value, rate, stored, power, loss):
 
 @kernel
 def measure(d, k):
-    """Joint coordinate of load k, its rate, and the wrench (moment, force) of a unit force along it."""
+    """Return the joint coordinate of load k, its rate, and the wrench (moment, force) of a unit force along it."""
     return gauge.counted(d, d.loads[k].gauge)
 
 
 @kernel
 def line(d, k):
-    """Distance between the two origins of load k, its rate, and the direction from the first one to the second.
+    """Return the distance between the two origins of load k, its rate, and the direction from the first to the second.
 
-    The direction is zero where they meet.
+    The direction is zero where the origins coincide.
     """
     a, b = d.site_frames[d.loads[k].a], d.site_frames[d.loads[k].b]
     r = sub(b.origin, a.origin)
@@ -73,7 +73,7 @@ def line(d, k):
 
 
 def along_coordinate(size: Callable) -> Callable:
-    """The kernel `apply` of loads along a joint coordinate by size(d, k) [N or N m]; all of its power is work."""
+    """Build `apply` of loads along a joint coordinate with the force size(d, k) [N or N m]; all power is work."""
 
     @kernel
     def apply(d, k):
@@ -85,7 +85,7 @@ def along_coordinate(size: Callable) -> Callable:
 
 
 def at_origin(given: Callable) -> Callable:
-    """The kernel `apply` of loads at the origin of a frame by the vector given(d, k) [N]; all of its power is work."""
+    """Build `apply` of loads at the origin of a frame with the force given(d, k) [N]; all power is work."""
 
     @kernel
     def apply(d, k):

@@ -1,4 +1,4 @@
-"""Uniform gravity, treated as an upward acceleration of the ground."""
+"""Uniform gravity, implemented as an upward acceleration of the ground."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from flexclear.pipeline.core.scene.schema import Scene
 
 
 def field(scene: Scene) -> np.ndarray:
-    """Sum of the scene's gravity fields [m/s^2], shape (3,)."""
+    """Return the sum of the scene's gravity fields [m/s^2], shape (3,)."""
     fields: list[np.ndarray] = [np.array(load.acceleration) for load in scene.load.values() if load.type == "gravity"]
     return np.sum(fields, axis=0) if fields else np.zeros(3)

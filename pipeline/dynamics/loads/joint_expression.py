@@ -1,4 +1,4 @@
-"""Force or torque along a joint coordinate by an expression; all of its power is booked as work."""
+"""Force or torque along a joint coordinate by an expression; all of its power counts as work."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.loads.fields import along_coordinate
 from flexclear.pipeline.dynamics.loads.row import Row, by_formula
 
-#: makes of the kernel formula(d, k) of an expression the kernel `apply`
+#: builds the kernel `apply` from the kernel formula(d, k) of an expression
 applying = along_coordinate
 
 
 def row(load: JointExpression, path: str, formula: Formula, coordinate: Coordinate) -> Row:
-    """What the expression reads, and its numbers."""
+    """Return the load's row: the arguments of the expression, and its numbers."""
     return by_formula(formula, path, joint=load.joint)

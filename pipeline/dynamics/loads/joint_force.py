@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.loads.row import Row
 
 @kernel
 def given(d, k):
-    """The force of load k."""
+    """Return the force of load k."""
     return law(d, k, 0)
 
 
@@ -19,5 +19,5 @@ apply = along_coordinate(given)
 
 
 def row(load: JointForce, path: str, coordinate: Coordinate) -> Row:
-    """One law [N or N m]."""
+    """Return the load's row: one law [N or N m]."""
     return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{path[:-1]}.force]"),))

@@ -1,6 +1,6 @@
-"""Friction along a joint coordinate: viscous, and Coulomb's of given strength, regularised as in contacts.
+"""Friction along a joint coordinate: viscous, and Coulomb friction of given strength, regularised as in contacts.
 
-Its strength does not follow the joint's reaction.  Source: Wang & Wang (2019), eqs. (27)-(29), for the
+The strength does not depend on the joint's reaction.  Source: Wang & Wang (2019), eqs. (27)-(29), for the
 regularised coefficient.
 """
 
@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.vectors import scale
 
 @kernel
 def apply(d, k):
-    """Apply load k."""
+    """Apply the force of load k."""
     value, rate, moment, force = measure(d, k)
     bend, speed = d.load_bends[d.loads[k].bend0], abs(rate)
     bend.now = rate
@@ -29,7 +29,7 @@ def apply(d, k):
 
 
 def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:
-    """Viscous coefficient [N s/m or N m s/rad], static and dynamic friction [N or N m], their speeds."""
+    """Return the load's row: viscous coefficient [N s/m or N m s/rad], dry friction [N or N m] and its speeds."""
     viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
     if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
         raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")

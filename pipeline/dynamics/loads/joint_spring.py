@@ -13,7 +13,7 @@ from flexclear.pipeline.dynamics.vectors import scale
 
 @kernel
 def apply(d, k):
-    """Apply load k."""
+    """Apply the force of load k."""
     value, rate, moment, force = measure(d, k)
     stretch, damped = value - number(d, k, 2), number(d, k, 1) * rate
     size = -(number(d, k, 0) * stretch + damped)
@@ -22,7 +22,7 @@ def apply(d, k):
 
 
 def row(load: JointSpring, path: str, coordinate: Coordinate) -> Row:
-    """Stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
+    """Return the load's row: stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
     kind = "torsional " if coordinate.turning else ""
     stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")
     if stiffness < 0.0 or damping < 0.0 or stiffness == damping == 0.0:

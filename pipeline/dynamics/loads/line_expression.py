@@ -1,4 +1,4 @@
-"""Tension between two origins by an expression; all of its power is booked as work."""
+"""Tension between two origins by an expression; all of its power counts as work."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexclear.pipeline.dynamics.vectors import cross, scale
 
 
 def applying(formula: Callable) -> Callable:
-    """The kernel `apply` of loads whose expression the kernel formula(d, k) computes."""
+    """Build the kernel `apply` of a tension from the kernel formula(d, k) of its expression."""
 
     @kernel
     def apply(d, k):
@@ -27,5 +27,5 @@ def applying(formula: Callable) -> Callable:
 
 
 def row(load: LineExpression, path: str, formula: Formula) -> Row:
-    """What the expression reads, and its numbers."""
+    """Return the load's row: the arguments of the expression, and its numbers."""
     return by_formula(formula, path, frames=load.between)

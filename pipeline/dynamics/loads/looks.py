@@ -1,4 +1,4 @@
-"""What expressions read, each by one kernel: loads by expressions are composed of these (`compile.formulas`)."""
+"""Arguments of expressions, each read by one kernel; `compile.formulas` composes loads from these kernels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub  # noqa: F4
 
 @kernel
 def index(d, k, i):
-    """Return what load k reads as its i-th: the number of a site, or of a gauge."""
+    """Return the i-th index that load k reads: the index of a site, or of a gauge."""
     return d.looks[d.loads[k].look0 + i].index
 
 
@@ -30,19 +30,19 @@ def position(d, k, i):
 
 @kernel
 def velocity(d, k, i):
-    """Return its velocity."""
+    """Return the velocity of a site's origin."""
     return d.site_frames[index(d, k, i)].velocity
 
 
 @kernel
 def omega(d, k, i):
-    """Return its angular velocity."""
+    """Return the angular velocity of a site."""
     return d.site_frames[index(d, k, i)].omega
 
 
 @kernel
 def coordinate(d, k, i):
-    """Return a joint coordinate, full turns counted."""
+    """Return a joint coordinate, with full turns counted."""
     value, _, _, _ = gauge.counted(d, index(d, k, i))
     return value
 
@@ -56,6 +56,6 @@ def coordinate_rate(d, k, i):
 
 @kernel
 def note(d, k, i, value):
-    """Note the i-th value of load k at whose zero the slope jumps, which guards watch."""
+    """Store the i-th watched value of load k, at whose zero the slope jumps; guards watch it."""
     bend = d.load_bends[d.loads[k].bend0 + i]
     bend.now = value

@@ -1,4 +1,4 @@
-"""Force at the origin of a frame by expressions; all of its power is booked as work."""
+"""Force at the origin of a frame by expressions; all of its power counts as work."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from flexclear.pipeline.core.scene.loads import PointExpression
 from flexclear.pipeline.dynamics.loads.fields import at_origin
 from flexclear.pipeline.dynamics.loads.row import Row, by_formula
 
-#: makes of the kernel formula(d, k) of three expressions, a vector, the kernel `apply`
+#: builds the kernel `apply` from the kernel formula(d, k) of three expressions, a vector
 applying = at_origin
 
 
 def row(load: PointExpression, path: str, formula: Formula) -> Row:
-    """What the expressions read, and their numbers."""
+    """Return the load's row: the arguments of the expressions, and their numbers."""
     return by_formula(formula, path, frames=(load.frame,), follows=load.axes == "frame")

@@ -1,4 +1,4 @@
-"""Force at the origin of a frame, fixed in the world or turning with the frame."""
+"""Force at the origin of a frame, with a direction fixed in the world or in the frame."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ apply = at_origin(laws)
 
 
 def row(load: PointForce, path: str) -> Row:
-    """Three laws [N]."""
+    """Return the load's row: three laws [N]."""
     laws = tuple((c, "force", f"{path[:-1]}.force]") for c in load.force)
     return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

@@ -1,4 +1,4 @@
-"""Torque on the body of a frame, fixed in the world or turning with the frame."""
+"""Torque on the body of a frame, with a direction fixed in the world or in the frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.vectors import ZERO, dot, turn
 
 @kernel
 def apply(d, k):
-    """Apply load k."""
+    """Apply the torque of load k."""
     frame = d.site_frames[d.loads[k].b]
     torque = laws(d, k)
     if d.loads[k].follows:
@@ -20,6 +20,6 @@ def apply(d, k):
 
 
 def row(load: PointTorque, path: str) -> Row:
-    """Three laws [N m]."""
+    """Return the load's row: three laws [N m]."""
     laws = tuple((c, "torque", f"{path[:-1]}.torque]") for c in load.torque)
     return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

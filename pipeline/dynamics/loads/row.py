@@ -1,4 +1,4 @@
-"""What a load acts on and with, as its module reads it from the scene."""
+"""Row of a load: the frames or joint it acts on, and its data, as its module reads them from the scene."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ TIME = Polynomial(type="polynomial", coefficients=(0.0, 1.0))
 
 @dataclass(frozen=True)
 class Row:
-    """frames: the frame acted on, or the two between which it acts; or `joint`: that joint's frames.
+    """Data of one load.
 
-    laws: law, dimension and path of each.  numbers: as many as it needs.  follows: whether it turns with
-    its frame.  counts_turns: whether it needs its angle beyond half a turn.  states: number of internal states.
-    bends: of each number that its kernel keeps in LOAD_BENDS, the magnitudes at which its slope or curvature jumps, as
-    speeds; 0.0: where it changes its sign; none: nowhere. Its parameters say by `bends` that steps end there.
-    reads: sort and name of what an expression reads (`formulas.Formula`).  located: whether the kernels' origin, from
-    which positions are measured, comes before its numbers.
+    frames: the frame acted on, or the two between which the load acts; or `joint`: the frames of this joint.
+    laws: law, dimension and key path of each.  numbers: as many as the load needs.  follows: True when the load turns
+    with its frame.  counts_turns: True when it needs its angle beyond half a turn.  states: number of internal states.
+    bends: for each number that its kernel stores in LOAD_BENDS, the magnitudes, as speeds, at which slope or curvature
+    jumps; 0.0: at a change of sign; empty: nowhere. The scene's model of the load has `bends` where steps end there.
+    reads: sort and name of each argument of an expression (`formulas.Formula`).  located: True when the kernels'
+    origin, from which positions are measured, precedes its numbers.
     """
 
     frames: tuple[str, ...] = ()
@@ -37,6 +38,6 @@ class Row:
 
 
 def by_formula(formula: Formula, path: str, **acts: Any) -> Row:
-    """The row of a load by an expression.  acts: what it acts on."""
+    """Return the row of a load by an expression.  acts: the frames or joint that the load acts on."""
     bends, laws = ((0.0,),) * formula.bends, ((TIME, "time", path),)
     return Row(laws=laws, numbers=formula.numbers, bends=bends, reads=formula.reads, located=True, **acts)

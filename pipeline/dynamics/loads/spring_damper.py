@@ -2,8 +2,8 @@ r"""Spring and damper on the line between two origins.
 
 .. math:: F = k\,(l - l_0) + c\,\dot l
 
-pulling the ends together. Where the ends meet the line has no direction: there the force is zero,
-which is its limit when :math:`l_0 = 0` and :math:`c = 0`; otherwise a start there is refused.
+pulls the ends together. Where the ends coincide the line has no direction: there the force is zero,
+its limit for :math:`l_0 = 0` and :math:`c = 0`; otherwise a start there is refused.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from flexclear.pipeline.dynamics.vectors import add, cross, scale, sub
 
 @kernel
 def apply(d, k):
-    """Apply load k."""
+    """Apply the force of load k."""
     length, rate, along = line(d, k)
     p = d.site_frames[d.loads[k].b].origin
     r = sub(p, d.site_frames[d.loads[k].a].origin)
     stretch, damped = length - number(d, k, 2), number(d, k, 1) * rate
-    # the part without a direction also has its slope where the ends meet
+    # the part -k r, which needs no direction, keeps its slope where the ends coincide
     force = add(scale(-number(d, k, 0), r), scale(number(d, k, 0) * number(d, k, 2) - damped, along))
     stored = 0.5 * number(d, k, 0) * stretch * stretch
     act(d, k, cross(p, force), force, length, rate, stored, 0.0, damped * rate)
 
 
 def row(load: SpringDamper, path: str) -> Row:
-    """Stiffness [N/m], damping [N s/m], free length [m]."""
+    """Return the load's row: stiffness [N/m], damping [N s/m], free length [m]."""
     return Row(frames=load.between, numbers=(load.stiffness, load.damping, load.free_length or 0.0))

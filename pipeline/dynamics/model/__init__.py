@@ -1,1 +1,1 @@
-"""A scene as a mechanism of links, numbered, in the arrays that the kernels take."""
+"""Mechanism of a scene: links, joints and closures, numbered, in the arrays that kernels take."""

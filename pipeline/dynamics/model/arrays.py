@@ -1,4 +1,4 @@
-"""Tables and stretches into the flat arrays h, f, w and n that the kernels take."""
+"""Packing of tables and stretches into the flat arrays h, f, w and n that kernels take."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics import memory as m
 
 
 class WorkSpace(NamedTuple):
-    """What kernels of one run may change. h: wiring that knows where w keeps what; w, n: floats and integers.
+    """Arrays that the kernels of one run may change: topology h with the offsets in w; w, n: floats and integers.
 
     lengths: of the stretches of w, by their indices in the header.
     """
@@ -27,32 +27,32 @@ class WorkSpace(NamedTuple):
 
 @dataclass(frozen=True)
 class Arrays:
-    """Wiring h and numbers f of a mechanism; `columns`: number of its twist columns."""
+    """Topology h and numbers f of a mechanism; columns: number of its twist columns."""
 
     h: np.ndarray
     f: np.ndarray
     columns: int
 
     def size(self, index: int) -> int:
-        """A size in the header."""
+        """Return a size from the header."""
         return int(self.h[index])
 
     def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
-        """A view of a wiring or number table with named fields, shape (rows,); of the wiring in another h if given."""
+        """Return a view of a table of h or f with named fields, shape (rows,); h: another copy of the topology."""
         wiring, after = _neighbours()[table.place]
         array = (self.h if h is None else h) if wiring else self.f
         end = len(array) if after is None else self.h[after]
         return m.named(table, array[self.h[table.place] : end])
 
     def rows(self, table: Any) -> np.ndarray:
-        """A wiring or number table as `pack` takes it, shape (rows, size)."""
+        """Return a table of h or f as `pack` takes it, shape (rows, size)."""
         stretch = self.table(table)
         return stretch.view(np.int64 if _neighbours()[table.place][0] else np.float64).reshape(-1, table.size)
 
     def work_space(self, room: m.Room) -> WorkSpace:
-        """A work space with a copy of h, the ground set and all else zero.
+        """Return a work space with a copy of h, in which the ground's frame is set and all else is zero.
 
-        room: what the integration method needs.
+        room: sizes that the integration method needs.
         """
         h, end = self.h.copy(), 0
         lengths = _work_lengths(h, room, self.columns)
@@ -69,7 +69,7 @@ class Arrays:
 
 @cache
 def _neighbours() -> dict[int, tuple[bool, int | None]]:
-    """Of each wiring or number table, by its index: whether it is wiring, and the index of the one after it."""
+    """Return, for each table of h and f by its index: True for one of h, and the index of the next table."""
     neighbours: dict[int, tuple[bool, int | None]] = {}
     for array in ("h", "f"):
         places = [table.place for table in m.TABLES[array]]
@@ -78,18 +78,18 @@ def _neighbours() -> dict[int, tuple[bool, int | None]]:
 
 
 def rows(table: Any, entries: Any) -> np.ndarray:
-    """Rows of a table, shape (rows, size), from a sequence of rows or from an array with as many numbers."""
+    """Return rows of a table, shape (rows, size), from a sequence of rows or from an array with as many numbers."""
     number = np.int64 if table in m.TABLES["h"] else np.float64
     return np.asarray(entries, dtype=number).reshape(-1, table.size)
 
 
 def named(table: Any, entries: Any) -> np.ndarray:
-    """The same with named fields, shape (rows,)."""
+    """Return rows of a table with named fields, shape (rows,), from the same arguments as `rows`."""
     return m.named(table, rows(table, entries).ravel())
 
 
 def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> Arrays:
-    """Pack tables, each a sequence of rows.
+    """Pack tables, each a sequence of rows, into h and f.
 
     sizes: those of the header that do not follow from the tables.
     """
@@ -108,7 +108,7 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
 
 
 def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:
-    """The header's sizes that follow from the tables."""
+    """Return the sizes of the header that follow from the tables."""
     closures = named(m.CLOSURES, tables[m.CLOSURES])
     counted = {name: table for name, table in m.NAMED.items() if table in count and f"n_{name}" in m.SIZES}
     return {m.SIZES[f"n_{name}"]: count[table] for name, table in counted.items()} | {
@@ -125,14 +125,14 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
 
 
 def envelope_size(envelope: np.ndarray) -> int:
-    """Entries of a matrix whose rows begin as an envelope with named fields says."""
+    """Return the number of entries of a matrix with an envelope, given with named fields."""
     if not len(envelope):
         return 0
     return int(np.max(envelope["origin"] + np.arange(1, len(envelope) + 1)))
 
 
 def _work_lengths(h: np.ndarray, room: m.Room, columns: int) -> dict[int, int]:
-    """Of the stretches and tables of w, by their indices in the header, in their order."""
+    """Return the lengths of the stretches and tables of w, by their indices in the header, in ascending order."""
     known = {name: int(h[index]) for name, index in m.SIZES.items()} | vars(room) | {"columns": columns}
 
     def factor(text: str) -> int:

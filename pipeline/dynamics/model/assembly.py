@@ -1,4 +1,4 @@
-"""From the poses that a scene gives to some that all joints allow, or a refusal."""
+"""Assembly: from the poses that a scene gives to poses that all joints allow, or a refusal."""
 
 from __future__ import annotations
 
@@ -17,25 +17,24 @@ from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, ill
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
-from flexclear.pipeline.dynamics.model.laws import NONE
+from flexclear.pipeline.dynamics.model.laws import NO_LAWS
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.placing import assemblies, chosen
+from flexclear.pipeline.dynamics.model.placing import ambiguity, assemblies
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
-#: joints that miss each other by less than this fraction of the mechanism's size are meant to fit
+#: residuals of joints below this fraction of the mechanism's size come from rounded input
 MEANT_TO_FIT = 1e-4
 
 
-def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
-    """The mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
+def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS) -> Mechanism:
+    """Return the mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
 
-    Raises InputError for joints whose frames start at a large distance or face each other the wrong way, for poses
-    given that contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.  One
-    with
-    flexible bodies or paths is only checked: deformation and prescribed poses are part of its closing, which the
-    engine does.
+    Mechanisms with flexible bodies or paths are only checked: the engine closes them, with deformation and prescribed
+    poses.
     given: laws that replace the scene's.
+    Raises InputError for joints whose frames start at a large distance or with opposite axes, for given poses that
+    contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.
     """
     starts = given_coordinates(mechanism.scene)
     given_start.refuse_driven(mechanism, starts, given)
@@ -49,15 +48,15 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
     if wrong is not None:
         raise wrong
-    missed = given_start.misses(mechanism, joints, poses, given)
-    given_start.refuse_far(mechanism, missed)
-    residual = max([*residuals(judged, poses).values(), *(miss.size for miss in missed)], default=0.0)
+    contradicted = given_start.contradictions(mechanism, joints, poses, given)
+    given_start.refuse_far(mechanism, contradicted)
+    residual = max([*residuals(judged, poses).values(), *(one.size for one in contradicted)], default=0.0)
     mechanism = replace(mechanism, start_residual=residual, placed=tuple(poses))
     if search:
         return _searched(mechanism, joints, placed, starts)
     asked = bool(starts or mechanism.deformation)
     if mechanism.has_paths or not (mechanism.all_rigid or asked):
-        return settled(mechanism, poses)
+        return with_starts(mechanism, poses)
     closed = close(mechanism, joints, poses)
     fitting = way(mechanism.scene, "frames to a tolerance") if closed is None else None
     if fitting is not None and (scene := fitting.fitted(mechanism, joints, poses)) is not None:
@@ -66,11 +65,11 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     if closed is None and mechanism.all_rigid:
         _refuse_drives(mechanism, joints, poses)
         raise _impossible(mechanism, joints, poses)
-    return settled(mechanism, closed or poses)
+    return with_starts(mechanism, closed or poses)
 
 
 def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> Mechanism:
-    """The mechanism with links without poses put where the joints allow it; InputError where they do not."""
+    """Return the mechanism with links without poses put where the joints allow; raise InputError where none fits."""
     candidates = assemblies(mechanism, joints, placed, starts)
     if not candidates:
         _refuse_starts(mechanism, joints, placed, starts)
@@ -78,11 +77,11 @@ def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], 
         if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
             raise _out_of_reach(mechanism, joints)
         raise _impossible(mechanism, joints, [link.start for link in mechanism.links])
-    return replace(settled(mechanism, candidates[0].poses), choice=chosen(mechanism, joints, candidates, starts))
+    return replace(with_starts(mechanism, candidates[0].poses), choice=ambiguity(mechanism, joints, candidates, starts))
 
 
-def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
-    """The mechanism with these starts; massless links within joints are where the joints' coordinates put them."""
+def with_starts(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
+    """Return the mechanism with these start poses; massless links of joints follow from the joints' coordinates."""
     links, settled_poses = [], list(poses)
     for i, link in enumerate(mechanism.links):
         if link.massless and i:
@@ -94,7 +93,7 @@ def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
 def _between(
     mechanism: Mechanism, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]
 ) -> Placement:
-    """Pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
+    """Return the pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
     assert link.inboard is not None
     F = settled_poses[link.inboard.link].of(start_place(mechanism, link.inboard))
     if not link.joint.positions:
@@ -106,7 +105,7 @@ def _between(
 
 
 def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]) -> np.ndarray:
-    """Those positions of a joint that is a chain, or of a path, which are its link's own, in the tree's sense.
+    """Return the positions of a chain or path that belong to one link, in the tree's sense.
 
     poses: of the links that have mass.
     """
@@ -127,7 +126,7 @@ def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]
 
 
 def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str, float]:
-    """Largest residual per joint [m, or the sine of an angle], without drives."""
+    """Return the largest residual per joint [m, or the sine of an angle], without drives."""
     worst = {}
     for joint in joints:
         worst[joint.name] = float(np.max(np.abs(joint.demands(poses).residuals), initial=0.0))
@@ -135,7 +134,7 @@ def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str,
 
 
 def _refuse_starts(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> None:
-    """InputError when the mechanism could be assembled, but for the positions that the scene gives."""
+    """Raise InputError when only the positions that the scene gives prevent the assembly."""
     requested = [start for start in starts if start.position is not None]
     driven = {(start.joint, start.number) for start in requested}
     loose = [
@@ -154,7 +153,7 @@ def _refuse_starts(mechanism: Mechanism, joints: list[Constraint], placed: set[i
 
 
 def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> None:
-    """InputError when the mechanism could be assembled, but for where its drives start."""
+    """Raise InputError when only the start values of drives prevent the assembly."""
     driven = [joint for joint in joints if joint.values]
     if not driven or close(mechanism, [replace(joint, values={}) for joint in joints], poses) is None:
         return
@@ -162,7 +161,7 @@ def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[P
 
 
 def _out_of_reach(mechanism: Mechanism, joints: Sequence[Constraint]) -> InputError:
-    """What is said of joints that fit together, but not where their drives start."""
+    """Return the error of joints that fit together, but not at the start values of their drives."""
     driven = {joint.name for joint in joints if joint.values}
     scene = mechanism.scene
     names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in driven]

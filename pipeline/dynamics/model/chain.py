@@ -1,8 +1,8 @@
-"""From a joint in the tree to the links that make its motion.
+"""Chains of links for joints of the tree.
 
-A joint moves by one kernel of its own. Where some of its freedoms are prescribed and others not, or where the tree
-meets a joint with several axes from its second frame, it becomes a chain of hinges and slides with massless links
-between: each freedom is then a coordinate by itself, free or known. The pose of a frame on a path is such a chain too.
+A joint moves by one kernel of its own. Where only some of its coordinates are prescribed, or where the tree meets a
+joint with several axes from its second frame, it becomes a chain of hinges and slides with massless links between them.
+Each coordinate of the chain is then free or known by itself. The pose of a frame on a path is a chain, too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class InboardJoint:
     """The joint between a link and its parent: a joint of the scene, or one step of the chain that represents it.
 
     kind: joint type.  axes: of its frames, in the frames of the scene's joint (columns).
-    positions: which of that joint's positions are its own.
+    positions: indices of its positions in the scene's joint.
     drives: prescribed coordinates, none or as many as it has speeds.
     sign: -1 where the tree meets the joint from its second frame: its coordinates are then minus the scene's.
     """
@@ -38,12 +38,12 @@ class InboardJoint:
 
     @property
     def straight(self) -> bool:
-        """Whether its frames have the axes of those of the scene's joint."""
+        """True when its frames have the axes of the scene's joint."""
         return bool(np.array_equal(self.axes, np.eye(3)))
 
 
 def chain(edge: Edge, reverse: bool, port_near: bool, port_far: bool) -> list[InboardJoint]:
-    """The chain of a joint, from the parent on; a link at a port of a flexible body keeps the port's axes."""
+    """Return the chain of a joint, from the parent outwards; links at ports of flexible bodies keep the ports' axes."""
     joints = _path(edge) if edge.kind == PATH else _joint(edge, reverse)
     if port_near and not joints[0].straight:
         joints.insert(0, InboardJoint("fixed"))
@@ -65,7 +65,7 @@ def _joint(edge: Edge, reverse: bool) -> list[InboardJoint]:
 def _single(
     coordinates: tuple[Coordinate, ...], drives: tuple[str | None, ...], first: int, sign: float
 ) -> list[InboardJoint]:
-    """A hinge or slide per coordinate; first: position of the first one in the joint."""
+    """Return a hinge or slide per coordinate; first: position in the joint of the first one."""
     return [
         InboardJoint(c.part, c.axes, (first + k,), (drive,) if drive else (), sign)
         for k, (c, drive) in enumerate(zip(coordinates, drives, strict=True))
@@ -73,7 +73,7 @@ def _single(
 
 
 def _path(edge: Edge) -> list[InboardJoint]:
-    """Slides to the frame's origin; then Cardan angles, a rotation vector, or a free rotation."""
+    """Return slides to the frame's origin; then Cardan angles, a rotation vector, or a free rotation."""
     turns = edge.drives[3:]
     slides = _single(SLIDES, edge.drives[:3], 0, 1.0)
     if edge.vector:
@@ -84,7 +84,7 @@ def _path(edge: Edge) -> list[InboardJoint]:
 
 
 def path_positions(edge: Edge, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Positions of a path's chain for a pose in the world: origin [m], then quaternion or Cardan angles [rad]."""
+    """Return the positions of a path's chain at a pose in the world: origin [m], quaternion or Cardan angles [rad]."""
     if not any(edge.drives[3:]):
         return np.concatenate([p, joint_type("spherical").coordinates(R, p)])
     # R = Rx(a) Ry(b) Rz(c)

@@ -1,4 +1,4 @@
-"""Closing: from poses of links to some nearby in which all joints fit."""
+"""Closing of loops: from poses of links to nearby ones in which all joints fit."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-#: a start further from closed than this fraction of the mechanism's size is a mistake, not rounding
+#: residuals of the start above this fraction of the mechanism's size are an error of the scene, not rounding
 WORST_GUESS = 0.05
-#: gap [m] from which on a length may have been given in mm without a unit
-BARE = 1.0
-#: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end; where
-#: coordinates are large next to the mechanism, so many roundings of them if that is more
+#: gap [m] above which a length may have been given in mm without a unit
+LIKELY_MILLIMETRES = 1.0
+#: residuals, in units of the mechanism's size, below which nothing is moved, and at which closing may end; with large
+#: coordinates, so many roundings of these instead if that is more
 CLOSED_EXACTLY, CLOSED_ENOUGH = 1e-13, 1e-11
 EXACT_ROUNDINGS, CLOSED_ROUNDINGS = 4.0, 100.0
 CLOSING_ITERATIONS = 60
-#: least damping, as a fraction of the mean of the normal matrix: without any, that of redundant joints has no inverse
+#: least damping, as a fraction of the mean of the normal matrix, which is singular for redundant joints
 LEAST_DAMPING = 1e-15
-#: least cosine between axes that a joint keeps parallel
+#: least cosine of the angle between axes that a joint keeps parallel
 SAME_WAY = 0.5
-#: radius of gyration, as fraction of the mechanism's size, below which a link resists turning no less
+#: least radius of gyration that a link counts with, as a fraction of the mechanism's size
 LEAST_GYRATION = 0.01
 
 
@@ -39,8 +39,8 @@ LEAST_GYRATION = 0.01
 class Misfit:
     """Residuals of all joints: `values` scaled by the mechanism's size, shape (rows,).
 
-    blocks: of their gradient against the links' motions, shape (rows, columns), each with its first row and column;
-    what overlaps is added.
+    blocks: parts of their gradient with respect to the links' motions, (rows, columns), each with its first row and
+    column; overlapping parts are added.
     """
 
     values: np.ndarray
@@ -53,7 +53,7 @@ class Misfit:
         return float(np.max(np.abs(self.values), initial=0.0))
 
     def gradient(self) -> csr_array:
-        """Against the links' motions, shape (rows, columns); sparse, since a joint concerns two links."""
+        """Return the gradient by the links' motions, (rows, columns); sparse, since a joint concerns two links."""
         from scipy.sparse import csr_array  # slow to import, and most scenes give poses that fit
 
         placed = [(np.indices(block.shape).reshape(2, -1), row, column) for block, row, column in self.blocks]
@@ -70,20 +70,20 @@ def close(
     still: Collection[int] = (),
     within: float = 0.0,
 ) -> list[Placement] | None:
-    """Poses nearby, in the metric of the mass, in which all joints fit; None when there are none.
+    """Return nearby poses, in the metric of the mass, in which all joints fit; None when the iteration finds none.
 
-    still: links that are not moved.  within: largest residual with which they fit, in units of the mechanism's size;
-    by default what rounding leaves.
+    still: links that are not moved.  within: largest residual with which joints fit, in units of the mechanism's size;
+    by default that of rounding.
 
-    Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints ask for the
-    same thing twice (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
+    Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints impose a condition twice
+    (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
     """
     here, grain = list(poses), _rounding(mechanism)
     exact, closed = max(CLOSED_EXACTLY, EXACT_ROUNDINGS * grain), max(CLOSED_ENOUGH, CLOSED_ROUNDINGS * grain)
     now = misfit(mechanism, joints, here)
     if now.worst <= exact:
         return here
-    from scipy.sparse import diags_array, eye_array  # slow to import, as is what solves
+    from scipy.sparse import diags_array, eye_array  # slow to import, as is the solver
     from scipy.sparse.linalg import spsolve
 
     mobility = diags_array(_mobilities(mechanism, here, still))
@@ -106,16 +106,16 @@ def close(
 
 
 def _rounding(mechanism: Mechanism) -> float:
-    """Rounding of the largest coordinates of the scene, as a fraction of the mechanism's size."""
+    """Return the rounding of the largest coordinates of the scene, as a fraction of the mechanism's size."""
     reach = [mechanism.origin, *(link.start.p for link in mechanism.links)]
     reach += [frame.place.p for frame in mechanism.frames.values()]
     return float(np.finfo(float).eps * np.max(np.abs(reach)) / mechanism.length)
 
 
 def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Misfit:
-    """Residuals of all joints and driven coordinates.
+    """Return the residuals of all joints and driven coordinates.
 
-    Motions: per link but the ground its small rotation about its centre of mass, and that centre's displacement in
+    Motions, per link but the ground: its small rotation about its centre of mass, and the centre's displacement in
     units of the mechanism's size.
     """
     L = mechanism.length
@@ -139,7 +139,7 @@ def _centre(link: Link) -> np.ndarray:
 
 
 def _mobilities(mechanism: Mechanism, poses: Sequence[Placement], still: Collection[int]) -> np.ndarray:
-    """Inverse of mass and least principal moment of inertia per motion, shape (6 (links - 1),)."""
+    """Return the inverse of mass and least principal moment of inertia per motion, shape (6 (links - 1),)."""
     L, result = mechanism.length, []
     largest = max((link.mass for link in mechanism.links[1:]), default=1.0)
     for i, link in enumerate(mechanism.links[1:], start=1):
@@ -162,7 +162,7 @@ def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> li
 
 
 def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
-    """What is wrong about joints whose frames are far from fitting, if some are."""
+    """Return the error of the first joint whose frames are far from fitting, or None."""
     for joint in joints:
         demanded = joint.demands(poses)
         gap, turned = (
@@ -176,7 +176,7 @@ def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Seque
                 f"'{a}' and '{b}' start {gap:.3g} m apart, where a {joint.edge.kind} joint holds them together "
                 f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
                 "correct the poses of the bodies, or the frames"
-                + ("; bare numbers are in metres" if gap >= BARE else ""),
+                + ("; bare numbers are in metres" if gap >= LIKELY_MILLIMETRES else ""),
             )
         if turned > WORST_GUESS:
             return InputError(
@@ -189,7 +189,7 @@ def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Seque
 
 
 def opposite(joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
-    """What is wrong about axes that a joint keeps parallel, if some face each other; coordinates count about them."""
+    """Return the error of the first axes that a joint keeps parallel but that point in opposite directions, or None."""
     for joint in joints:
         A, B = joint.frames(poses)
         pairs = joint_type(joint.edge.kind).ROTATIONS

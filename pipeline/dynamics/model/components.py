@@ -1,4 +1,4 @@
-"""Independent mechanisms of a scene: links between which no joint, contact, load or gear acts share no force."""
+"""Independent mechanisms of a scene: no joint, contact, load or gear acts between them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.schema import Scene
 
-#: a number of each independent mechanism
+#: one number per independent mechanism
 Floors = Sequence[float] | np.ndarray
 #: an error group: floor, number of variables, independent mechanism
 Group = tuple[float, int, int]
@@ -17,9 +17,9 @@ Group = tuple[float, int, int]
 
 @dataclass(frozen=True)
 class Components:
-    """The independent mechanisms of a scene, in the order of their first links.
+    """Independent mechanisms of a scene, in the order of their first links.
 
-    of_link: number of the one that each link belongs to, -1 of the ground.  frames: of each, those that its joints,
+    of_link: index of the mechanism of each link, -1 for the ground.  frames: of each mechanism, those that its joints,
     loads and paths name.  lengths: sizes [m].
     """
 
@@ -28,12 +28,12 @@ class Components:
     lengths: tuple[float, ...] = ()
 
     def of(self, *links: int) -> int:
-        """The one to which a part between some links belongs, of which the ground may be one."""
+        """Return the independent mechanism of a part between some links, one of which may be the ground."""
         return max([0, *(self.of_link[link] for link in links)])
 
 
 def joined(scene: Scene) -> list[tuple[str, ...]]:
-    """Frames between which each part of a scene acts: joints, loads, gears and paths."""
+    """Return the frames between which each part of a scene acts: joints, loads, gears and paths."""
 
     def of_joints(*names: str) -> tuple[str, ...]:
         return tuple(frame for name in names if name in scene.joint for frame in scene.joint[name].between)
@@ -49,9 +49,9 @@ def joined(scene: Scene) -> list[tuple[str, ...]]:
 
 
 def components(scene: Scene, parents: Sequence[int], link_of: Mapping[str, int]) -> Components:
-    """The independent mechanisms, without their sizes.
+    """Return the independent mechanisms, without their sizes.
 
-    parents: of each link in the tree, -1 of the ground.  link_of: the link of each body.
+    parents: of each link in the tree, -1 for the ground.  link_of: the link of each body.
     """
     root = list(range(len(parents)))
 

@@ -1,4 +1,4 @@
-"""What joints and drives demand of the poses of links, and what they leave free."""
+"""Constraints that joints and drives impose on the poses of links: residuals, wrenches, free motions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
-from flexclear.pipeline.dynamics.model.laws import NONE, drive_laws
+from flexclear.pipeline.dynamics.model.laws import NO_LAWS, drive_laws
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
@@ -19,10 +19,10 @@ from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
 
 class Demands(NamedTuple):
-    """Residuals (n,) [m or -], and the wrenches (n, 6) (moment about the origin, force) that resist them.
+    """Residuals (n,) [m or -] of a joint, and the wrenches (n, 6) (moment about the origin, force) that resist them.
 
-    A wrench times the twist of B relative to A (angular velocity; velocity of the point at the origin) is the
-    residual's rate.
+    The rate of a residual is its wrench times the twist of B relative to A (angular velocity; velocity of the point at
+    the origin).
     """
 
     residuals: np.ndarray
@@ -30,7 +30,7 @@ class Demands(NamedTuple):
 
     @property
     def turning(self) -> np.ndarray:
-        """Whether each is an angle, not a length, shape (n,)."""
+        """True for each residual that is an angle, not a length, shape (n,)."""
         return ~np.any(self.wrenches[:, 3:] != 0.0, axis=1)
 
 
@@ -38,7 +38,7 @@ class Demands(NamedTuple):
 class Constraint:
     """A joint between frames on two links.
 
-    values: where coordinates are at the start, by number: those that drives prescribe, and those that the scene gives.
+    values: prescribed start values of coordinates, by number: from drives, and from the scene's start.
     """
 
     edge: Edge
@@ -54,19 +54,19 @@ class Constraint:
         return self.edge.name
 
     def demands(self, poses: Sequence[Placement]) -> Demands:
-        """What it demands, its drives left out."""
+        """Return residuals and wrenches of the joint, without those of its drives."""
         return demands(self.edge.kind, *self.frames(poses))
 
     def prescribed(self, poses: Sequence[Placement]) -> Demands:
-        """The same of those of its coordinates that have `values`."""
+        """Return residuals and wrenches of the coordinates that have prescribed `values`."""
         return prescribed(self.edge.kind, *self.frames(poses), self.values)
 
     def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
-        """Both frames in the world, from the poses of all links."""
+        """Return both frames in the world, from the poses of all links."""
         return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
 
     def coordinates(self, poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
-        """Where its named coordinates are [m or rad], by its name and their numbers."""
+        """Return the joint coordinates [m or rad], by the joint's name and their numbers."""
         A, B = self.frames(poses)
         declared, relative = joint_type(self.edge.kind), A.inverse().of(B)
         now = declared.coordinates(relative.R, relative.p)
@@ -74,11 +74,11 @@ class Constraint:
 
 
 def constraints(
-    mechanism: Mechanism, given: Mapping[str, Pieces] = NONE, starts: Sequence[Given] = ()
+    mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, starts: Sequence[Given] = ()
 ) -> list[Constraint]:
-    """All joints but contacts and paths: those of the tree in the order of its links, then the closures.
+    """Return all joints but contacts and paths: those of the tree in the order of its links, then the closures.
 
-    given: laws that replace the scene's.  starts: coordinates whose positions hold besides.
+    given: laws that replace the scene's.  starts: coordinates whose positions are prescribed as well.
     """
     t = mechanism.scene.time.start
     laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
@@ -96,13 +96,13 @@ def constraints(
 
 
 def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
-    """A link's own side of its inboard joint, in the link's frame."""
+    """Return the placement of a link's inboard joint on the link itself, in the link's frame."""
     frame = link.branch.frame
     return Placement() if frame is None or not link.flexible else start_place(mechanism, mechanism.site(frame))
 
 
 def demands(kind: str, A: Placement, B: Placement) -> Demands:
-    """What a joint demands of its two frames."""
+    """Return residuals and wrenches of a joint between two frames, without its drives."""
     declared = joint_type(kind)
     residuals, wrenches = [], []
     for k in declared.TRANSLATIONS:
@@ -116,7 +116,7 @@ def demands(kind: str, A: Placement, B: Placement) -> Demands:
 
 
 def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> Demands:
-    """The same for the driven coordinates of a joint."""
+    """Return residuals and wrenches of those coordinates of a joint that have prescribed values."""
     declared, relative = joint_type(kind), A.inverse().of(B)
     now = declared.coordinates(relative.R, relative.p)
     residuals, wrenches = [], []
@@ -133,16 +133,16 @@ def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """Vector product; numpy's own costs fifty times as much for one pair, and there are thousands."""
+    """Return the vector product; numpy's own costs fifty times as much for one pair, and thousands are needed."""
     ax, ay, az = a.tolist()
     bx, by, bz = b.tolist()
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def freedoms(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
-    """What a joint leaves free of the motion of B relative to A: axes of turns about B's origin, and of slides.
+    """Return free motions of B relative to A: axes of rotations about B's origin (turns, 3), and of slides (slides, 3).
 
-    Shapes (turns, 3) and (slides, 3), orthonormal each; turns come first in the joint's speeds.
+    Both sets are orthonormal; rotations come first in the joint's speeds.
     """
     declared, (_, wrenches) = joint_type(kind), demands(kind, A, B)
     turning = wrenches[len(declared.TRANSLATIONS) :, :3]

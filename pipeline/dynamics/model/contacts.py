@@ -1,4 +1,4 @@
-"""The tables of the contacts: wiring, numbers of their laws, and their variables in the state."""
+"""Tables of the contacts: topology, numbers of their laws, and their variables in the state."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
-    from flexclear.pipeline.dynamics.model.model import Model
 
-#: least impact rates where the scene gives none: far below the approach speeds of common machines [m/s or rad/s], and
-#: the fraction of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
+#: default impact floor, far below approach speeds in common machines [m/s or rad/s]; and its ratio to the size of a
+#: mechanism of 10 cm [1/s]: in a mechanism of micrometres 1 um/s would be fast
 LEAST_RATE, SLOW_IMPACT = 1e-6, 1e-5
-#: wiring of a contact but for the kinds of its laws
-Touching = Sequence[tuple[int, int]]
+#: (outer site, inner site) of each contact
+SitePairs = Sequence[tuple[int, int]]
 
 
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
-    """The normal law of every contact with its numbers; InputError for a law that cannot be had."""
+    """Return the normal law of each contact with its numbers; raise InputError for a law with impossible values."""
     return tuple(_resolve(mechanism, contact) for contact in mechanism.contacts)
 
 
 def fill(
-    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching, gauges: Gauges, slot: int
+    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], site_pairs: SitePairs, gauges: Gauges, slot: int
 ) -> dict[Any, Any]:
-    """The tables CONTACTS and CONTACT_NUMBERS, given (outer site, inner site) of every contact.
+    """Return the tables CONTACTS and CONTACT_NUMBERS.
 
-    gauges: take those of the stops.  slot: of the first bristles in the ledger.
+    site_pairs: (outer, inner) sites of each contact.  gauges: receives those of the stops.  slot: ledger index of the
+    first bristles.
     """
     mechanism, rows, reals, first = numbering.mechanism, [], [], numbering.nq + numbering.nv + slot
-    for contact, law, sites in zip(mechanism.contacts, laws, touching, strict=True):
+    for contact, law, sites in zip(mechanism.contacts, laws, site_pairs, strict=True):
         name, joint, *_ = contact
         length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
@@ -64,12 +64,12 @@ def fill(
 
 
 def part_of(mechanism: Mechanism, contact: Contact) -> int:
-    """The independent mechanism that a contact belongs to."""
+    """Return the number of the independent mechanism that a contact belongs to."""
     return mechanism.components.of(contact.outer.link, contact.inner.link)
 
 
 def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> dict[str, list[Group]]:
-    """Error groups of the contacts' variables in the ledger and of their bristles (`model.filling.blocks`)."""
+    """Return error groups of the contacts' variables in the ledger and of their bristles (`model.filling.blocks`)."""
     parts, ledger = [part_of(mechanism, contact) for contact in mechanism.contacts], list[Group]()
     for part in parts:
         floors = {"damping": energies, "friction": energies, "impulse": np.divide(energies, lengths)}  # [J], [N s]
@@ -80,19 +80,19 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> dict[str,
 
 
 def _floor(joint: Clearance | End, length: float) -> float:
-    """Least impact rate of a contact of a mechanism of that size [m/s or rad/s]."""
+    """Return the least impact rate of a contact [m/s or rad/s]; length: size of its mechanism [m]."""
     if joint.floor is not None:
         return joint.floor
     return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW_IMPACT * length)
 
 
 def friction_law(name: str, joint: Any) -> Any:
-    """The friction law of a joint that has one."""
+    """Return the friction law of a joint with friction."""
     return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
 def bristle(name: str, joint: Any) -> float | None:
-    """Size of the bristles of a joint's friction [m]; None without."""
+    """Return the size of the bristles of a joint's friction [m]; None for a law without bristles."""
     if joint.friction is None:
         return None
     size: float | None = friction_law(name, joint).bristle(joint.friction)
@@ -116,12 +116,12 @@ def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
 
 
 def _reduced_mass(masses: Sequence[float]) -> float | None:
-    """Of the links on both sides [kg], the ground's (0 here) being infinite; None when both are."""
+    """Return the reduced mass of the links on both sides [kg]; 0 means the ground, infinite. None when both are."""
     inverse = sum(1.0 / mass for mass in masses if mass > 0.0)
     return 1.0 / inverse if inverse > 0.0 else None
 
 
-def arms(model: Model) -> np.ndarray:
-    """By what a gap of each contact is multiplied to be a length: 1, or the size [m] of ends of turning coordinates."""
-    turning = [getattr(contact.joint, "coordinate", None) for contact in model.contacts]
-    return np.array([model.length if one is not None and one.turning else 1.0 for one in turning])
+def arms(mechanism: Mechanism) -> np.ndarray:
+    """Return the factor that makes each contact's gap a length: 1, or the size [m] for ends of angles."""
+    turning = [getattr(contact.joint, "coordinate", None) for contact in mechanism.contacts]
+    return np.array([mechanism.length if one is not None and one.turning else 1.0 for one in turning])

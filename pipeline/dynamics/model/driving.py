@@ -1,4 +1,4 @@
-"""Which coordinates are prescribed; what can be wrong about naming them."""
+"""Prescribed coordinates of a scene, and validation of the names by which scenes refer to coordinates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A prescribed coordinate: its name in records, its law, what the law's values measure, where it is."""
+    """A prescribed coordinate: its name in records, its law, the dimension of the law's values, and its key path."""
 
     name: str
     law: Any
@@ -28,12 +28,12 @@ class Prescribed:
 
 @cache
 def joint_type(kind: str) -> Any:
-    """What declares a joint type; asked for some hundred times per link while a mechanism is built."""
+    """Return the declaration of a joint type; cached: building a mechanism needs it some hundred times per link."""
     return lookup(JOINTS, kind, where="joint")
 
 
 def measured(value: Any, dimension: str, path: str) -> float:
-    """A number of a scene in SI; InputError, placed at `path`, for one of another dimension."""
+    """Return a number of a scene in SI; raise InputError at `path` for another dimension."""
     try:
         return quantity(value, dimension)
     except ValueError as error:
@@ -41,13 +41,13 @@ def measured(value: Any, dimension: str, path: str) -> float:
 
 
 def label(joint: str, kind: str, k: int) -> str:
-    """Name in records and in ``[start.joint]`` of coordinate k of a joint of some type."""
+    """Return the name, in records and in ``[start.joint]``, of coordinate k of a joint of some type."""
     declared: tuple[Coordinate, ...] = joint_type(kind).COORDINATES
     return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
 
 
 def prescribed(scene: Scene) -> list[Prescribed]:
-    """All prescribed coordinates, in the order of the scene."""
+    """Return all prescribed coordinates, in the order of the scene."""
     coordinates = []
     for name, drive in scene.drive.items():
         if isinstance(drive, PathDrive):
@@ -61,7 +61,7 @@ def prescribed(scene: Scene) -> list[Prescribed]:
 
 
 def coordinate_of(scene: Scene, joint: str, name: str | None, path: str) -> tuple[str, int, Coordinate]:
-    """The joint's name, and number and declaration of the coordinate that something names."""
+    """Return joint name, and number and declaration of the named coordinate; raise InputError for unknown names."""
     if joint not in scene.joint:
         raise InputError(f"{path[:-1]}.joint]", f"there is no joint '{joint}'", suggestion(joint, scene.joint))
     kind = scene.joint[joint].type
@@ -93,16 +93,16 @@ def coordinate_of(scene: Scene, joint: str, name: str | None, path: str) -> tupl
 
 
 def named_coordinate(scene: Scene, text: str, path: str) -> tuple[str, Coordinate]:
-    """The joint and coordinate that ``A`` or ``A.rotation`` names; InputError when there is none."""
+    """Return the joint and coordinate that ``A`` or ``A.rotation`` names; raise InputError when neither exists."""
     joint, _, coordinate = text.partition(".")
     try:
         return joint, coordinate_of(scene, joint, coordinate or None, path)[2]
-    except InputError as error:  # the joint and its coordinate are in one text here
+    except InputError as error:  # one text names joint and coordinate
         raise InputError(path, error.problem, error.remedy) from None
 
 
 def joint_drives(scene: Scene) -> dict[str, tuple[str | None, ...]]:
-    """Driven joint -> the drive of each of its coordinates, or None."""
+    """Return, for each driven joint, the drive of each of its coordinates, or None; raise InputError for two of one."""
     driven: dict[str, tuple[str | None, ...]] = {}
     for name, drive in scene.drive.items():
         if isinstance(drive, PathDrive):

@@ -1,4 +1,4 @@
-"""What effects add to a model: blocks of the ledger and tables, next to those of contacts and loads."""
+"""Blocks of the ledger and tables that effects add to a model, next to those of contacts and loads."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
-#: what loads add to the ledger: work done, energy lost
+#: number of ledger entries of loads: work done, energy lost
 LOADS = 2
-#: of an independent mechanism that is not the first one: work of drives, loss of modal damping, work and loss of loads
+#: entries of each independent mechanism but the first: work of drives, loss of modal damping, work and loss of loads
 OTHER_BOOKS = 4
 
 
 def blocks(mechanism: Mechanism, parts: Parts, energies: Floors, lengths: Floors) -> dict[str, list[Group]]:
-    """The error groups of each block of the ledger, in the order of the state: those of effects by their names.
+    """Return the error groups of each block of the ledger, in the order of the state; effects have blocks by name.
 
     energies, lengths: floors of each independent mechanism.
     """
@@ -39,16 +39,16 @@ def blocks(mechanism: Mechanism, parts: Parts, energies: Floors, lengths: Floors
 
 
 def slots(mechanism: Mechanism, parts: Parts) -> dict[str, int]:
-    """The index in the ledger at which each block begins, and the ledger's `end`."""
+    """Return the index in the ledger at which each block begins, and the ledger's `end`."""
     ones = np.ones(len(mechanism.components.lengths))
     counts = {name: sum(n for _, n, _ in groups) for name, groups in blocks(mechanism, parts, ones, ones).items()}
     return dict(zip([*counts, "end"], accumulate(counts.values(), initial=0), strict=True))
 
 
 class Filling(NamedTuple):
-    """What effects fill their tables from.
+    """Data from which effects fill their tables.
 
-    closures: as the table CLOSURES has them.  gauges: take those of the effects.  slots: see the function.
+    closures: in the order of the table CLOSURES.  gauges: receives those of the effects.  slots: see the function.
     """
 
     numbering: Numbering
@@ -59,7 +59,7 @@ class Filling(NamedTuple):
 
 
 def tables(filling: Filling) -> dict[Any, Any]:
-    """Rows of the tables of all effects; those of effects that the mechanism lacks are empty."""
+    """Return the tables of all effects; those of effects that the mechanism lacks are empty."""
     filled: dict[Any, Any] = {m.NAMED[name]: () for name in m.OF_EFFECTS if m.ARRAYS[name] != "w"}
     for fill in filling.parts.functions("fill"):
         filled |= {m.NAMED[name]: rows for name, rows in fill(filling).items()}

@@ -1,4 +1,4 @@
-"""Frames that are known only to a tolerance, as those of meshed bodies, moved so that joints fit that nearly do."""
+"""Fitting of frames known only to a tolerance, as those of meshed bodies, so that nearly fitting joints fit."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from flexclear.pipeline.dynamics.model.constraints import Constraint, demands
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 
-#: steps of Newton's method for the frame of a joint, which converge quadratically from what a mesh leaves
+#: steps of Newton's method for the frame of a joint; they converge quadratically from the errors of a mesh
 NEWTON_STEPS = 5
 
 
 def fitted(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Scene | None:
-    """The scene with the frames of bodies moved by the least that lets joints fit which nearly do.
+    """Return the scene with frames of bodies moved by the least amount that lets nearly fitting joints fit.
 
     joints, poses: of the mechanism, which cannot be closed.  None where frames would move beyond their tolerance.
     """
@@ -28,7 +28,8 @@ def fitted(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
     if not tolerances or not mechanism.all_rigid:
         return None
     best = close(mechanism, joints, poses, within=max(tolerances.values()) / mechanism.length)
-    # the least misfit is spread over all joints: those between exact frames fit again, the others take all of it
+    # the least-squares misfit is spread over all joints; closing those between exact frames gives the rest to the
+    # others
     loose = [any(f.partition(".")[0] in tolerances for f in (j.edge.frame_a, j.edge.frame_b)) for j in joints]
     exact_joints = [joint for joint, moves in zip(joints, loose, strict=True) if not moves]
     best = None if best is None else close(mechanism, exact_joints, best)
@@ -54,7 +55,7 @@ def fitted(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
 
 
 def _met(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
-    """The joint's second frame in the world, or its first one, moved by the least that makes the joint fit."""
+    """Return a joint's second (`far`) or first frame in the world, moved by the least that makes the joint fit."""
     A, B = joint.frames(poses)
     for _ in range(NEWTON_STEPS):
         residual, wrench = demands(joint.edge.kind, A, B)
@@ -67,7 +68,7 @@ def _met(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
 
 
 def changed(before: Scene, after: Scene) -> str:
-    """A sentence about the frames that were moved."""
+    """Return a sentence that lists bodies whose frames were moved, with amounts."""
     away = {
         body: max(float(np.linalg.norm(np.subtract(new.position, old.frames[frame].position))) for frame, new in frames)
         for body, old in before.rigid().items()

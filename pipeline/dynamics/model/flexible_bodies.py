@@ -1,4 +1,4 @@
-"""Tables of the flexible bodies, from their bundles; how their points move with the modes."""
+"""Tables of the flexible bodies from their bundles; motion of points on these bodies with the modes."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 
 def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
-    """The tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies.
+    """Return the tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies.
 
-    losses: place in the ledger of what damping loses in each independent mechanism.
+    losses: ledger index of the energy that modal damping dissipates, of each independent mechanism.
     """
     flex, flex_real, ends = list[tuple[int, ...]](), list[list[float]](), list[int]()
     data, index, value, interface = list[float](), list[int](), list[float](), list[float]()
@@ -74,17 +74,18 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
 
 
 def _body(mechanism: Mechanism, link: int) -> tuple[str, Labelled]:
-    """Name and bundle of a flexible link's body."""
+    """Return name and bundle of a flexible link's body."""
     name, bundle = mechanism.links[link].flexible, mechanism.links[link].bundle
     assert name is not None
     assert bundle is not None
     return name, bundle
 
 
-def bow(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray | None:
-    """Shortening of a bent body per pair of modes at a frame [1/(kg m)], or its first moment [1/m]; shape (mode, mode).
+def shortening(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray | None:
+    """Return a bent body's shortening per pair of modes at a frame [1/(kg m)], or first moment [1/m]; (mode, mode).
 
-    link: a flexible one.  frame: its name in the bundle.  None where the scene does not ask for it.
+    link: a flexible one.  frame: its name in the bundle, None for the first moment.  None without stiffening in the
+    scene.
     """
     body, bundle = _body(mechanism, link)
     if mechanism.scene.flexible()[body].stiffening is None:
@@ -101,16 +102,16 @@ def bow(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray
 
 
 def shift(
-    shape: np.ndarray, bow: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
+    shape: np.ndarray, shortening: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    r"""Displacement :math:`S q + \tfrac12 q^T B q\, e_x` of a point in the body frame, and its two rates.
+    r"""Return displacement :math:`S q + \tfrac12 q^T B q\, e_x` of a point in the body frame, and its two rates.
 
-    shape: S, (3, mode).  bow: B, (mode, mode), the shortening of a bent beam; None where the scene leaves it out.
+    shape: S, (3, mode).  shortening: B of a bent beam, (mode, mode); None where the scene leaves it out.
     q, u, du: modal coordinates, rates and second rates, (time, mode).
     """
     displacement, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
-    if bow is not None:
-        bent, turning = q @ bow, u @ bow
+    if shortening is not None:
+        bent, turning = q @ shortening, u @ shortening
         displacement[:, 0] += 0.5 * np.sum(bent * q, axis=1)
         rate[:, 0] += np.sum(bent * u, axis=1)
         second[:, 0] += np.sum(bent * du, axis=1) + np.sum(turning * u, axis=1)
@@ -118,7 +119,7 @@ def shift(
 
 
 def _damping(name: str, body: FlexibleBody, bundle: Labelled) -> np.ndarray:
-    """Damping 2 zeta omega of every mode [1/s]; InputError when ratios and modes differ in number."""
+    """Return damping 2 zeta omega of each mode [1/s]; raise InputError when ratios and modes differ in number."""
     square = np.diag(bundle["modal_stiffness"].values)
     given = body.damping
     if isinstance(given, Rayleigh):
@@ -134,14 +135,14 @@ def _damping(name: str, body: FlexibleBody, bundle: Labelled) -> np.ndarray:
 
 
 def _forms(mechanism: Mechanism, link: int, n: int) -> list[np.ndarray]:
-    """Int rho B and int rho x B (n n each) of a body, zeros where it does not ask for stiffening."""
-    first = bow(mechanism, link)
+    """Return int rho B and int rho x B of a body, n n entries each; zeros for a body without stiffening."""
+    first = shortening(mechanism, link)
     second = None if first is None else _body(mechanism, link)[1]["shortening_second_moment"].values
     return [np.zeros(n * n) if form is None else form.ravel() for form in (first, second)]
 
 
 def _data(bundle: Labelled, damping: np.ndarray) -> np.ndarray:
-    """C1 (3n), E (9n), modal mass (n n), stiffness omega^2 (n), damping 2 zeta omega (n).
+    """Return C1 (3n), E (9n), modal mass (n n), stiffness omega^2 (n), damping 2 zeta omega (n).
 
     The coordinates of a bundle are mass-normalised eigenmodes of its reduced matrices.
     """
@@ -157,7 +158,7 @@ def _data(bundle: Labelled, damping: np.ndarray) -> np.ndarray:
 
 
 def _interface_data(bundle: Labelled, basis: InterfaceBasis) -> np.ndarray:
-    """C1 (3n), modal mass (n n) and stiffness (n n) in the interface basis."""
+    """Return C1 (3n), modal mass (n n) and stiffness (n n) in the interface basis."""
     T, mass = basis.matrix, bundle["modal_mass"].values
     mixed = mass if mass_coupled(bundle) else np.diag(np.diag(T.T @ np.diag(np.diag(mass)) @ T))
     stiffness = T.T @ (np.diag(bundle["modal_stiffness"].values)[:, None] * T)
@@ -165,7 +166,7 @@ def _interface_data(bundle: Labelled, basis: InterfaceBasis) -> np.ndarray:
 
 
 def _moments(bundle: Labelled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nonzero int rho S_ki S_lj, row (3k + l) n + j after row: values, modes i, and per row how many end with it."""
+    """Return nonzero int rho S_ki S_lj by row (3k + l) n + j: values, modes i, and the end of each row among them."""
     F = bundle["mode_mode_moment"].values
     n = F.shape[-1]
     k, l, i, j = np.nonzero(np.abs(F) > NO_COUPLING * max(np.abs(F).max(), 1e-300))
@@ -175,31 +176,31 @@ def _moments(bundle: Labelled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _inboard_frame(mechanism: Mechanism, link: int) -> str | None:
-    """Name in the bundle of the frame by which a flexible link hangs in the tree; None for a free body."""
+    """Return the bundle's name of a flexible link's inboard frame; None for a body without joint in the tree."""
     frame = mechanism.links[link].branch.frame
     return None if frame is None else frame.partition(".")[2]
 
 
 def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
-    """Whether modes move the frame by which a flexible link hangs in the tree."""
+    """Return True when modes move the inboard frame of a flexible link."""
     frame = _inboard_frame(mechanism, link)
     if frame is None:
         return False
     _, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
-    drawn = bow(mechanism, link, frame)
-    return any(np.any(shape) for shape in [*shapes, *([] if drawn is None else [drawn])])
+    at_frame = shortening(mechanism, link, frame)
+    return any(np.any(shape) for shape in [*shapes, *([] if at_frame is None else [at_frame])])
 
 
 def coupled(mechanism: Mechanism, link: int) -> bool:
-    """Whether modes of a flexible link share entries of the mass matrix of its own.
+    """Return True when modes of a flexible link have common entries in its own block of the mass matrix.
 
-    They do where they move the frame by which it hangs in the tree, and with it the whole body.
+    They have where they move the inboard frame, and with it the whole body.
     """
     return _inboard_moves(mechanism, link) or mass_coupled(_body(mechanism, link)[1])
 
 
 def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any], list[float]]:
-    """Ports of sites first, then one inboard port per flexible link (`Numbering.port_of_inboard`)."""
+    """Return the tables of ports: of sites, then one per flexible link's own frame (`Numbering.port_of_inboard`)."""
     mechanism = numbering.mechanism
     rows, reals, data = list[Any](), list[Any](), list[float]()
     ports = [(numbering.sites[p.site].link, p.frame.partition(".")[2], p.column) for p in numbering.ports]
@@ -211,8 +212,8 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
             pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
         chunks: list[np.ndarray] = [(shape @ numbering.bases[link].moving).ravel() for shape in shapes]
         if shortened:
-            drawn = None if frame is None else bow(mechanism, link, frame)
-            chunks.append(np.zeros(n * n) if drawn is None else drawn.ravel())
+            at_frame = None if frame is None else shortening(mechanism, link, frame)
+            chunks.append(np.zeros(n * n) if at_frame is None else at_frame.ravel())
         rows.append((numbering.flexible.index(link), column, len(data)))
         reals.append(pose)
         data += np.concatenate(chunks).tolist()
@@ -220,12 +221,12 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
 
 
 def start_place(mechanism: Mechanism, site: Site) -> Placement:
-    """A site in the frame of its link, moved by the deformation with which the scene lets its body begin."""
+    """Return a site's placement in its link, moved by the deformation that the scene gives the body at the start."""
     q, bundle = mechanism.deformation.get(site.link), mechanism.links[site.link].bundle
     if q is None or bundle is None or site.frame is None:
         return site.place
     label = site.frame.partition(".")[2]
     _, moves, turns = frame_shapes(bundle, label)
     rest = np.zeros((1, len(q)))
-    shifted, _, _ = shift(moves, bow(mechanism, site.link, label), q[None], rest, rest)
+    shifted, _, _ = shift(moves, shortening(mechanism, site.link, label), q[None], rest, rest)
     return Placement(site.place.p + shifted[0], rotation_vector_to_matrix(turns @ q) @ site.place.R)

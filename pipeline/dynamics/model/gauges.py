@@ -1,4 +1,4 @@
-"""The table of the gauges, which measure joint coordinates, and the internal states of parts."""
+"""Table of the gauges, which measure joint coordinates, and the internal states of parts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
 @dataclass
 class Gauges:
-    """Gauges and internal states given out so far.
+    """Gauges and internal states, in the order in which they were added.
 
-    rows: of the table GAUGES.  owners: sites, or -1, between which the part of each internal state acts; these states
-    are at the end of the state.
+    rows: of the table GAUGES.  owners: sites, or -1 for the world, between which the part of each internal state acts.
+    Internal states are at the end of the state.
     """
 
     rows: list[tuple[int, ...]] = field(default_factory=list)
@@ -27,21 +27,21 @@ class Gauges:
         return len(self.owners)
 
     def add(self, a: int, b: int, coordinate: Coordinate, *, counts: bool) -> int:
-        """Number of a new gauge of a joint coordinate between sites; `counts`: whether full turns of an angle count."""
+        """Add a gauge of a joint coordinate between sites, return its index; counts: count full turns of an angle."""
         turns = self.states(1, a, b) if counts and coordinate.turning else -1
         how = (coordinate.side, coordinate.axis, *coordinate.sine, *coordinate.cosine)
         self.rows.append((a, b, turns, int(coordinate.turning), *how))
         return len(self.rows) - 1
 
     def states(self, number: int, a: int, b: int) -> int:
-        """First of so many new internal states of a part between sites."""
+        """Add `number` internal states of a part between sites a and b; return the index of the first."""
         first = self.internal
         self.owners += [(a, b)] * number
         return first
 
 
 def angles(gauges: np.ndarray, sites: np.ndarray) -> dict[int, float]:
-    """Angle [rad] in (-pi, pi] of every gauge that counts turns, by its internal state.
+    """Return the angle [rad] in (-pi, pi] of each gauge that counts turns, by its internal state.
 
     gauges: rows of GAUGES; sites: frames of all sites, rows of SITE_FRAMES; both with named fields.
     """
@@ -51,7 +51,7 @@ def angles(gauges: np.ndarray, sites: np.ndarray) -> dict[int, float]:
 
 
 def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[float]:
-    """Coordinates [rad, or m] that gauges measure, full turns counted as the internal states say; as of `angles`."""
+    """Return the coordinates [rad or m] of gauges, with full turns from internal states; arguments as of `angles`."""
     entries = []
     for row in gauges:
         a, b = sites[row["a"]], sites[row["b"]]

@@ -1,4 +1,4 @@
-"""What a scene says of its start, against what its drives and joints make of it: refused, or mended and reported."""
+"""Contradictions between the start that a scene gives and its drives and joints: refused, or corrected and reported."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
-#: a start further from its drive's law than this, as fraction of the mechanism's size or in rad, is a contradiction
+#: a start that is further from its drive's law than this is refused, as a fraction of the mechanism's size and in rad
 FAR_FROM_LAW, FAR_ANGLE = 0.05, 0.1
-#: what is moved by less than this, as fraction of the mechanism's size or in rad, was given as well as it was written
-WRITTEN = 1e-6
-#: most bodies of which a mend is reported one by one
+#: corrections below this, as a fraction of the mechanism's size or in rad, come from the digits that were written
+INPUT_DIGITS = 1e-6
+#: largest number of bodies whose correction is reported one by one
 MOST_REPORTED = 8
 
 
 @dataclass(frozen=True)
-class Miss:
-    """A coordinate whose start, in the poses given, is not where a drive's law or the scene starts it [m or rad].
+class Contradiction:
+    """A coordinate whose value `now` in the given poses is not the `value` of a drive's law or of the scene [m or rad].
 
-    rule: what starts it at `value`, in words.  drive: its drive, or nothing.
-    of_path: the coordinate is one of a path, not of a joint.
+    rule: name of what prescribes `value`.  drive: its drive, or None.
+    of_path: True for a coordinate of a path, not of a joint.
     """
 
     drive: str | None
@@ -48,12 +48,12 @@ class Miss:
 
     @property
     def size(self) -> float:
-        """Difference of the two; angles that differ by whole turns are one."""
+        """Absolute difference of the two values [m or rad]; angles are compared modulo full turns."""
         difference = self.now - self.value
         return abs((difference + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(difference)
 
     def text(self) -> str:
-        """What is given, and what the law says."""
+        """Return a sentence with both values and their difference."""
         unit = "rad" if self.turning else "m"
         return (
             f"{self.what} starts at {_written(self.now)} {unit} in the poses given, and at "
@@ -63,20 +63,20 @@ class Miss:
 
 
 def _written(value: float) -> str:
-    """A coordinate [m or rad] in words; rounding of poses is nought."""
+    """Return a coordinate [m or rad] as text; values below 1e-12 are rounding and become 0."""
     return f"{0.0 if abs(value) < 1e-12 else value:.6g}"
 
 
-def misses(
+def contradictions(
     mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement], given: Mapping[str, Pieces]
-) -> list[Miss]:
-    """Starts of coordinates against the poses that the scene gives; a body without a pose contradicts nothing.
+) -> list[Contradiction]:
+    """Return coordinates whose prescribed start contradicts the given poses; bodies without a pose are not examined.
 
     given: laws that replace the scene's; they were made for these poses and are not examined.
     """
     placed = given_links(mechanism)
     driven = [joint for joint in joints if joint.values and {joint.link_a, joint.link_b} <= placed]
-    collected = [miss for joint in driven for miss in _of_joint(joint, poses)]
+    collected = [contradiction for joint in driven for contradiction in _of_joint(joint, poses)]
     for link in mechanism.links:
         edge = link.branch.edge
         if edge is None or edge.kind != PATH or link.massless:
@@ -84,11 +84,11 @@ def misses(
         site = mechanism.site(edge.frame_b)
         if site.link in placed:
             collected += _of_path(mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given)
-    return [miss for miss in collected if miss.drive not in given]
+    return [contradiction for contradiction in collected if contradiction.drive not in given]
 
 
 def given_links(mechanism: Mechanism) -> set[int]:
-    """Links whose pose the scene gives, the ground among them."""
+    """Return the links whose pose the scene gives, and the ground."""
     bodies = mechanism.scene.body
     return {0} | {
         i
@@ -97,7 +97,7 @@ def given_links(mechanism: Mechanism) -> set[int]:
     }
 
 
-def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
+def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Contradiction]:
     now, kind = joint.coordinates(poses), joint.edge.kind
     differences = joint.prescribed(poses).residuals
     for (k, value), difference in zip(joint.values.items(), differences, strict=True):
@@ -108,10 +108,10 @@ def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
         start = value + float(difference) if coordinate.turning else now[joint.name, k]
         path = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
         rule = f"the law of drive '{drive}'" if drive else "its own start"
-        yield Miss(drive, path, rule, what, start, value, coordinate.turning)
+        yield Contradiction(drive, path, rule, what, start, value, coordinate.turning)
 
 
-def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]) -> Iterator[Miss]:
+def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]) -> Iterator[Contradiction]:
     t = mechanism.scene.time.start
     laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
     now = path_positions(edge, G.R, G.p + mechanism.origin)
@@ -121,36 +121,36 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
         angle = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
         drive, what = str(edge.drives[3]), f"the turn of '{edge.frame_b}'"
         path = f"[drive.{drive.partition('.')[0]}.rotation]"
-        yield Miss(drive, path, f"the law of drive '{drive}'", what, angle, 0.0, True, True)
+        yield Contradiction(drive, path, f"the law of drive '{drive}'", what, angle, 0.0, True, True)
     for k, (name, value) in enumerate(zip(edge.drives, requested, strict=True)):
         if name is None or value is None or (edge.vector and k >= 3):
             continue
         rule, what = f"the law of drive '{name}'", f"'{edge.frame_b}'"
-        yield Miss(name, f"[drive.{name}]", rule, what, float(now[k]), value, k >= 3, True)
+        yield Contradiction(name, f"[drive.{name}]", rule, what, float(now[k]), value, k >= 3, True)
 
 
-def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
-    """InputError for poses given that contradict a joint's drive by more than a mend may move them.
+def refuse_far(mechanism: Mechanism, far: Sequence[Contradiction]) -> None:
+    """Raise InputError for given poses that contradict a joint's drive by more than a correction may move them.
 
-    What a path leads is put where the path begins, however far that is, and reported: the path says where the body is.
+    A frame on a path is moved to the start of the path, however far that is, and the correction is reported.
     """
-    for miss in far:
-        if miss.of_path:
+    for contradiction in far:
+        if contradiction.of_path:
             continue
-        limit = FAR_ANGLE if miss.turning else FAR_FROM_LAW * mechanism.length
-        if miss.size > limit:
-            unit = "rad" if miss.turning else "m"
+        limit = FAR_ANGLE if contradiction.turning else FAR_FROM_LAW * mechanism.length
+        if contradiction.size > limit:
+            unit = "rad" if contradiction.turning else "m"
             raise InputError(
-                miss.place,
-                f"{miss.text()} (more than {limit:.3g} {unit})",
+                contradiction.place,
+                f"{contradiction.text()} (more than {limit:.3g} {unit})",
                 "correct the poses or the start of the law, or leave out the poses of the bodies that the drive moves"
-                if miss.drive
+                if contradiction.drive
                 else "correct the poses or the position, or leave out the poses of the bodies that follow from it",
             )
 
 
 def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[str, Pieces]) -> None:
-    """InputError for starts of driven coordinates that are not those of the drives' laws.
+    """Raise InputError for given starts of driven coordinates that differ from the drives' laws.
 
     given: laws that replace the scene's; they were made for this start.
     """
@@ -163,7 +163,7 @@ def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[
             for key, order, requested in (("position", 0, start.position), ("velocity", 1, start.velocity)):
                 law, unit = laws[name].value(t, order), coordinate.unit + "/s" * order
                 size = 1.0 if coordinate.turning else mechanism.length
-                if requested is not None and abs(law - requested) > WRITTEN * max(size, abs(law)):
+                if requested is not None and abs(law - requested) > INPUT_DIGITS * max(size, abs(law)):
                     raise InputError(
                         f"{start.place[:-1]}.{key}]",
                         f"is {requested:.6g} {unit}, and by the law of drive '{name}' {law:.6g} {unit}",
@@ -171,8 +171,8 @@ def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[
                     )
 
 
-def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
-    """A sentence about the bodies that do not start where the scene gives them, with amounts; else nothing.
+def corrected_starts(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
+    """Return a sentence that lists bodies which do not start where the scene gives them, with amounts; else nothing.
 
     now: frames of all links at the start.
     """
@@ -181,8 +181,8 @@ def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
         before, after = mechanism.placed[i], now[i]
         distance = float(np.linalg.norm(after.p - before.p)) / mechanism.length
         turned = float(rotation_between(matrix_to_quaternion(before.R), matrix_to_quaternion(after.R)))
-        amounts = [f"moved by {distance * mechanism.length:.3g} m"] if distance > WRITTEN else []
-        amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > WRITTEN else []
+        amounts = [f"moved by {distance * mechanism.length:.3g} m"] if distance > INPUT_DIGITS else []
+        amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > INPUT_DIGITS else []
         if amounts:
             corrections.append(
                 (distance + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}")

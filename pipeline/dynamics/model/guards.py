@@ -1,4 +1,4 @@
-"""The table of the guards, on which steps end (`integrate.guards`): levels and reversals that bend forces."""
+"""Table of the guards, at which steps end (`integrate.guards`): levels and reversals at which forces have kinks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Guard = tuple[tuple[int, ...], float, float]
 
 
 def fill(mechanism: Mechanism, parts: Parts, loaded: Loaded) -> dict[Any, Any]:
-    """The tables GUARDS and GUARD_NUMBERS."""
+    """Return the tables GUARDS and GUARD_NUMBERS."""
     of_effects = [guard for made in parts.functions("guards") for guard in made(mechanism)]
     guards = [*_of_contacts(mechanism), *of_effects, *_of_loads(loaded)]
     return {
@@ -26,7 +26,7 @@ def fill(mechanism: Mechanism, parts: Parts, loaded: Loaded) -> dict[Any, Any]:
 
 
 def speeds(table: Any, offset: int, count: int, levels: tuple[float, ...], contact: int = -1) -> Iterator[Guard]:
-    """Guards of a sliding velocity at the speeds at which its law bends, 0 for none."""
+    """Yield guards of a sliding velocity at the speeds at which its law has kinks; a level of 0 means none."""
     for level in levels:
         if level > 0.0:
             yield (table.place, offset, count, contact, -1), level, level

@@ -1,4 +1,4 @@
-"""A consistent start: joint coordinates from the bodies' poses, loops closed, speeds projected."""
+"""Consistent start: joint coordinates from the poses of bodies, loops closed, speeds projected."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
 from flexclear.pipeline.dynamics.model.driving import joint_type
-from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift, start_place
+from flexclear.pipeline.dynamics.model.flexible_bodies import shift, shortening, start_place
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modes
 
-#: state -> frames of all links and sites, named fields of LINK_FRAMES and SITE_FRAMES, and rates at which the loops
-#: open, (closure rows,)
+#: state -> frames of all links and sites (named fields of LINK_FRAMES and SITE_FRAMES), and residual rates of the
+#: closures, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
-#: misses below this fraction of the speeds asked for are rounding
+#: errors below this fraction of the requested speeds are rounding
 RIGID = 1e-9
-#: given velocities that are missed by less than this fraction of the speeds were given as well as they were written
-WRITTEN = 1e-6
-#: given velocities that are missed by more than this fraction of the largest one are a mistake, not a rough start
+#: errors of given velocities below this fraction of the speeds come from the digits with which they were written
+INPUT_DIGITS = 1e-6
+#: errors above this fraction of the largest given velocity are refused
 WRONG = 0.05
-#: combinations of speeds that change rates by less than this fraction of the largest change nothing: redundant closures
+#: combinations of speeds that change rates by less than this fraction of the largest have no effect, as redundant rows
 REDUNDANT = 1e-9
 #: a spring shorter than this fraction of the mechanism's size has no direction
 SHORTEST_SPRING = 1e-9
 
 
 def start_state(model: Model) -> np.ndarray:
-    """State at the start as the scene gives it, before the loops are closed; shape (NY,)."""
+    """Return the state at the start as the scene gives it, before the loops are closed; shape (NY,)."""
     y = np.zeros(model.ny)
     for i, link in enumerate(model.links[1:], start=1):
         if not link.drives and joint_type(link.kind).POSITIONS:
@@ -49,7 +49,7 @@ def start_state(model: Model) -> np.ndarray:
 
 
 def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
-    """Positions of a link's joint, or of its part of it, from the poses of the two frames."""
+    """Return the positions of a link's joint, or of its part of a chain, from the poses of the joint's two frames."""
     edge, starts = link.branch.edge, [link.start for link in mechanism.links]
     if edge is not None and edge.kind != link.kind:
         return chain_positions(mechanism, link, starts)
@@ -61,10 +61,10 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Rate:
-    """A rate that is given: `requested` [m/s or rad/s], where the scene says so, and what counts as much.
+    """A velocity that the scene gives: `requested` [m/s or rad/s], its key path, and its natural unit `size`.
 
-    speed, sign: of which free coordinate it is the speed, times the sign; of a joint that closes a loop none.
-    sites: of the two frames of such a joint, `coordinate` which of its motions.
+    speed, sign: index of the free coordinate whose speed, times the sign, is this velocity; None at a closure joint.
+    sites: of the two frames of a closure joint; coordinate: which of its motions the velocity belongs to.
     """
 
     place: str
@@ -76,7 +76,7 @@ class Rate:
     coordinate: Coordinate | None = None
 
     def of(self, sites: np.ndarray, u: np.ndarray) -> float:
-        """Its value at free speeds u, with the sites' frames, named fields of SITE_FRAMES."""
+        """Return the velocity [m/s or rad/s] at free speeds u; sites: frames, named fields of SITE_FRAMES."""
         if self.speed is not None:
             return self.sign * float(u[self.speed])
         assert self.coordinate is not None
@@ -89,7 +89,7 @@ class Rate:
 
 
 def given_rates(model: Model) -> list[Rate]:
-    """All rates that the scene gives, but those of driven coordinates."""
+    """Return all velocities of joints and modes that the scene gives, except those of driven coordinates."""
     return [*_of_joints(model), *_of_modes(model)]
 
 
@@ -120,11 +120,11 @@ def _of_modes(model: Model) -> Iterator[Rate]:
 
 @dataclass(frozen=True)
 class Velocities:
-    """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
+    """Linear equations matrix @ speeds = target of the speeds at the start, in natural units; (rows, nv), (rows,).
 
-    asked: velocities that the target represents, before those of the drives are taken off, (rows,).
-    given: paths of the velocities that the first `n_given` rows set; the other rows keep the loops closed.
-    fastest: size of all these velocities, those of a slow motion at least.
+    asked: requested velocities, from which the target results by subtracting those of the drives, (rows,).
+    given: key paths of the velocities that the first `n_given` rows set; the other rows keep the loops closed.
+    fastest: largest of these velocities, plus that of a slow motion.
     """
 
     matrix: np.ndarray
@@ -136,7 +136,7 @@ class Velocities:
 
 
 def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
-    """What bodies, joints, modes and loops ask of the speeds in a state."""
+    """Return the linear equations that bodies, joints, modes and closures impose on the speeds in a state."""
     requested, others = with_velocities(model), given_rates(model)
     y = y.copy()
     y[model.speeds] = 0.0
@@ -170,12 +170,12 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
 
 
 def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: float = WRONG) -> np.ndarray:
-    """Y with speeds that give bodies, joints and modes their velocities and keep the loops closed; otherwise the least.
+    """Return y with the least speeds that give bodies, joints and modes their velocities and keep the loops closed.
 
-    Velocities of bodies are those of centres of mass, flexible or rigid.  Flexible bodies start without speeds of
-    deformation if joints, drives and given velocities allow that.
-    fraction: of the largest velocity given, by which joints and drives may miss them; the nearest velocities are taken
-    then. Raises InputError when joints and drives do not allow the velocities.
+    A body's velocity is that of its centre of mass, for flexible and rigid bodies.  Flexible bodies start without modal
+    speeds if joints, drives and given velocities allow that.
+    fraction: largest error of the nearest speeds that joints and drives allow, relative to the largest given velocity.
+    Raises InputError when the error is larger.
     """
     elastic = np.zeros(model.nv, dtype=bool)
     for modes in model.numbering.modal_coordinates.values():
@@ -189,7 +189,7 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
     if miss > RIGID * equations.fastest:
         speeds, miss = _least(equations.matrix, equations.target)
     largest = float(np.max(np.abs(equations.asked), initial=0.0))
-    if equations.given and miss > max(WRITTEN * equations.fastest, fraction * largest):
+    if equations.given and miss > max(INPUT_DIGITS * equations.fastest, fraction * largest):
         names = ", ".join(path.removeprefix("[body.").removesuffix(".velocity]") for path in equations.given)
         raise InputError(
             equations.given[0],
@@ -204,7 +204,7 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
 
 
 def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:
-    """The bodies that the scene gives velocities, by name."""
+    """Return the bodies to which the scene gives velocities, by name."""
     return {
         name: body
         for name, body in model.scene.body.items()
@@ -214,13 +214,13 @@ def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:
 
 
 def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: np.ndarray) -> list[str]:
-    """Sentences about bodies, joints and modes whose start velocities are not those that the scene gives, with amounts.
+    """Return sentences that list bodies, joints and modes whose start velocities differ from the scene's, with amounts.
 
     y: state at the start.  frames, sites: of all links and sites there, named fields of LINK_FRAMES and SITE_FRAMES.
     """
     requested, changes, unit = with_velocities(model), [], _units(model)
     given = _given(requested)
-    limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
+    limit = INPUT_DIGITS * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
     for name, row in zip(requested, given, strict=True):
         change = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
         if np.nanmax(change / unit) > limit:
@@ -231,7 +231,7 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
             )
     for rate in given_rates(model):
         change = abs(rate.of(sites, y[model.speeds]) - rate.requested)
-        if change > WRITTEN * (_slow(model) * rate.size + abs(rate.requested)):
+        if change > INPUT_DIGITS * (_slow(model) * rate.size + abs(rate.requested)):
             changes.append(
                 f"the start velocity {rate.place} was mended so that joints and drives allow it: by {change:.3g}"
             )
@@ -239,22 +239,22 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
 
 
 def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
-    """Sentences about modes that a start z has otherwise than y, in which they are as the scene gives them.
+    """Return sentences that list the modes which start otherwise in state z than in y, which has the scene's values.
 
-    Raises InputError where they are far from that.
+    Raises InputError where the difference is large.
     """
     changes = []
     for i, q in model.mechanism.deformation.items():
         mine, name = model.numbering.modal_positions[i], model.links[i].flexible
         change, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
         unit = model.length * model.links[i].mass ** 0.5
-        if change > max(WRITTEN * unit, WRONG * largest):
+        if change > max(INPUT_DIGITS * unit, WRONG * largest):
             raise InputError(
                 f"[start.modal.{name}.coordinate]",
                 f"joints and drives do not allow this deformation: they change it by {change:.3g} m",
                 "give another one, or replace a joint by one that leaves more motion",
             )
-        if change > WRITTEN * max(largest, WRITTEN * unit):
+        if change > INPUT_DIGITS * max(largest, INPUT_DIGITS * unit):
             changes.append(
                 f"the deformation given for {name} was mended so that joints and drives allow it: "
                 f"by up to {change:.3g} m"
@@ -263,23 +263,23 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
 
 
 def _given(requested: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
-    """Angular velocity and velocity given for each body, shape (bodies, 6); nan where none is."""
+    """Return angular velocity and velocity given for each body, shape (bodies, 6); nan where none is given."""
     given = [_components(b.angular_velocity) + _components(b.velocity) for b in requested.values()]
     return np.array(given).reshape(-1, 6)
 
 
 def _units(model: Model) -> np.ndarray:
-    """What counts as much among angular velocity and velocity: radians, and the mechanism's size; shape (6,)."""
+    """Return the natural units of angular and linear velocity: radians, and the mechanism's size; shape (6,)."""
     return np.array([1.0] * 3 + [model.length] * 3)
 
 
 def _slow(model: Model) -> float:
-    """A radian, or the mechanism's size, in the time of the whole run is slow [1/s]."""
+    """Return the rate of a slow motion [1/s]: a radian, or the mechanism's size, in the time of the whole run."""
     return 1.0 / (model.scene.time.end - model.scene.time.start)
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
-    """The least speeds that come nearest to the target, and by how much they miss it; all in their natural units."""
+    """Return the least speeds that come nearest to the target, and their largest error; all in natural units."""
     speeds, *_ = np.linalg.lstsq(matrix, target, rcond=REDUNDANT)
     return speeds, float(np.max(np.abs(matrix @ speeds - target), initial=0.0))
 
@@ -290,30 +290,30 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
 
 @dataclass(frozen=True)
 class Centre:
-    """Centre of mass of a body: its position in the frame of its link, undeformed.
+    """Centre of mass of a body; place: its position in the frame of its link, undeformed.
 
-    shape, bow: its shift with the modal coordinates, as in `flexible_bodies.shift`; these are at `positions` and
-    `speeds` among the free ones.
+    shape, shortening: its displacement with the modal coordinates, as in `flexible_bodies.shift`.  positions, speeds:
+    indices of these coordinates among the free ones.
     """
 
     link: int
     place: np.ndarray
     shape: np.ndarray
-    bow: np.ndarray | None = None
+    shortening: np.ndarray | None = None
     positions: range = range(0)
     speeds: range = range(0)
 
     def motion(self, frames: np.ndarray, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Angular velocity of the body and velocity of this point, world axes, shape (6,)."""
+        """Return angular velocity of the body and velocity of its centre of mass, world axes, shape (6,)."""
         frame, bent, bending = frames[self.link], q[None, self.positions], u[None, self.speeds]
-        moved, rate, _ = shift(self.shape, self.bow, bent, bending, np.zeros_like(bent))
+        moved, rate, _ = shift(self.shape, self.shortening, bent, bending, np.zeros_like(bent))
         arm = frame["axes"] @ (self.place + moved[0])
         v = frame["velocity"] + np.cross(frame["omega"], arm) + frame["axes"] @ rate[0]
         return np.concatenate([frame["omega"], v])
 
 
 def centre_of(model: Model, name: str) -> Centre:
-    """The centre of mass of a body, and how it moves."""
+    """Return the centre of mass of a body, with its dependence on the modal coordinates."""
     i, body = model.mechanism.link_of[name], model.scene.body[name]
     link = model.links[i]
     if isinstance(body, RigidBody):
@@ -321,13 +321,13 @@ def centre_of(model: Model, name: str) -> Centre:
         return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
-    bent, numbering = bow(model.mechanism, i), model.numbering
+    bent, numbering = shortening(model.mechanism, i), model.numbering
     bent = None if bent is None else bent / link.mass
     return Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
 
 
 def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:
-    """Y with the internal states of parts as they start; `sites`: their frames at y, rows of SITE_FRAMES."""
+    """Return y with the internal states of parts at their start values; sites: frames at y, rows of SITE_FRAMES."""
     y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
     for index, angle in angles(model.arrays.table(m.GAUGES), sites).items():
         y[first + index] = angle
@@ -337,7 +337,7 @@ def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray
 
 
 def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
-    """Internal states of effects that follow from the frames of all sites and that continue others, by their first."""
+    """Return the internal states of effects from all sites' frames and previous states, by the index of the first."""
     states = dict[int, np.ndarray]()
     for follow in model.parts.functions("states"):
         states |= follow(model, sites, internal)
@@ -345,7 +345,7 @@ def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[in
 
 
 def check_loads(model: Model, loads: np.ndarray) -> None:
-    """InputError for a spring or damper of no length, which has no direction; `loads`: rows of LOAD at the start."""
+    """Raise InputError for a spring or damper of zero length: it has no direction; loads: rows of LOAD at the start."""
     for (name, _), value in zip(model.loads, loads["value"], strict=True):
         load = model.scene.load[name]
         has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)

@@ -1,4 +1,4 @@
-"""Interface bases of the flexible bodies: which combinations of modes move the frames by which a scene uses them."""
+"""Interface bases of the flexible bodies: combinations of modes that move, or hold still, the frames a scene uses."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 #: a shape or moment below this fraction of the largest of its kind is rounding, not coupling
 NO_COUPLING = 1e-13
-#: so is a product of inertia of two modes, of unit modal mass, below this: it is a sum over all elements
+#: products of inertia of two modes of unit modal mass below this are rounding: each is a sum over all elements
 UNCOUPLED = 1e-11
-#: singular values of the frames' shapes below this fraction of the largest move nothing
+#: singular values of the frames' shapes below this fraction of the largest count as zero
 FRAME_RANK = 1e-12
-#: modes are mixed where for each moving shape at least so many are held: fewer save less than mixing takes
+#: least number of held shapes per moving shape at which modes are mixed: with fewer, mixing costs more than it saves
 WORTH_MIXING = 0.5
 
 
 @dataclass(frozen=True)
 class InterfaceBasis:
-    """Orthogonal T of `bodies.interface`, shape (mode, shape); `held`: number of shapes that move no frame, first."""
+    """Orthogonal T of `bodies.interface`, (mode, shape); `held`: number of the first shapes, which move no frame."""
 
     matrix: np.ndarray
     held: int
@@ -38,15 +38,15 @@ class InterfaceBasis:
         return self.matrix[:, self.held :]
 
     def entries(self) -> list[tuple[int, int]]:
-        """(mode, shape) of the entries of T that are not zero, shape after shape."""
+        """Return (mode, shape) of the nonzero entries of T, shape after shape."""
         return [(int(i), int(j)) for j, i in zip(*np.nonzero(self.matrix.T), strict=True)]
 
 
 def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
-    """The interface basis of a flexible link.
+    """Return the interface basis of a flexible link.
 
-    Modes stay as they are where they share entries of the mass matrix, and where bending shortens bodies, which moves
-    every frame on them.
+    Modes are not mixed where they have common entries in the mass matrix, nor where bending shortens bodies, which
+    moves all frames on them.
     """
     name, bundle = mechanism.links[link].flexible, mechanism.links[link].bundle
     assert bundle is not None
@@ -58,13 +58,13 @@ def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
 
 
 def mass_coupled(bundle: Labelled) -> bool:
-    """Whether modes have common entries of the modal mass."""
+    """Return True when the modal mass has entries between different modes."""
     mass = bundle["modal_mass"].values
     return bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
 
 
 def _motions(bundle: Labelled, frames: list[str]) -> np.ndarray:
-    """Displacements and turns of frames per mode, each in units of the largest, shape (6 frames, mode)."""
+    """Return displacements and rotations of frames per mode, both in units of the largest, shape (6 frames, mode)."""
     shapes = [frame_shapes(bundle, frame.partition(".")[2])[1:] for frame in frames]
     kinds = []
     for name, kind in zip(("frame_translation_shape", "frame_rotation_shape"), zip(*shapes, strict=True), strict=False):
@@ -73,9 +73,9 @@ def _motions(bundle: Labelled, frames: list[str]) -> np.ndarray:
 
 
 def basis(motions: np.ndarray, stiffness: np.ndarray) -> InterfaceBasis:
-    """The basis for motions of frames per mode, shape (motions, mode), and the stiffness of every mode, shape (mode,).
+    """Return the basis for the frames' motions per mode, (motions, mode), and the stiffness of each mode, (mode,).
 
-    Held shapes are vibrations of the body with all frames held still: stiffness couples them to moving shapes alone.
+    Held shapes are vibrations of the body with all frames held still: stiffness couples them only to moving shapes.
     Modes that move frames in different ways, as in bending and in torsion, are not mixed.
     """
     held, moving, n = list[np.ndarray](), list[np.ndarray](), len(stiffness)
@@ -88,7 +88,7 @@ def basis(motions: np.ndarray, stiffness: np.ndarray) -> InterfaceBasis:
 
 
 def _families(common: np.ndarray) -> list[list[int]]:
-    """Modes that are connected by common motions, ascending; common: symmetric (modes, modes), true for such pairs."""
+    """Return groups of modes with common motions, ascending; common: symmetric (modes, modes), true for such pairs."""
     reached = common | np.eye(len(common), dtype=bool)
     for _ in range(len(common).bit_length()):
         reached = reached @ reached
@@ -96,7 +96,7 @@ def _families(common: np.ndarray) -> list[list[int]]:
 
 
 def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Held and moving shapes, columns over the modes of one family."""
+    """Return held and moving shapes, as columns over the modes of one family."""
     n = len(stiffness)
     _, values, rows = np.linalg.svd(motions, full_matrices=True) if motions.size else (None, np.zeros(0), np.eye(n))
     rank = int(np.sum(values > FRAME_RANK * values.max(initial=1e-300)))
@@ -106,31 +106,31 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
         return np.zeros((n, 0)), np.eye(n)
     still, moving = rows[rank:].T, rows[:rank].T
     _, axes = np.linalg.eigh(still.T @ (stiffness[:, None] * still))
-    # turns before displacements: shapes after the first ones move frames without turning them. With something heavy
-    # on a frame, the mass matrix of other moving shapes, scaled to a unit diagonal, is worse conditioned by 10 to 100
+    # rotations before displacements: then only the first shapes rotate frames. With a heavy body on a frame, the mass
+    # matrix of other moving shapes, scaled to a unit diagonal, is worse conditioned by a factor of 10 to 100
     turns_first, _ = np.linalg.qr((motions[np.any(motions != 0.0, axis=1)] @ moving)[::-1].T)
     return still @ axes, moving @ turns_first
 
 
 def frame_index(bundle: Labelled, frame: str) -> int:
-    """Return the index of a named frame of a bundle; ValueError when there is none."""
+    """Return the index of a named frame of a bundle; raise ValueError when the bundle has none."""
     return [str(name) for name in bundle["frame"].values].index(frame)
 
 
 def frame_shapes(bundle: Labelled, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Undeformed pose row (12), translation and rotation shapes (3, n) of a named frame."""
+    """Return undeformed pose (12,), translation shapes and rotation shapes (3, n each) of a named frame."""
     k = frame_index(bundle, frame)
     pose = np.concatenate([bundle["frame_position"].values[k], bundle["frame_rotation"].values[k].ravel()])
     shapes = [bundle[name].values[k].copy() for name in ("frame_translation_shape", "frame_rotation_shape")]
     for name, shape in zip(("frame_translation_shape", "frame_rotation_shape"), shapes, strict=True):
-        # what the reference condition holds still is exactly still
+        # frames that the reference condition holds still must be exactly still
         scale = np.abs(bundle[name].values).max()
         shape[np.abs(shape) <= NO_COUPLING * 1e3 * scale] = 0.0
     return pose, shapes[0], shapes[1]
 
 
 def modes_of(arrays: Arrays) -> np.ndarray:
-    """Coordinates with modes as eigenmodes, of coordinates with modes in the interface basis; orthogonal, (nv, nv)."""
+    """Return the orthogonal matrix (nv, nv) from coordinates in the interface basis to those with eigenmodes."""
     matrix, entries = np.eye(arrays.size(m.NV)), arrays.table(m.BASIS)
     values = arrays.table(m.BASIS_VALUES)["value"]
     for body in arrays.table(m.FLEXES):

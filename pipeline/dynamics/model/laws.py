@@ -1,4 +1,4 @@
-"""Laws of time: those of drives and loads, checked, and their tables."""
+"""Laws of time of drives and loads: validation and tables."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
 from flexclear.pipeline.dynamics.model.driving import prescribed
 
-#: no laws instead of the scene's
-NONE: Mapping[str, Pieces] = MappingProxyType({})
+#: no laws that replace the scene's
+NO_LAWS: Mapping[str, Pieces] = MappingProxyType({})
 
 
 def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
-    """The law of every prescribed coordinate; `given` ones are taken as they are.
+    """Return the law of each prescribed coordinate; laws in `given` replace the scene's unchecked.
 
-    Raises InputError where a value has the wrong dimension, a law does not cover the run, or value
-    or rate jump: no finite force could follow.
+    Raises InputError where a value has the wrong dimension, a law does not cover the run, or value or rate jump: no
+    finite force could follow.
     """
     laws = []
     for one in prescribed(scene):
@@ -39,7 +39,7 @@ def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
 
 
 def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
-    """The pieces of a law; InputError for the wrong dimension, or when it does not cover the run."""
+    """Return the pieces of a law; raise InputError for a wrong dimension, or a law that does not cover the run."""
     try:
         made = pieces_of(law, dimension)
     except ValueError as error:
@@ -56,7 +56,7 @@ def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
 
 
 def fill(laws: Sequence[Pieces]) -> dict[Any, Any]:
-    """The tables LAWS, PIECES, PIECE_HARMONICS and HARMONICS."""
+    """Return the tables LAWS, PIECES, PIECE_HARMONICS and HARMONICS."""
     rows: list[tuple[int, int]] = []
     parts: list[tuple[int, int]] = []
     pieces = [np.zeros((0, m.PIECES.size))]

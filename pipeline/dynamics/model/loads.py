@@ -1,4 +1,4 @@
-"""The tables of the loads."""
+"""Tables of the loads."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
 class Load(NamedTuple):
-    """A load by name, and the frame that it acts on, or the two between which it acts."""
+    """A load: its name, and the frame on which, or the two between which, it acts."""
 
     name: str
     frames: tuple[str, ...]
@@ -34,9 +34,9 @@ class Load(NamedTuple):
 
 @dataclass(frozen=True)
 class Loaded:
-    """Tables of the loads, kind after kind; `laws` are theirs.
+    """Tables of the loads, ordered by kind, and their laws.
 
-    bends: of each row of LOAD_BENDS, the levels at which it bends a load (`loads.row`).
+    bends: of each row of LOAD_BENDS, the levels at which its load has kinks (`loads.row`).
     """
 
     loads: tuple[Load, ...]
@@ -46,7 +46,7 @@ class Loaded:
 
 
 def gravity(scene: Scene) -> np.ndarray:
-    """Sum of the scene's gravity fields [m/s^2], shape (3,)."""
+    """Return the sum of the scene's gravity fields [m/s^2], shape (3,)."""
     if len(scene.forces()) == len(scene.load):
         return np.zeros(3)
     field: np.ndarray = lookup(LOADS, "gravity", where="[load]")(scene)
@@ -54,13 +54,13 @@ def gravity(scene: Scene) -> np.ndarray:
 
 
 def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: Mapping[str, Pieces]) -> Loaded:
-    """Check the loads of a mechanism, give their frames sites, and fill their tables; `given`: as `model.tabulate`.
+    """Validate the loads of a mechanism, add sites for their frames, fill their tables; given: as in `model.tabulate`.
 
-    gauges: take those of the loads and their internal states.
+    gauges: receives those of the loads and their internal states.
     """
     scene, forces = mechanism.scene, mechanism.scene.forces()
     kind_of = {name: load_kind(scene, name) for name in forces}
-    names = sorted(forces, key=kind_of.__getitem__)  # stable: within a kind as the scene has them
+    names = sorted(forces, key=kind_of.__getitem__)  # stable: the scene's order within a kind
     kinds = tuple(sorted(set(kind_of.values())))
     loads: list[Load] = []
     rows: list[tuple[int, ...]] = []
@@ -81,7 +81,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
             laws += [checked_law(scene, law, dimension, path) for law, dimension, path in row.laws]
         rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows), len(looks), len(bends)))
         numbers += [*(mechanism.origin if row.located else ()), *row.numbers]
-        looks += [_look(mechanism, numbering, gauges, *one) for one in row.reads]
+        looks += [_read_index(mechanism, numbering, gauges, *one) for one in row.reads]
         bends += row.bends
     counts = [list(kind_of.values()).count(kind) for kind in kinds]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
@@ -94,8 +94,8 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     return Loaded(tuple(loads), tables, bends, laws)
 
 
-def _look(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str, name: str) -> int:
-    """Number of the site, or of the gauge, at which an expression reads."""
+def _read_index(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str, name: str) -> int:
+    """Return the number of the site, or of the gauge, that an expression reads."""
     scene = mechanism.scene
     if sort == "coordinate":
         joint, coordinate = named_coordinate(scene, name, "[load]")
@@ -108,9 +108,9 @@ def _look(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str,
 
 
 def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[str, Coordinate] | None]:
-    """What a load acts on and with, its joint coordinate, and the one that it measures with that joint's name.
+    """Return a load's row, its joint coordinate, and the coordinate that it measures with that joint's name.
 
-    Raises InputError for what cannot be.
+    Raises InputError for a load that cannot exist.
     """
     load: Any = scene.load[name]
     path = f"[load.{name}]"
@@ -137,7 +137,7 @@ def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[st
 
 
 def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int, int]:
-    """Numbers of its sites a and b; a is -1 where the world holds against it."""
+    """Return the numbers of the load's sites a and b; a is -1 for a load between the world and b."""
     path, frames = f"[load.{load.name}]", load.frames
     links = [mechanism.link_of[find_frame(mechanism.frames, frame, path).body] for frame in frames]
     if len(links) == 2 and links[0] == links[1]:

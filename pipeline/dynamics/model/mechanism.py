@@ -1,4 +1,4 @@
-"""A scene as a mechanism: links in the order of a spanning tree, closures, contacts; before anything is numbered."""
+"""Mechanism of a scene: links in the order of a spanning tree, closures and contacts, before numbering."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, sp
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: fraction of the largest radius of gyration below which the distances of a scene are no size of it
+#: a scene's distances count as its size only above this fraction of the largest radius of gyration
 NO_SIZE = 1e-9
 
 
 @dataclass(frozen=True)
 class Site:
-    """A frame on a link that something uses; `frame` names it when the link is flexible."""
+    """A frame on a link that a joint, contact or load uses; frame: its name when the link is flexible."""
 
     link: int
     place: Placement
@@ -56,12 +56,12 @@ class Closure(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Of the joint."""
+        """Name of the joint."""
         return self.edge.name
 
     @property
     def ends(self) -> list[tuple[Site, Site]]:
-        """Pairs of sites between which it acts."""
+        """Pairs of sites between which the closure acts."""
         return [(self.a, self.b)]
 
     @property
@@ -72,7 +72,7 @@ class Closure(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A clearance joint, or an end of a stop: its name, what the scene says of it, and two sites.
+    """A clearance joint, or an end of a stop: its name, its part of the scene, and two sites.
 
     outer, inner: of the socket or journal, and of the ball or pin; of a stop, of the joint's first and second frame.
     """
@@ -84,12 +84,12 @@ class Contact(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What it is called in messages."""
+        """Name of the contact in messages."""
         return f"joint {self.name}" if self.joint.type != STOP else f"stop {self.name}"
 
     @property
     def place(self) -> str:
-        """Where the scene says what it is."""
+        """Key path of the contact in the scene."""
         return f"joint.{self.name}" if self.joint.type != STOP else f"stop.{self.name.rpartition('.')[0]}"
 
 
@@ -99,8 +99,8 @@ class Link:
 
     A rigid link's frame is its inboard joint frame; a flexible one's is its body frame.
     places: frame of each of its bodies; none for a massless link within a joint (see `chain`).
-    start: pose in the world, from the kernels' origin.  inboard: where its joint sits on the parent; None for the
-    ground.  inertia: of a rigid link, in its frame.  bundle: of a flexible one.
+    start: pose in the world, from the kernels' origin.  inboard: site of its joint on the parent; None for the ground.
+    inertia: of a rigid link, in its frame.  bundle: of a flexible one.
     """
 
     branch: Branch
@@ -119,7 +119,7 @@ class Link:
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """Names of its prescribed coordinates: none, or all that it has."""
+        """Names of its prescribed coordinates: none or all of its joint's."""
         return self.joint.drives
 
     @property
@@ -136,10 +136,10 @@ class Link:
 
     @cached_property
     def undeformed(self) -> RigidInertia | None:
-        """Mass, centre of mass and inertia about it in the link's frame where nothing is deformed; None if massless."""
+        """Mass, centre of mass and inertia about it in the link's frame, undeformed; None for a massless link."""
         if self.bundle is None:
             return self.inertia
-        if "inertia" in self.bundle:  # no modes are known, only what is rigid
+        if "inertia" in self.bundle:  # a bundle without modes
             return RigidInertia(self.mass, self.bundle["com"].values, self.bundle["inertia"].values)
         com = self.bundle["first_moment"].values / self.mass
         second = self.bundle["second_moment"].values - self.mass * np.outer(com, com)
@@ -147,12 +147,12 @@ class Link:
 
     @property
     def massless(self) -> bool:
-        """Whether it only connects two freedoms of a joint, or is the ground."""
+        """True for the ground, and for a link that only connects two coordinates of a joint."""
         return self.inertia is None and self.bundle is None
 
     @property
     def on_path(self) -> bool:
-        """Whether a prescribed pose in the world replaces its joint."""
+        """True when a prescribed pose in the world replaces its joint."""
         return self.branch.edge is not None and self.branch.edge.kind == PATH
 
 
@@ -160,12 +160,11 @@ class Link:
 class Mechanism:
     """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
-    origin: point of the world that the kernels use as theirs, close to the mechanism.  length: size of the mechanism
-    [m].
-    components: its parts that share no force.
+    origin: point of the world, close to the mechanism, that is the kernels' origin.  length: size of the mechanism [m].
+    components: its independent mechanisms.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
-    choice: which of several ways it was assembled in, and frames moved for that, in words; empty without these.
+    choice: sentence on the choice among several assemblies, and on frames moved to fit; empty without these.
     deformation: modal coordinates at the start of the flexible links to which the scene gives some.
     """
 
@@ -190,8 +189,9 @@ class Mechanism:
 
     @cached_property
     def drive_signs(self) -> np.ndarray:
-        """What a drive's coordinate in the tree is times the scene's: -1 where the tree meets its joint from the far
-        side, otherwise 1; shape (drives,).
+        """Factor from a drive's coordinate in the scene to that in the tree, shape (drives,).
+
+        It is -1 where the tree meets the joint from its second frame, otherwise 1.
         """
         signs = {name: link.joint.sign for link in self.links for name in link.drives}
         return np.array([signs[name] for name in self.drives])
@@ -203,16 +203,16 @@ class Mechanism:
 
     @property
     def has_paths(self) -> bool:
-        """Whether the pose of some frame in the world is prescribed."""
+        """True when the pose of a frame in the world is prescribed."""
         return any(link.on_path for link in self.links)
 
     @property
     def all_rigid(self) -> bool:
-        """Whether no body is flexible."""
+        """True when no body is flexible."""
         return not any(link.flexible for link in self.links)
 
     def site(self, frame: str) -> Site:
-        """The site at a named frame."""
+        """Return the site at a named frame."""
         return _site(self.frames, self.links, self.link_of, frame)
 
 
@@ -224,7 +224,7 @@ def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, 
 
 
 def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
-    """The mechanism that a scene describes; InputError for what cannot be built.
+    """Return the mechanism of a scene; raise InputError for a scene that cannot be built.
 
     bundles: reduced flexible bodies by name.
     """
@@ -264,14 +264,14 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:
-    """A point close to the mechanism: moments about it lose no digits, wherever the scene is."""
+    """Return a point close to the mechanism: moments about it lose no digits, wherever the scene is."""
     moving = [s.p for s in starts[1:]]
     return np.mean(moving, axis=0) if moving else np.zeros(3)
 
 
 @dataclass(frozen=True)
 class _Body:
-    """A group of bodies that becomes a link: where its host frame starts, and its bundle if it is flexible."""
+    """A group of bodies that becomes a link; start: pose of its host frame; bundle: of a flexible body."""
 
     scene: Scene
     group: Group
@@ -279,7 +279,7 @@ class _Body:
     bundle: Labelled | None
 
     def link(self, branch: Branch, own: Placement, inboard: Site, joint: InboardJoint) -> Link:
-        """The link, its bodies in its frame, which is `own` in the host's unless it is flexible."""
+        """Return the link; own: its frame in the host's, for rigid bodies."""
         if self.bundle is not None:
             places = dict(self.group.places)
             return Link(branch, self.group, places, self.start, joint, inboard, bundle=self.bundle)
@@ -290,7 +290,7 @@ class _Body:
 
 
 def _unjoined(body: _Body, branch: Branch) -> Link:
-    """The ground, or a body that nothing holds; its frame is at its centre of mass, so that turning and moving part."""
+    """Return the ground, or a body without joint, with its frame at the centre of mass to decouple its motions."""
     if branch.parent < 0:
         places = {n: body.start.of(p) for n, p in body.group.places.items()}
         return Link(branch, body.group, places, Placement(), InboardJoint("fixed"), None)
@@ -307,7 +307,7 @@ def _joined(
     link_of: Mapping[str, int],
     origin: np.ndarray,
 ) -> list[Link]:
-    """The link of a group, preceded by the massless ones of a joint that is a chain."""
+    """Return the link of a group, preceded by the massless links of a joint that is a chain."""
     edge, far = branch.edge, branch.frame
     assert edge is not None
     assert far is not None
@@ -333,9 +333,9 @@ def _joined(
 def sizes(
     scene: Scene, links: list[Link], link_of: Mapping[str, int], frames: Mapping[str, Frame]
 ) -> tuple[float, Components]:
-    """Size of all that there is [m], and independent mechanisms with theirs: what length tolerances are relative to.
+    """Return the size of the scene [m] and its independent mechanisms with theirs; length tolerances refer to these.
 
-    What an independent mechanism does not use of the ground is none of its size.
+    Frames on the ground count in the size of an independent mechanism only if that mechanism uses them.
     """
     result = components(scene, [link.branch.parent for link in links], link_of)
     contacts = scene.contacts().values()
@@ -351,12 +351,12 @@ def sizes(
 
 
 def _links_of(joint: Any, link_of: Mapping[str, int]) -> list[int]:
-    """Links that a joint is between."""
+    """Return the links that a joint connects."""
     return [link_of[frame.partition(".")[0]] for frame in joint.between]
 
 
 def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequence[float]) -> float:
-    """Size of some links [m], or of the clearance they move in."""
+    """Return the size of some links [m], which is at least their largest clearance."""
     points, of_body = list[np.ndarray](), dict[str, list[np.ndarray]]()
     for frame in frames.values():
         of_body.setdefault(frame.body, []).append(frame.place.p)
@@ -368,7 +368,7 @@ def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequen
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
     size = max(size, *clearances, 0.0)
-    # of a body held at its centre of mass, only rounding of its position is left
+    # a body held at its centre of mass has no size but the rounding of its position
     gyration = max((np.sqrt(np.trace(J) / (2.0 * mass)) for mass, _, J in _inertias(links)), default=0.0)
     return size if size > NO_SIZE * gyration else float(gyration) or 1.0
 
@@ -378,7 +378,7 @@ def _inertias(links: Sequence[Link]) -> list[tuple[float, np.ndarray, np.ndarray
 
 
 def require_bodies(scene: Scene) -> None:
-    """InputError when nothing can move, and for a body that has been left out of a mechanism."""
+    """Raise InputError when nothing can move, and for a body that no part connects to the mechanism."""
     moving = [*scene.rigid(), *scene.flexible()]
     if not moving:
         raise InputError("[body]", "the scene has no body that could move", "add a rigid or flexible body")

@@ -1,4 +1,4 @@
-"""Rigidly joined bodies become one link; every body and frame is fixed in it."""
+"""Merging of rigidly joined bodies into links, in which every body and frame has a fixed placement."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ GROUND = "ground"
 
 @dataclass(frozen=True)
 class Placement:
-    """Pose of a frame: origin p and axes R (columns) in some parent frame."""
+    """Pose of a frame: origin p and axes R (columns) in a parent frame."""
 
     p: np.ndarray = field(default_factory=lambda: np.zeros(3))
     R: np.ndarray = field(default_factory=lambda: np.eye(3))
 
     def of(self, inner: Placement) -> Placement:
-        """`inner`, given in this frame, in this frame's parent."""
+        """Return `inner`, given in this frame, in this frame's parent."""
         return Placement(self.p + self.R @ inner.p, self.R @ inner.R)
 
     def point(self, p: np.ndarray) -> np.ndarray:
-        """A point, given in this frame, in this frame's parent."""
+        """Return a point, given in this frame, in this frame's parent."""
         return np.asarray(self.p + self.R @ p)
 
     def inverse(self) -> Placement:
-        """The parent, seen from this frame."""
+        """Return the pose of the parent in this frame."""
         return Placement(-self.R.T @ self.p, self.R.T)
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A named frame: its body and its undeformed placement in it."""
+    """A named frame: its body and its undeformed placement there."""
 
     body: str
     place: Placement
@@ -50,7 +50,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Group:
-    """Bodies that move as one; `places` gives each body's frame in that of the first, the host."""
+    """Bodies that move as one; places: each body's frame in that of the first one, the host."""
 
     host: str
     places: dict[str, Placement]
@@ -66,7 +66,7 @@ class RigidInertia(NamedTuple):
 
 
 def frames_of(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, Frame]:
-    """Every named frame of the scene by ``body.FRAME``."""
+    """Return all named frames of the scene by ``body.FRAME``."""
     frames: dict[str, Frame] = {}
     for name, body in scene.body.items():
         if isinstance(body, FlexibleBody):
@@ -84,14 +84,14 @@ def frames_of(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, Frame]
 
 
 def find_frame(frames: Mapping[str, Frame], name: str, path: str) -> Frame:
-    """The frame called `name`; InputError with the nearest name when there is none."""
+    """Return the frame called `name`; raise InputError that suggests the nearest name when none has it."""
     if name not in frames:
         raise InputError(path, f"there is no frame '{name}'", suggestion(name, list(frames)))
     return frames[name]
 
 
 def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[str, int]]:
-    """Groups of rigidly joined bodies (the ground's first), and the group of each body."""
+    """Return groups of rigidly joined bodies (the ground's first), and the group of each body."""
     neighbours: dict[str, list[tuple[str, Placement]]] = {name: [] for name in scene.body}
     grounds = [n for n, b in scene.body.items() if isinstance(b, Ground)]
     for name, joint in scene.joint.items():
@@ -110,7 +110,7 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
             continue
         is_ground = root in grounds
         if is_ground and groups:
-            places = groups[0].places  # further bodies of type ground are the same world
+            places = groups[0].places  # several bodies of type ground are one world
         else:
             places = {}
             groups.append(Group(root, places, _flexible(scene, root)))
@@ -124,7 +124,7 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
 
 
 def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group], group_of: Mapping[str, int]) -> None:
-    """InputError for fixed joints around a loop of rigid bodies that do not fit together."""
+    """Raise InputError for fixed joints around a loop of rigid bodies that do not fit together."""
     same = _same_place(scene, frames)
     for name, joint in scene.joint.items():
         if joint.type != "fixed":
@@ -160,7 +160,7 @@ def _flexible(scene: Scene, body: str) -> bool:
 
 
 def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia:
-    """Of rigid bodies that move as one, with these placements in the requested frame."""
+    """Return the inertia of rigid bodies that move as one; places: their placements in the requested frame."""
     mass, first = 0.0, np.zeros(3)
     parts = []
     for name, here in places.items():
@@ -182,11 +182,10 @@ def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia
 def start_places(
     scene: Scene, groups: list[Group], group_of: Mapping[str, int], frames: Mapping[str, Frame]
 ) -> list[Placement]:
-    """Start pose of every group's host frame in the world.
+    """Return the start pose of every group's host frame in the world.
 
-    A group whose bodies give no pose follows from a joint with a group that has one, the two
-    frames coinciding.  Raises InputError for a group without any pose, and for a pose that
-    contradicts the fixed joints.
+    A group without given pose takes it from a joint to a group with a pose, the joint's frames coinciding.  Raises
+    InputError for a group without any pose, and for a pose that contradicts the fixed joints.
     """
     known: dict[int, Placement] = {0: Placement()}
     same = _same_place(scene, frames)
@@ -215,8 +214,7 @@ def start_places(
 
 
 def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
-    """Distance within which two points coincide [m]: nine digits of a metre, but six to nine of what the scene
-    spans."""
+    """Return the distance [m] below which points coincide: 1e-9, but within 1e-9 and 1e-6 of the scene's extent."""
     poses = [pose.position for body in scene.body.values() if (pose := getattr(body, "pose", None)) is not None]
     origins = np.array([(0.0, 0.0, 0.0), *poses])
     span = max([*np.ptp(origins, axis=0), *(float(np.linalg.norm(f.place.p)) for f in frames.values())])
@@ -224,7 +222,7 @@ def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
 
 
 def _close(a: Placement, b: Placement, same: float) -> bool:
-    """Whether two placements coincide; `same`: distance that makes no difference [m]."""
+    """Return True when two placements coincide; same: distance that counts as none [m]."""
     return bool(np.allclose(a.p, b.p, rtol=0, atol=same) and np.allclose(a.R, b.R, rtol=0, atol=1e-9))
 
 
@@ -235,7 +233,7 @@ def _propagate(
     groups: list[Group],
     known: dict[int, Placement],
 ) -> None:
-    # fixed joints determine the pose exactly; any other joint only when nothing better does
+    # fixed joints determine a pose exactly, so they come first
     joints = sorted(scene.joint.items(), key=lambda item: item[1].type != "fixed")
     changed = True
     while changed:

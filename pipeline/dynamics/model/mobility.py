@@ -1,9 +1,9 @@
-"""Mobility, rank and redundancy of a mechanism, and refusals of mechanisms that cannot move as asked.
+"""Mobility, rank and redundancy of a mechanism, and refusals of mechanisms that cannot move as requested.
 
-All of it follows from the directions in which the joints leave the links free: the closures'
-Jacobian in any basis of them.  Whether a loss of rank belongs to the mechanism (a planar loop in
-space) or to the pose alone is seen from poses nearby.  Motions that no mass resists are refused here too: a rod without
-inertia about its axis that is free to spin, a point on a ball joint.
+All of it follows from the directions in which the joints leave the links free: the closures' Jacobian in any basis of
+them. Nearby poses show whether a loss of rank belongs to the mechanism (a planar loop in space) or to the pose alone.
+Motions that no mass resists are refused here, too: a rod without inertia about its axis that is free to spin, a point
+mass on a ball joint.
 """
 
 from __future__ import annotations
@@ -17,36 +17,36 @@ from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
-from flexclear.pipeline.dynamics.model.assembly import settled
+from flexclear.pipeline.dynamics.model.assembly import with_starts
 from flexclear.pipeline.dynamics.model.closing import LEAST_GYRATION, close
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.rates import Rates, acting, motions, rates
+from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_axes
 
-#: displacements, in radians and fractions of the mechanism's size, of the poses nearby; how many are searched for, and
-#: how many are enough; fraction of the displacement that such a pose must keep when its loops are closed
+#: nearby poses: displacements, in radians and fractions of the mechanism's size; how many are tried, and how many are
+#: enough; fraction of the displacement that must remain when the loops are closed
 NEARBY, POSE_TRIES, ENOUGH_POSES, LEFT = (0.03, 0.01), 24, 2, 0.1
-#: fraction of a self-stress that a joint must carry for its reaction to count as undetermined
+#: least fraction of a self-stress at which a joint's reaction counts as undetermined
 CARRIES = 1e-6
-#: condition numbers are not distinguished from infinity above this
+#: condition numbers above this count as infinite
 INFINITE = 1e15
-#: rows of a locked mechanism that are smaller than this may be no more than misaligned joints
+#: rows of a locked mechanism below this size may come from misaligned joints
 SLIGHT_ROW = 1e-3
-#: a motion has no mass when it has this fraction of what it would have if every body resisted turning about all axes
-#: alike
+#: a motion has no mass when its inertia is below this fraction of what bodies with their largest moment of inertia
+#: about all axes would have
 WEIGHTLESS = 1e-14
-#: fraction of the largest by which a link takes part in such a motion
+#: least fraction of the largest motion at which a link takes part in a motion without mass
 TAKES_PART = 1e-3
 
 
 @dataclass(frozen=True)
 class Mobility:
-    """Counts of a mechanism at its start. coordinates: free ones of the tree.
+    """Counts of a mechanism at its start; coordinates: free ones of the tree.
 
-    rank: independent closure rows of `rows`; those of poses nearby where the start is singular.
+    rank: number of independent closure rows among `rows`; at nearby poses where the start is singular.
     redundant_joints: joints whose reaction the equations of motion of rigid bodies do not determine.
-    singular_start: of a start in a singular pose, where it is and why it cannot continue by itself, in words.
+    singular_start: a sentence that describes a singular start pose; empty otherwise.
     """
 
     coordinates: int
@@ -57,7 +57,7 @@ class Mobility:
 
     @property
     def mobility(self) -> int:
-        """Degrees of freedom, prescribed ones not counted."""
+        """Degrees of freedom, without prescribed ones."""
         return self.coordinates - self.rank
 
     @property
@@ -67,21 +67,21 @@ class Mobility:
 
     @property
     def start_refusal(self) -> str:
-        """The same with what helps."""
+        """The sentence of `singular_start` with remedies."""
         return (
             f"{self.singular_start}: give its bodies the velocities of one of these, choose one by [start] branch if "
             "drives or forces move it, or start it in another pose of its path"
         )
 
     def text(self) -> str:
-        """In words, for the user."""
+        """Return mobility and redundancy as a sentence for the user."""
         says = "condition follows" if self.redundant == 1 else "conditions follow"
         more = f", {self.redundant} closure {says} from the others" if self.redundant else ""
         return f"free motions besides the drives: {self.mobility}{more}"
 
 
 def analyse(model: Model) -> Mobility:
-    """Mobility of an assembled mechanism.
+    """Return the mobility of an assembled mechanism.
 
     Raises InputError for a mechanism that cannot move at all, drives that contradict each other and motions that no
     mass resists.
@@ -92,7 +92,7 @@ def analyse(model: Model) -> Mobility:
     if regular is not None:
         poses, singular = regular, _singular_start(model, here)
         here = rates(model, poses)
-    mobility = Mobility(model.nv, len(here.J), here.rank, _undetermined(model, here, poses), singular)
+    mobility = Mobility(model.nv, len(here.J), here.rank, _self_stressed(model, here, poses), singular)
     _refuse_locked(model, mobility, here)
     _refuse_contradiction(model, here)
     if here.rank < model.nv and model.mechanism.all_rigid:
@@ -101,10 +101,10 @@ def analyse(model: Model) -> Mobility:
 
 
 def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
-    """Poses nearby in which the closures have a higher rank than at the start, if there are any.
+    """Return nearby poses in which the closures have a higher rank than at the start; None without these.
 
-    Of a redundant mechanism all poses nearby have the rank of the start.  From a singular pose a random way need not
-    lead onto a branch of the motion: it may not close, or close back to where it began, which says nothing.
+    In a redundant mechanism all nearby poses have the rank of the start.  From a singular pose a random displacement
+    need not lead onto a branch of the motion: it may not close, or close at the start again, which is no evidence.
     """
     if here.rank == model.nv or model.mechanism.has_paths or not model.mechanism.all_rigid:
         return None
@@ -118,7 +118,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         closed = close(model.mechanism, joints, _displaced(model, start, motion))
         if closed is None:
             continue
-        there = [link.start for link in settled(model.mechanism, closed).links]
+        there = [link.start for link in with_starts(model.mechanism, closed).links]
         away = _distance(start, there, model.length) > LEFT * NEARBY[k % 2]
         (left if away else stayed).append((rates(model, there).rank, there))
         evidence += away
@@ -129,13 +129,13 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
 
 
 def _distance(one: Sequence[Placement], other: Sequence[Placement], length: float) -> float:
-    """How far the farthest link has gone, in fractions of the mechanism's size, or turned [rad]."""
+    """Return the largest motion of a link, as the sum of displacement over the mechanism's size and rotation [rad]."""
     ways = [np.linalg.norm(a.p - b.p) / length + np.linalg.norm(a.R - b.R) for a, b in zip(one, other, strict=True)]
     return float(max(ways))
 
 
 def _singular_start(model: Model, here: Rates) -> str:
-    """What is said of a start in a singular pose."""
+    """Return a sentence that describes a start in a singular pose."""
     names = {closure.name: None for closure in model.closures}
     values = here.values
     ratio = values[0] / max(values[min(here.rank, len(values) - 1)], values[0] / INFINITE, 1.0 / INFINITE)
@@ -146,7 +146,7 @@ def _singular_start(model: Model, here: Rates) -> str:
 
 
 def _displaced(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:
-    """Poses after a small motion of the tree's free coordinates."""
+    """Return the poses after a small motion of the tree's free coordinates."""
     numbering, twists, moved = model.numbering, motions(model, poses).twists, [poses[0]]
     for i in range(1, len(poses)):
         route = [(c, col) for c, col in numbering.joint_route(i) if c < numbering.nv]
@@ -156,17 +156,17 @@ def _displaced(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> 
     return moved
 
 
-def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> frozenset[str]:
-    """Joints that carry part of a self-stress: reactions in balance with each other, without any load."""
+def _self_stressed(model: Model, here: Rates, poses: Sequence[Placement]) -> frozenset[str]:
+    """Return the joints that carry part of a self-stress: reactions in balance with each other, without any load."""
     if here.rank == len(here.J):
         return frozenset()
     mechanism, L = model.mechanism, model.length
-    stresses = here.stresses / np.max(np.abs(here.stresses), axis=1, keepdims=True)
-    carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
+    self_stresses = here.self_stresses / np.max(np.abs(here.self_stresses), axis=1, keepdims=True)
+    carried = np.zeros((len(mechanism.links), 6, len(self_stresses)))  # wrench that a link takes from its closures
     joints, row = set[str](), 0
     for closure in model.closures:
-        stress = stresses[:, row : row + len(closure.rows)]
-        for acts in acting(closure, poses, L):
+        stress = self_stresses[:, row : row + len(closure.rows)]
+        for acts in row_axes(closure, poses, L):
             wrench = acts.wrenches(L).T @ stress.T
             carried[acts.a.link] -= wrench
             carried[acts.b.link] += wrench
@@ -201,8 +201,8 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
 
 
 def _refuse_contradiction(model: Model, here: Rates) -> None:
-    """Drives that the loops tie to each other can follow their laws only if these happen to agree."""
-    drives = [name for name, tied in zip(model.drives, here.tied, strict=True) if tied]
+    """Raise InputError for moving drives that the loops couple: their laws would have to agree."""
+    drives = [name for name, tied in zip(model.drives, here.dependent_drives, strict=True) if tied]
     moving = [name for name in drives if moves(model, name)]
     if not moving:
         return
@@ -215,7 +215,7 @@ def _refuse_contradiction(model: Model, here: Rates) -> None:
 
 
 def moves(model: Model, name: str) -> bool:
-    """Whether the law of a drive is not one value all along."""
+    """Return True when the law of a drive is not constant."""
     first, count = model.arrays.table(m.LAWS)[model.drives.index(name)]
     pieces = slice(first, first + count)
     values = model.arrays.table(m.PIECES)["coefficients"][pieces]
@@ -224,10 +224,10 @@ def moves(model: Model, name: str) -> bool:
 
 
 def _refuse_weightless(model: Model, poses: Sequence[Placement], twists: np.ndarray, free: np.ndarray) -> None:
-    """InputError when rigid bodies can move without any of their masses moving.
+    """Raise InputError when rigid bodies can move without any of their masses moving.
 
-    twists: unit motions of every column of the numbering, (columns, 6); free: those of them that open no closure,
-    (nv, mobility).  Flexible bodies are left to the engine, whose mass matrix knows their modes.
+    twists: unit motions of every column of the numbering, (columns, 6); free: motions of the free coordinates with all
+    closures closed, (nv, mobility).  Flexible bodies are left to the engine, whose mass matrix includes their modes.
     """
     links, nv, L = model.links, model.nv, model.length
     moved, momenta, even = (np.zeros((len(links), 6, nv)) for _ in range(3))
@@ -252,11 +252,11 @@ def _refuse_weightless(model: Model, poses: Sequence[Placement], twists: np.ndar
 
 
 def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
-    """A motion for which a mass matrix has nothing of what another one has, or None."""
+    """Return a motion for which the mass matrix `own` vanishes against the mass matrix `even`, or None."""
     sizes = np.sqrt(even.diagonal())
     scaled = even / np.outer(sizes, sizes) if sizes.all() else np.zeros_like(even)
     if not np.linalg.eigvalsh(scaled)[0] > WEIGHTLESS:
-        return None  # of links within a joint, which have no mass, in a singular pose: the engine says so
+        return None  # a singular pose moves massless links of a joint alone: the engine reports that
     # own v = value scaled v, by Cholesky's factor: scaled = L L^T, v = L^-T w (scipy.linalg is slow to import)
     back = np.linalg.inv(np.linalg.cholesky(scaled)).T
     values, vectors = np.linalg.eigh(back.T @ (own / np.outer(sizes, sizes)) @ back)
@@ -264,7 +264,7 @@ def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
 
 
 def _refuse_motion(model: Model, twists: np.ndarray) -> None:
-    """InputError for a motion without mass; twists: of every link in it, (links, 6)."""
+    """Raise InputError for a motion without mass; twists: of all links in this motion, (links, 6)."""
     sizes = np.abs(twists).max(axis=1)
     links = [link for link, size in zip(model.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
     names = sorted({name for link in links for name in link.places})

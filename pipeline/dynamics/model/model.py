@@ -1,4 +1,4 @@
-"""A mechanism ready to be evaluated: numbered, with all its wiring and numbers in tables."""
+"""Model: a numbered mechanism whose topology and numbers are in tables, ready to be evaluated."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering, number
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
-#: four roundings of a length, as a fraction of it
+#: four roundings of a length, relative to the length
 LENGTH_ROUNDING = 8.9e-16
 
 
 @dataclass(frozen=True)
 class Model:
-    """A mechanism ready to be evaluated, and what is asked of it again and again.
+    """A mechanism ready to be evaluated, with derived quantities that other modules use often.
 
-    links: parents first; link 0 is the ground.  closures, loads: as their tables have them.
-    laws: the normal law of every contact.  drives: names of the prescribed coordinates; drive_signs: see `Mechanism`.
+    links: parents first; link 0 is the ground.  closures, loads: in the order of their tables.
+    laws: normal law of each contact.  drives: names of the prescribed coordinates; drive_signs: see `Mechanism`.
     gravity: acceleration [m/s^2], shape (3,).  length: size of the mechanism [m].
     nq, nv, ny: number of free positions, free coordinates and state variables.
     """
@@ -63,30 +63,30 @@ class Model:
 
     @property
     def speeds(self) -> slice:
-        """Speeds of the free coordinates in the state; the positions come before, the ledger after them."""
+        """Slice of the state with the speeds of the free coordinates, between positions and ledger."""
         return slice(self.nq, self.nq + self.nv)
 
     @property
     def state_scales(self) -> np.ndarray:
-        """Natural unit of each state variable: the mechanism's size or a radian, both per second, ...; shape (NY,)."""
+        """Natural unit of each state variable: the mechanism's size, 1 rad, these per second, ...; shape (NY,)."""
         return np.asarray(self.arrays.table(m.FLOORS)["natural"][self.arrays.table(m.GROUPS)["group"]])
 
     @property
     def speed_scales(self) -> np.ndarray:
-        """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
+        """Natural unit of each free coordinate's speed: the mechanism's size or 1 rad, per second; shape (nv,)."""
         return self.state_scales[self.speeds]
 
     def rows_of(self, *kinds: type) -> dict[str, np.ndarray]:
-        """Row of the table LOADS of each load of such kinds, by name, as the scene has them."""
+        """Return the rows of the table LOADS of all loads of the given types, by name, in the order of the scene."""
         rows = {name: row for (name, _), row in zip(self.loads, self.arrays.table(m.LOADS), strict=True)}
         return {name: rows[name] for name, load in self.scene.forces().items() if isinstance(load, kinds)}
 
 
-def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:
-    """Place a mechanism's links so that its joints fit, number it and fill its tables.
+def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NO_LAWS) -> Model:
+    """Assemble a mechanism, number it and fill its tables.
 
-    given: laws of prescribed coordinates, and of loads along joints as ``load.NAME``, that replace the scene's.
-    Raises InputError for what cannot be built.
+    given: laws that replace the scene's: of prescribed coordinates by name, and of loads along joints as ``load.NAME``.
+    Raises InputError for a mechanism that cannot be built.
     """
     mechanism = assembled(mechanism, given)
     return filled(mechanism, number(mechanism), given)
@@ -95,17 +95,17 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
 def filled(
     mechanism: Mechanism,
     numbering: Numbering,
-    given: Mapping[str, Pieces] = laws.NONE,
+    given: Mapping[str, Pieces] = laws.NO_LAWS,
     like: Model | None = None,
 ) -> Model:
-    """The model of an assembled mechanism; `given` as of `tabulate`.
+    """Return the model of an assembled mechanism; `given` as in `tabulate`.
 
-    like: a model with the same links, joints, frames and flexible bodies, whose wiring is this one's, too.
+    like: a model with the same links, joints, frames and flexible bodies, whose topology tables are reused.
     """
     normals = contacting.resolve(mechanism)
     closing: list[Closure | Coupling] = [*mechanism.closures, *couplings(mechanism)]
     looped, ordered = wiring.closures(numbering, closing) if like is None else ({}, like.closures)
-    touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
+    site_pairs = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
     gauges = Gauges()
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
@@ -116,7 +116,7 @@ def filled(
     books = _books(slots)
     tables = {
         m.LINK_NUMBERS: [_link_numbers(*one) for one in zip(mechanism.links, _borne(mechanism), strict=True)],
-        **contacting.fill(numbering, parts, normals, touching, gauges, slots["bristles"]),
+        **contacting.fill(numbering, parts, normals, site_pairs, gauges, slots["bristles"]),
         **laws.fill([*in_tree, *loaded.laws]),
         **loaded.tables,
         m.LOADS: _booked(mechanism, loaded, books),
@@ -153,7 +153,7 @@ def filled(
 
 
 def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
-    """Tables of what is recorded by its name: moving bodies as the scene lists them, and frames."""
+    """Return the tables of what is recorded by name: moving bodies in the order of the scene, and frames."""
     bodies, frames, links = mechanism.moving_bodies, mechanism.frames.values(), mechanism.links
     holding = [mechanism.link_of[frame.body] for frame in frames]
     return {
@@ -165,7 +165,7 @@ def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
 
 
 def _body_numbers(mechanism: Mechanism, name: str) -> np.ndarray:
-    """Row of the table BODY_NUMBERS; the kernels' frame of a flexible body is no centre of mass."""
+    """Return a body's row of BODY_NUMBERS; a flexible body's inertia stays zero: its frame is no centre of mass."""
     body, places = mechanism.scene.body[name], mechanism.links[mechanism.link_of[name]].places
     here = places[name]
     if not isinstance(body, RigidBody):
@@ -175,18 +175,18 @@ def _body_numbers(mechanism: Mechanism, name: str) -> np.ndarray:
 
 
 def _symmetric(J: np.ndarray) -> list[float]:
-    """Entries xx yy zz xy xz yz of a symmetric matrix."""
+    """Return the entries xx yy zz xy xz yz of a symmetric matrix."""
     return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
 
-#: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted but none
-#: other of its own body's modes, up to which the mass matrix is factored as a matrix: beyond it, articulated inertias
-#: take less time (docs/engine.md)
+#: depth of a tree up to which the mass matrix is factored as a matrix; beyond, articulated inertias take less time
+#: (docs/engine.md). Depth: root mean square, over the free coordinates, of the number of coordinates from each to the
+#: ground, itself counted but no other mode of its own body
 DEEP_TREE = 8.0
 
 
 def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
-    """Tables that follow from links, joints, frames and flexible bodies alone, but for those of the closures."""
+    """Return the tables that follow from links, joints, frames and flexible bodies; those of closures excluded."""
     return {
         m.LINKS: _links(numbering, parts),
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
@@ -197,7 +197,7 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
 
 
 def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool) -> Parts:
-    """The kinds of parts that there are: of what the scene may have."""
+    """Return the kinds of parts that the mechanism has, out of those that its scene may have."""
     mechanism = numbering.mechanism
     return replace(
         most_parts(mechanism.scene),
@@ -210,7 +210,7 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
 
 
 def articulated(numbering: Numbering) -> bool:
-    """Return whether the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP_TREE`)."""
+    """Return True when the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP_TREE`)."""
     if not numbering.nv:
         return False
     before, depths = [0] * len(numbering.coordinates), list[int]()
@@ -223,7 +223,7 @@ def articulated(numbering: Numbering) -> bool:
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
-    """Rows of the table LINKS."""
+    """Return the rows of the table LINKS."""
     rows: list[tuple[int, ...]] = []
     last = {link.branch.parent: i for i, link in enumerate(numbering.mechanism.links) if i}
     for i, link in enumerate(numbering.mechanism.links):
@@ -239,15 +239,15 @@ def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
 
 
 def _link_numbers(link: Link, borne: np.ndarray) -> np.ndarray:
-    """Row of the table LINK_NUMBERS; flexible links have their numbers elsewhere."""
+    """Return a link's row of LINK_NUMBERS; the inertia of flexible links is zero here: they have other tables."""
     mass, com, J = link.inertia or (0.0, np.zeros(3), np.zeros((3, 3)))
     return np.array([mass, *com, *_symmetric(J), *borne])
 
 
 def _borne(mechanism: Mechanism) -> np.ndarray:
-    """Mass of each link and all beyond, and a bound of their polar moment about its origin; shape (links, 2).
+    """Return mass and a bound of the polar moment about the link's origin of each link and its descendants, (links, 2).
 
-    In any pose: as if everything were in one line, and what slides as far out as the mechanism is large.
+    The bound holds in any pose: all links in one straight line, every slide extended by the mechanism's size.
     """
     sums, links = np.zeros((len(mechanism.links), 3)), mechanism.links  # mass, its first and second moment
     for i in range(len(links) - 1, 0, -1):
@@ -265,7 +265,7 @@ def _borne(mechanism: Mechanism) -> np.ndarray:
 
 
 class Book(NamedTuple):
-    """Places in the ledger of what an independent mechanism as a whole has there: see BOOKS."""
+    """Indices in the ledger of the energy sums of one independent mechanism: see BOOKS."""
 
     work: int
     loss: int
@@ -276,28 +276,29 @@ Books = list[Book]
 
 
 def _books(slots: Mapping[str, int]) -> Books:
-    """Where each independent mechanism keeps its books."""
+    """Return the ledger indices of the energy sums of each independent mechanism."""
     others = range(slots["books"], slots["end"], filling.OTHER_BOOKS)
     return [Book(m.DRIVE_WORK, m.MODAL_LOSS, slots["loads"]), *(Book(k, k + 1, k + 2) for k in others)]
 
 
 def _booked(mechanism: Mechanism, loaded: loading.Loaded, books: Books) -> list[tuple[int, ...]]:
-    """Rows of the table LOADS with the places of their books."""
+    """Return the rows of the table LOADS, with the ledger index of each load's energy sums."""
     links = [[mechanism.link_of[frame.partition(".")[0]] for frame in load.frames] for load in loaded.loads]
     parts = [mechanism.components.of(*both) for both in links]
     return [(*row, books[part].load) for row, part in zip(loaded.tables[m.LOADS], parts, strict=True)]
 
 
 def _drives(mechanism: Mechanism, books: Books) -> list[int]:
-    """Rows of the table DRIVES."""
+    """Return the rows of the table DRIVES."""
     parts = {name: mechanism.components.of(i) for i, link in enumerate(mechanism.links) for name in link.drives}
     return [books[parts[name]].work for name in mechanism.drives]
 
 
 def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling]) -> list[float]:
-    """Rows of the table CLOSURE_NUMBERS.
+    """Return the rows of the table CLOSURE_NUMBERS.
 
-    What is small in large surroundings closes no tighter than these round its places.
+    A small mechanism within a large one closes only to the rounding of its coordinates; the weights are bounded by
+    that.
     """
     L, weights = mechanism.length, list[float]()
     rounding = LENGTH_ROUNDING * L / mechanism.scene.solver.rtol
@@ -308,7 +309,7 @@ def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling
 
 
 def _error_groups(numbering: Numbering, parts: Parts, gauges: Gauges) -> tuple[np.ndarray, np.ndarray]:
-    """Group of every state variable, and rows of FLOORS; gauges: have the internal states of parts, which come last."""
+    """Return each state variable's group, and the rows of FLOORS; gauges: have the internal states, which are last."""
     mechanism, of_link = numbering.mechanism, numbering.mechanism.components.of_link
     lengths, masses = np.array(mechanism.components.lengths), np.zeros(len(mechanism.components.lengths))
     for link, part in zip(mechanism.links[1:], of_link[1:], strict=True):
@@ -323,11 +324,11 @@ def _error_groups(numbering: Numbering, parts: Parts, gauges: Gauges) -> tuple[n
 def _floors(
     numbering: Numbering, parts: Parts, gauges: Gauges, lengths: np.ndarray, energies: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Group of every state variable; of each group the floor below which it is resolved absolutely, and its component.
+    """Return the group of each state variable, and each group's floor of the error scale and independent mechanism.
 
-    A vector is one group, so that turning the scene hardly changes a step.  Floors: the independent mechanism's
-    size, one radian, both per second, and the energy of moving its mass by its size in a second.
-    lengths, energies: of each independent mechanism.
+    Below its floor, a group is resolved absolutely. A vector is one group, so that turning the scene hardly changes a
+    step.  Floors: the independent mechanism's size, one radian, both per second, and the energy of moving its mass by
+    its size in a second.  lengths, energies: of each independent mechanism.
     """
     mechanism, of_link, rows = numbering.mechanism, numbering.mechanism.components.of_link, list[tuple[float, int]]()
     q_group, v_group = np.zeros(numbering.nq, dtype=np.int64), np.zeros(numbering.nv, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Places in the tables: which coordinate, column, row and slot belongs to what."""
+"""Numbering of a mechanism: indices of positions, coordinates, columns, sites and ports."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Route = list[tuple[int, int]]  #: (coordinate, column) pairs that move a site
 
 
 class Port(NamedTuple):
-    """A site on a flexible link: its number, the name of its frame, the first column that modes have there."""
+    """A site on a flexible link: its number, the name of its frame, the first column of the modes there."""
 
     site: int
     frame: str
@@ -24,11 +24,11 @@ class Port(NamedTuple):
 
 @dataclass
 class Numbering:
-    """Numbering of a mechanism. Coordinates: free ones 0..nv-1 in elimination order, then prescribed ones.
+    """Numbering of a mechanism: free coordinates 0..nv-1 in elimination order, then prescribed ones.
 
     positions, coordinates: of each link's joint; prescribed ones after all free ones.
-    modal_positions, modal_coordinates: modes of flexible links.  bases: theirs, by which coordinates are shapes; held
-    ones before moving ones.  Site k - 1 is the inboard site of link k.
+    modal_positions, modal_coordinates: modes of flexible links.  bases: interface bases of these, in which coordinates
+    are shapes, held ones before moving ones.  Site k - 1 is the inboard site of link k.
     """
 
     mechanism: Mechanism
@@ -50,11 +50,11 @@ class Numbering:
 
     @property
     def flexible(self) -> list[int]:
-        """Links that are flexible, in their order in the tables."""
+        """Flexible links, in the order of their tables."""
         return list(self.modal_positions)
 
     def site(self, site: Site) -> int:
-        """Number of a site; of an existing one for the same placement."""
+        """Return the number of a site, which is added unless one with the same placement exists."""
         for k, other in enumerate(self.sites):
             same = other.link == site.link and other.frame == site.frame
             if same and np.array_equal(other.place.p, site.place.p) and np.array_equal(other.place.R, site.place.R):
@@ -62,12 +62,12 @@ class Numbering:
         return self.add_site(site)
 
     def sites_of(self, joint: str) -> tuple[int, int]:
-        """Numbers of the sites at both frames of a joint."""
+        """Return the numbers of the sites at both frames of a joint."""
         first, second = (self.site(self.mechanism.site(frame)) for frame in self.mechanism.scene.joint[joint].between)
         return first, second
 
     def add_site(self, site: Site) -> int:
-        """Number of a new site, with a port of its own where the link is flexible."""
+        """Add a site, with a port where its link is flexible; return its number."""
         self.sites.append(site)
         if site.frame is not None:
             self.ports.append(Port(len(self.sites) - 1, site.frame, self.columns))
@@ -75,37 +75,37 @@ class Numbering:
         return len(self.sites) - 1
 
     def port_of(self, site: int) -> int:
-        """Port of a site, or -1."""
+        """Return the port of a site, or -1."""
         return next((k for k, port in enumerate(self.ports) if port.site == site), -1)
 
     def port_of_inboard(self, link: int) -> int:
-        """Port of a flexible link's own inboard frame: these follow those of the sites."""
+        """Return the port of a flexible link's own inboard frame: these follow those of the sites."""
         return len(self.ports) + self.flexible.index(link)
 
     def moving(self, link: int) -> range:
-        """Coordinates of a flexible link's moving shapes."""
+        """Return the coordinates of a flexible link's moving shapes."""
         return self.modal_coordinates[link][self.bases[link].held :]
 
     def route(self, site: int) -> Route:
-        """What moves a site, from itself to the ground."""
+        """Return (coordinate, column) of all motions that move a site, from the site to the ground."""
         link, port = self.sites[site].link, self.port_of(site)
         moving = self.moving(link) if port >= 0 else ()
         return [(c, self.ports[port].column + j) for j, c in enumerate(moving)] + self.joint_route(link)
 
     def joint_route(self, link: int) -> Route:
-        """What moves a link's inboard joint: its own coordinates, then its parent's."""
+        """Return (coordinate, column) of a link's inboard joint and of all motions that move its inboard site."""
         if link == 0:
             return []
         return [(c, c) for c in self.coordinates[link]] + self.route(link - 1)
 
 
 def number(mechanism: Mechanism) -> Numbering:
-    """The numbering of a mechanism, with the inboard sites of its links."""
+    """Return the numbering of a mechanism, with the inboard sites of its links."""
     numbering = Numbering(mechanism)
     _number_positions(numbering, mechanism.links)
     _number_coordinates(numbering, mechanism.links)
     for i, link in enumerate(mechanism.links):
-        if link.drives:  # of which there are as many as positions and speeds
+        if link.drives:  # as many as positions and as speeds
             first, count = mechanism.drives.index(link.drives[0]), len(link.drives)
             numbering.positions[i] = range(numbering.nq + first, numbering.nq + first + count)
             numbering.coordinates[i] = range(numbering.nv + first, numbering.nv + first + count)
@@ -129,7 +129,7 @@ def _number_positions(numbering: Numbering, links: list[Link]) -> None:
 
 
 def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
-    """Descendants before ancestors: then the factor of the mass matrix has no fill."""
+    """Number descendants before ancestors: then the factor of the mass matrix has no fill-in."""
     numbering.coordinates = [range(0)] * len(links)
     children: dict[int, list[int]] = {}
     for i, link in enumerate(links[1:], start=1):

@@ -1,8 +1,8 @@
-"""Assembly from joints alone: where links without poses go, of several ways the one nearest to what the scene hints.
+"""Assembly of links without given poses: of several assemblies, the one nearest to the scene's hints.
 
-The joints determine the poses that are missing, one link after the other, their coordinates at the values that drives,
-starts and hints give, else at zero or, to find other assemblies, anywhere. Loops are then closed (`closing.close`),
-with the links that have a pose held still as long as that is possible.
+The joints determine the missing poses, one link after the other. Their coordinates have the values that drives, starts
+and hints give, else zero or, to find other assemblies, random values. Loops are then closed (`closing.close`); links
+with a given pose stay still as long as that is possible.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 
-#: guesses from which assemblies are searched for; the first has nothing at random
+#: initial guesses from which assemblies are sought; only the first is not random
 GUESSES = 16
-#: size of random slides, as a fraction of the mechanism's size
+#: largest random slide, as a fraction of the mechanism's size
 SLIDE = 0.3
-#: assemblies are one if no coordinate differs by more than this, in radians or fractions of the mechanism's size
+#: assemblies are equal if no coordinate differs by more than this, in radians or fractions of the mechanism's size
 SAME_ASSEMBLY = 1e-4
-#: a mechanism that can move, and is so close to all hints, is searched for no further
+#: the search ends at an assembly that can move and is closer than this to all hints
 NEAR_HINTS = 0.5
-#: singular values of naturally sized rows below this fraction of the largest leave a motion free
+#: singular values of naturally sized rows below this fraction of the largest count as zero: a motion is free
 LOOSE = 1e-6
 
 Hints = Mapping[tuple[str, int], float]
@@ -36,7 +36,7 @@ Hints = Mapping[tuple[str, int], float]
 
 @dataclass(frozen=True)
 class Assembly:
-    """Poses of all links in which the joints fit. coordinates: of the joints, by name and number [m or rad]."""
+    """Poses of all links in which the joints fit; coordinates: of the joints, by name and number [m or rad]."""
 
     poses: list[Placement]
     coordinates: dict[tuple[str, int], float]
@@ -45,9 +45,9 @@ class Assembly:
 def assemblies(
     mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]
 ) -> list[Assembly]:
-    """Ways in which the joints fit, the best one first: nearest to the hints, then to the first guess.
+    """Return the assemblies in which the joints fit, nearest to the hints first, then to the first guess; maybe none.
 
-    placed: links that have a pose.  Empty when none was found.
+    placed: links that have a given pose.
     """
     hints, aims = targets(joints, starts)
     random, distinct, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
@@ -67,7 +67,7 @@ def assemblies(
             not _isolated(mechanism, joints, poses)
             and _distance(mechanism, joints, made.coordinates, hints) < NEAR_HINTS
         ):
-            break  # a mechanism that can move is assembled where it was first searched for
+            break  # a mechanism that can move: its first assembly near the hints counts
     return sorted(
         distinct,
         key=lambda one: (
@@ -78,10 +78,10 @@ def assemblies(
     )
 
 
-def chosen(
+def ambiguity(
     mechanism: Mechanism, joints: Sequence[Constraint], candidates: Sequence[Assembly], starts: Sequence[Given]
 ) -> str:
-    """What is said of several assemblies of which the scene chooses none; else nothing."""
+    """Return a sentence that lists several assemblies between which the scene does not choose; else an empty text."""
     first = candidates[0]
     if len(candidates) < 2 or not _isolated(mechanism, list(joints), first.poses):
         return ""
@@ -102,7 +102,7 @@ def chosen(
 
 
 def targets(joints: Sequence[Constraint], starts: Sequence[Given]) -> tuple[Hints, Hints]:
-    """Where coordinates are to be about, by hints alone, and with what is prescribed of them."""
+    """Return the approximate coordinates that hints give, and these with the prescribed coordinates added."""
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
     return hints, hints | {(j.name, k): value for j in joints for k, value in j.values.items()}
 
@@ -115,9 +115,9 @@ def guess(
     random: np.random.Generator | None = None,
     spread: float = 0.0,
 ) -> list[Placement]:
-    """Poses of all links, those not placed each put where a joint to a known one has it; loops may stay open."""
+    """Return poses of all links; a joint to a known link places each link without a pose, loops may stay open."""
     poses, known = [link.start for link in mechanism.links], set(placed)
-    # joints with few degrees of freedom are best
+    # joints with few degrees of freedom come first: they determine poses best
     order = sorted(joints, key=lambda joint: len(joint_type(joint.edge.kind).SPEEDS) - len(joint.values))
     while True:
         joint = next((j for j in order if (j.link_a in known) != (j.link_b in known)), None)
@@ -135,7 +135,7 @@ def guess(
 def _motion(
     mechanism: Mechanism, joint: Constraint, values: Hints, random: np.random.Generator | None, spread: float
 ) -> Placement:
-    """Pose of a joint's second frame in its first, its coordinates moved one after the other."""
+    """Return the pose of a joint's second frame in its first, as a sequence of motions, one per coordinate."""
     coordinates = joint_type(joint.edge.kind).COORDINATES
     pose = Placement()
     if not coordinates and random is not None and joint.edge.kind == "spherical":
@@ -155,7 +155,7 @@ def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> di
 
 
 def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:
-    """Largest difference of coordinates that both have, in radians or fractions of the mechanism's size."""
+    """Return the largest difference of common coordinates, in radians or fractions of the mechanism's size."""
     turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_type(j.edge.kind).COORDINATES)}
     differences = [0.0]
     for key in one.keys() & other.keys():
@@ -165,7 +165,7 @@ def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, ot
 
 
 def _isolated(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> bool:
-    """Whether the joints, with what is prescribed of them, leave no motion."""
+    """Return True when the joints and the prescribed coordinates leave no motion."""
     free = [i for i, link in enumerate(mechanism.links) if i and not link.massless]
     columns = [6 * (i - 1) + k for i in free for k in range(6)]
     gradient = misfit(mechanism, joints, poses).gradient().toarray()[:, columns]

@@ -1,4 +1,4 @@
-"""Plausibility of an assembled mechanism: pins that start outside of their joints, joints that were forgotten."""
+"""Plausibility checks of an assembled mechanism: pins that start outside their joints, joints that may be missing."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from flexclear.pipeline.dynamics.effects.stops.model import STOP, End
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 
-#: surfaces whose inner part is a pin or a ball within a hollow one
+#: contact surfaces of a pin or ball in a hollow part
 ROUND = ("clearance-revolute", "clearance-spherical")
-#: frames that are closer than this fraction of the mechanism's size are at one point; surfaces that are less deep in
-#: each other than this fraction of their clearance or radius may only touch
+#: frames closer than this fraction of the mechanism's size are at one point; penetrations below this fraction of
+#: clearance or radius count as touching
 SAME_POINT = 1e-3
 
 
 def offsets(mechanism: Mechanism) -> Iterator[tuple[Contact, np.ndarray, Placement]]:
-    """Of every pin and ball: its contact, the way from the middle of its hollow to it [m] and its pose at the start.
+    """Yield each pin and ball: its contact, its offset [m] from the middle of the hollow part, and its start pose.
 
-    Along its axis a pin may be anywhere; that part is left out.
+    The offset of a pin leaves out the component along its axis, which is arbitrary.
     """
     for contact in mechanism.contacts:
         if contact.joint.type == STOP or contact.joint.type not in ROUND:
@@ -37,7 +37,7 @@ def offsets(mechanism: Mechanism) -> Iterator[tuple[Contact, np.ndarray, Placeme
 
 
 def refuse_missed(mechanism: Mechanism) -> None:
-    """InputError for a pin or ball that starts outside of its hollow, with its distance."""
+    """Raise InputError for a pin or ball that starts outside its hollow part, with the distance."""
     for contact, away, _ in offsets(mechanism):
         joint, distance = contact.joint, float(np.linalg.norm(away))
         if distance <= joint.clearance + joint.radius:
@@ -52,9 +52,9 @@ def refuse_missed(mechanism: Mechanism) -> None:
 
 
 def refuse_overlap(mechanism: Mechanism) -> None:
-    """InputError for a ball or pin of a rigid mechanism that starts within its hollow's or plane's material.
+    """Raise InputError for a ball or pin of a rigid mechanism that starts within the material of hollow part or plane.
 
-    What rounding of poses may explain is left to the run, which closes the loops exactly.
+    Small overlaps, which rounding of poses may cause, pass: the run closes the loops exactly.
     """
     scene = mechanism.scene
     if scene.start is not None and scene.start.at is not None:
@@ -72,7 +72,7 @@ def refuse_overlap(mechanism: Mechanism) -> None:
 
 
 def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
-    """InputError for surfaces that start so deep in each other [m or rad], unless the scene says how that began."""
+    """Raise InputError for a start penetration `depth` [m or rad] of surfaces, unless an approach speed is given."""
     joint = contact.joint
     if joint.initial_approach_speed is not None:
         return
@@ -93,7 +93,7 @@ def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
 
 
 def length(metres: float) -> str:
-    """A length in m, mm or um."""
+    """Return a length as text in m, mm or um."""
     for factor, unit in ((1.0, "m"), (1e3, "mm")):
         if metres * factor >= 1.0:
             return f"{metres * factor:.4g} {unit}"
@@ -101,13 +101,13 @@ def length(metres: float) -> str:
 
 
 def unused_frames(mechanism: Mechanism) -> list[str]:
-    """Frames that the scene names nowhere outside of its bodies."""
+    """Return the frames that the scene names nowhere outside its bodies."""
     written = mechanism.scene.model_dump_json(exclude={"body", "title", "description"}, exclude_none=True)
     return [name for name in mechanism.frames if name not in written]
 
 
-def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
-    """Unused frames at one point of two bodies that nothing connects, as without a joint: body, text and remedy."""
+def missing_joints(mechanism: Mechanism) -> list[tuple[str, str, str]]:
+    """Return unused frames at one point of two unconnected bodies, where a joint may be missing: body, text, remedy."""
     parts = (*mechanism.scene.joint.values(), *mechanism.scene.load.values())
     connected = {frozenset(_links(mechanism, part.between)) for part in parts if hasattr(part, "between")}
     result = []
@@ -127,7 +127,7 @@ def _links(mechanism: Mechanism, frames: tuple[str, str]) -> list[int]:
 
 
 def _position(mechanism: Mechanism, frame: str) -> np.ndarray:
-    """Where a frame starts, from the kernels' origin [m]."""
+    """Return the start position of a frame, from the kernels' origin [m]."""
     there = mechanism.frames[frame]
     link = mechanism.links[mechanism.link_of[there.body]]
     position: np.ndarray = link.start.of(link.places[there.body]).point(there.place.p)

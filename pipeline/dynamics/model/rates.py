@@ -1,14 +1,14 @@
-r"""Rates at which closures open when the tree moves, each next to the size that such a rate may have.
+r"""Jacobian of the closures from joint axes and frames alone, scaled by the natural size of each entry.
 
-Which rows of the closures' Jacobian are independent is a question of size: an entry is zero when it is nothing but
-rounding. Rounding is proportional to the terms whose sum an entry is, not to the sum: a hinge's axis that
-meets a point of the closure contributes the turn times its distance along the axis, which cancels. So every entry
-has a natural size: that of a turn is the distance between the two joints, of a slide its way. Rows and columns are
-scaled until the natural sizes in each reach up to one:
+Which rows of the Jacobian are independent is a question of size: an entry is zero when it is only rounding. Rounding is
+proportional to the terms whose sum an entry is, not to the sum. A hinge axis that meets a point of the closure, for
+instance, contributes the rotation times the distance along the axis, which cancels. So every entry has a natural size:
+that of a rotation is the distance between the two joints, that of a slide its displacement. Rows and columns are scaled
+until the largest natural size in each is one:
 
 .. math:: J' = D_r J D_c, \qquad \max_j (D_r N D_c)_{ij} = \max_i (D_r N D_c)_{ij} = 1
 
-Then a singular value of J' is a pure number that depends on no unit, no mass, no axes and no size, and has an absolute
+Then the singular values of J' are pure numbers, independent of units, masses, axes and size, and have an absolute
 floor. Small parts of large mechanisms keep their own scale.
 
 Source: scaling: Ruiz (2001), A scaling algorithm to equilibrate both rows and columns norms in matrices, Rutherford
@@ -33,21 +33,20 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
-#: a turn counts as having at least this arm, in units of the mechanism's size: positions are not more exact at smaller
-#: distances
+#: least arm of a rotation, in units of the mechanism's size: positions are not more exact at smaller distances
 LEAST_ARM = 1e-3
-#: singular values of naturally sized rows below this are zero.  It is above what is left of a zero: an entry is a
-#: sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
-#: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it
-#: is below the root of `closures.SINGULAR_PIVOT`, 3e-7, where the kernels no longer solve for a row.
+#: singular values of naturally sized rows below this are zero.  The bound is above the rounding of a zero: an entry is
+#: a sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
+#: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it is
+#: below the root of `closures.SINGULAR_PIVOT`, 3e-7, at which the kernels no longer solve for a row.
 ZERO_SINGULAR_VALUE = 1e-7
-#: rounds of scaling; each halves the exponents by which rows and columns differ
+#: iterations of scaling; each halves the exponents by which rows and columns differ
 SCALING_ROUNDS = 12
 
 
 @dataclass(frozen=True)
 class Motions:
-    """Unit motion of every column of a numbering: turn [rad], displacement [m] of the point `at`; (columns, 3) each."""
+    """Unit motion of each column of a numbering: rotation [rad], displacement [m] of point `at`; each (columns, 3)."""
 
     turn: np.ndarray
     shift: np.ndarray
@@ -55,15 +54,15 @@ class Motions:
 
     @property
     def twists(self) -> np.ndarray:
-        """Turn, and displacement of the point at the origin, shape (columns, 6)."""
+        """Rotation, and displacement of the point at the origin, shape (columns, 6)."""
         return np.hstack([self.turn, self.shift + np.cross(self.at, self.turn)])
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Closure rows against unit motions of the free coordinates, J (rows, nv), and of the driven ones, (rows, drives).
+    """Scaled Jacobian of the closures: of free coordinates, J (rows, nv), and of driven ones, `known` (rows, drives).
 
-    Scaled by their natural sizes: by `row` and by `column`, which are shaped like one row and column of both.
+    row, column: factors of scaling, of each row and of each column of both.
     """
 
     J: np.ndarray
@@ -73,7 +72,7 @@ class Rates:
 
     @cached_property
     def decomposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """U, singular values, V^T of J, complete."""
+        """U, singular values and V^T of J, complete."""
         return np.linalg.svd(self.J)
 
     @property
@@ -88,30 +87,30 @@ class Rates:
 
     @property
     def free(self) -> np.ndarray:
-        """Motions of the free coordinates that open nothing, shape (nv, nv - rank)."""
+        """Motions of the free coordinates at which all residual rates are zero, shape (nv, nv - rank)."""
         nv = self.J.shape[1]
         return self.column[:nv, None] * self.decomposed[2][self.rank :].T
 
     @property
-    def stresses(self) -> np.ndarray:
-        """Combinations of rows that no free motion opens: multipliers in balance; shape (rows - rank, rows)."""
+    def self_stresses(self) -> np.ndarray:
+        """Left null space of J: multipliers in balance without loads (self-stresses), shape (rows - rank, rows)."""
         return self.decomposed[0][:, self.rank :].T * self.row
 
     @property
-    def tied(self) -> np.ndarray:
-        """Whether each driven coordinate takes part in what closures demand of driven ones alone; shape (drives,)."""
+    def dependent_drives(self) -> np.ndarray:
+        """True for each driven coordinate in a dependence among driven coordinates alone; shape (drives,)."""
         left = self.decomposed[0][:, self.rank :].T @ self.known
         return np.asarray(np.max(np.abs(left), axis=0, initial=0.0) > ZERO_SINGULAR_VALUE)
 
 
 def rates(model: Model, poses: Sequence[Placement]) -> Rates:
-    """How the closures of a mechanism open at these poses of its links."""
+    """Return the scaled Jacobian of a mechanism's closures at these poses of its links."""
     numbering, L = model.numbering, model.length
     motion, speeds = motions(model, poses), model.nv + len(model.drives)
     J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
     first = 0
     for closure in model.closures:
-        for acts in acting(closure, poses, L):
+        for acts in row_axes(closure, poses, L):
             mine, factor = slice(first, first + len(acts.factor)), acts.factor
             route = uncommon(closure_route(numbering, numbering.site(acts.a), numbering.site(acts.b)))
             for coordinate, column, sign in route:
@@ -128,11 +127,11 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     return Rates(J[:, : model.nv], J[:, model.nv :], by_row, by_column)
 
 
-class Acting(NamedTuple):
-    """What the rows of a closure are between two sites a and b: each a turn about a direction, or a way along one.
+class RowAxes(NamedTuple):
+    """Rows of a closure between two sites a and b: each a rotation about a direction, or a displacement along one.
 
-    directions: of each row, unit vectors where the loop is closed, (rows, 3).  turning, factor: of each row, which it
-    is, and what a radian or a metre of it counts for; (rows,).  point: origin of b.
+    directions: unit vector of each row where the loop is closed, (rows, 3).  turning: True for rotations, (rows,).
+    factor: of a row's radian or metre, (rows,).  point: origin of b.
     """
 
     a: Site
@@ -143,29 +142,29 @@ class Acting(NamedTuple):
     point: np.ndarray
 
     def wrenches(self, length: float) -> np.ndarray:
-        """Moment about the kernels' origin, in units of force times size, and force of each row; (rows, 6)."""
+        """Return moment about the kernels' origin, in units of force times size, and force of each row; (rows, 6)."""
         along = np.where(self.turning[:, None], 0.0, self.directions)
         moment = np.where(self.turning[:, None], self.directions, np.cross(self.point, along))
         return self.factor[:, None] * np.hstack([moment, length * along])
 
 
-def acting(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[Acting]:
-    """The rows of a closure, in radians or the mechanism's size, for each pair of sites between which it acts."""
+def row_axes(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[RowAxes]:
+    """Return the rows of a closure, in radians or the mechanism's size, for each pair of sites that it acts on."""
     frames = [(poses[a.link].of(a.place), poses[b.link].of(b.place)) for a, b in closure.ends]
     if isinstance(closure, Coupling):
         unit = 1.0 if closure.second.coordinate.turning else length
         sides = zip(closure.ends, closure.parts, frames, strict=True)
         return [
-            Acting(*ends, side.along(poses)[None], np.array([side.coordinate.turning]), np.array([factor / unit]), B.p)
+            RowAxes(*ends, side.along(poses)[None], np.array([side.coordinate.turning]), np.array([factor / unit]), B.p)
             for ends, (side, factor), (_, B) in sides
         ]
     demanded, (_, B) = demands(closure.edge.kind, *frames[0]), frames[0]
     directions = np.where(demanded.turning[:, None], demanded.wrenches[:, :3], demanded.wrenches[:, 3:])
-    return [Acting(*closure.ends[0], directions, demanded.turning, np.where(demanded.turning, 1.0, 1.0 / length), B.p)]
+    return [RowAxes(*closure.ends[0], directions, demanded.turning, np.where(demanded.turning, 1.0, 1.0 / length), B.p)]
 
 
 def motions(model: Model, poses: Sequence[Placement]) -> Motions:
-    """Unit motions of all columns: a radian, the mechanism's size, or of modes that size times the root of the mass."""
+    """Return all columns' unit motions: 1 rad, the mechanism's size, for modes that size times the root of the mass."""
     numbering, mechanism = model.numbering, model.mechanism
     turn, shift, at = (np.zeros((numbering.columns, 3)) for _ in range(3))
     for i, link in enumerate(mechanism.links):
@@ -186,7 +185,7 @@ def motions(model: Model, poses: Sequence[Placement]) -> Motions:
 
 
 def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Turn and displacement of a frame of a flexible link per mode, relative to its inboard frame, undeformed."""
+    """Return rotation and displacement per mode of a flexible link's frame, relative to the inboard one, undeformed."""
     own, unit = model.links[link].branch.frame, model.length * model.links[link].mass ** 0.5
     turn, shift, at = _frame_motions(model, link, frame, pose)
     if own is not None:
@@ -205,7 +204,7 @@ def _frame_motions(model: Model, link: int, frame: str, pose: Placement) -> tupl
 
 
 def scales(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Factors of rows and columns that bring the largest of each to one; empty ones keep the factor one."""
+    """Return factors of rows and columns that bring the largest entry of each to one; empty ones have factor one."""
     row, column = np.ones(sizes.shape[0]), np.ones(sizes.shape[1])
     for _ in range(SCALING_ROUNDS):
         now = sizes * row[:, None] * column

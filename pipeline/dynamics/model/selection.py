@@ -1,8 +1,8 @@
-"""Which closure rows are solved for, where some follow from the others.
+"""Selection of independent closure rows, for which the kernels solve.
 
-Loops of a planar mechanism in space, or Bricard's, ask for the same thing several times. Their
-multipliers are then not unique and J M^-1 J^T is singular, though the motion is as determined as
-ever. A selection keeps as many rows as the rank says; the others are only observed.
+Loops of a planar mechanism in space, or Bricard's linkage, impose the same condition several times. Their multipliers
+are then not unique and J M^-1 J^T is singular, although the motion is determined. A selection keeps as many rows as the
+rank; the others are only observed.
 """
 
 from __future__ import annotations
@@ -16,21 +16,20 @@ from flexclear.pipeline.dynamics.model.arrays import envelope_size
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.wiring import closure_envelope, threes
 
-#: a row below this fraction of its natural length is rounding: the square root of what rounding leaves of a cancelling
-#: sum, 1e-13 at worst, with some digits to spare
+#: rows below this fraction of their natural length are rounding: the square root of the rounding in a cancelling sum,
+#: 1e-13 at worst, with some digits to spare
 ROUNDING_ROW = 1e-6
 
 
 def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray, float]:
-    """Rows to keep, as many as `rank`, and their least pivot: 1 for rows at right angles, 0 for dependent ones.
+    """Return the mask of `rank` rows to keep, and their least pivot: 1 for rows at right angles, 0 for dependent ones.
 
-    spread: J L^-T, shape (rows, nv), a row each in the metric of the mass, M = L L^T.  scale: what a row's
-    length is compared with, so that one that has shrunk to nothing is not mistaken for a good one; a row of the scale 0
-    moves nothing.  QR decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each
-    row selected is the one that is most independent from those before.  Of rows that are no numbers the first ones are
-    selected, with the pivot 0.
+    spread: J L^-T, shape (rows, nv), each row in the metric of the mass, M = L L^T.  scale: reference of each row's
+    length, so that a row that has shrunk to rounding is not selected; a row of scale 0 moves nothing.  Method: QR
+    decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each row selected is the
+    most independent of the previous ones.  If any number is not finite, the first rows are selected, with the pivot 0.
     """
-    from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
+    from scipy.linalg import qr  # slow to import, and most mechanisms have no redundant rows
 
     selected, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
     if not count:
@@ -45,9 +44,9 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
 
 
 def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndarray:
-    """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,).
+    """Return, per row, the length of the longest row of the same closure and kind (along, turning); shape (rows,).
 
-    Not less than a small fraction of the row's natural length: rows that are nothing but rounding must stay small.
+    The scale is at least a small fraction of the row's natural length, so that rows of mere rounding stay small.
     """
     kinds, scales = model.arrays.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
     lengths = np.linalg.norm(spread, axis=1)
@@ -60,11 +59,11 @@ def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndar
 
 
 def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, factor: np.ndarray) -> np.ndarray:
-    """Length in the metric of the mass that each closure row would have if nothing cancelled in it; shape (rows,).
+    """Return the length in the metric of the mass that each closure row would have without cancellation; shape (rows,).
 
-    columns: rows of the work space's table COLUMNS; points: origins of all sites, (sites, 3);
-    factor: L of the mass matrix.  A turn counts with the mechanism's size as its arm, which only rounding resolves.
-    All are 0 where the mass matrix has no factor.
+    columns: rows of the work space's table COLUMNS; points: origins of all sites, (sites, 3); factor: L of the mass
+    matrix.  A rotation has the mechanism's size as its arm, in place of distances that only rounding resolves.
+    All lengths are 0 where the mass matrix has no factor.
     """
     from scipy.linalg import solve_triangular
 
@@ -90,7 +89,7 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
 
 
 def _acting(model: Model, c: Any) -> list[tuple[int, np.ndarray, float]]:
-    """Of each part of a closure (a row of CLOSURES): its second site, whether its rows turn, and their factor."""
+    """Return per part of a closure (row of CLOSURES): second site, mask of its rotational rows, and their factor."""
     arrays, k = model.arrays, c["coupling"]
     if k < 0:
         return [(c["site_b"], arrays.table(m.CLOSURE_ROWS)["kind"][c["row0"] : c["row0"] + c["n_rows"]] == 1, 1.0)]
@@ -101,9 +100,9 @@ def _acting(model: Model, c: Any) -> list[tuple[int, np.ndarray, float]]:
 
 
 def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
-    """Write into h, a copy of the model's wiring, that the `selected` rows are solved for.
+    """Write into h, a copy of the model's topology tables, the `selected` rows for which the kernels solve.
 
-    selected: per row of the closure table.  No size and no offset changes except the number of rows solved for.
+    selected: mask over all closure rows.  Sizes and offsets do not change, except the number of rows solved for.
     """
     all_rows = model.arrays.table(m.CLOSURES)
     closures, rows = model.arrays.table(m.CLOSURES, h), model.arrays.table(m.CLOSURE_ROWS, h)
@@ -124,7 +123,7 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
 
 
 def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
-    """Selected rows against free coordinates, shape (..., kept, nv), from what the kernels store on the supports.
+    """Return selected rows by free coordinates, (..., kept, nv), from the supports that the kernels store.
 
     stored: JACOBIAN or SPREAD of the work space, shape (..., size).
     """
@@ -140,25 +139,25 @@ def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     return full
 
 
-def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
-    """Place of each selected row among all, as residuals and their rates are stored."""
+def selected_indices(model: Model, h: np.ndarray) -> np.ndarray:
+    """Return the index of each selected row among all rows, the order of residuals and their rates."""
     spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in model.arrays.table(m.CLOSURES, h))
     return np.array([k for span in spans for k in span], dtype=np.int64)
 
 
 def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Which free coordinates the closures of the selected rows depend on; masks (selected rows,) -> (nv,)."""
+    """Return the mask (nv,) of free coordinates in the closures of some rows; chosen: mask (selected rows,)."""
     support, mask = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
     for c in model.arrays.table(m.CLOSURES, h):
         if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
             mask[support[c["support0"] : c["support0"] + c["n_support"]]] = True
-    for body in model.arrays.table(m.FLEXES):  # of which a closure may depend on some shapes
+    for body in model.arrays.table(m.FLEXES):  # a closure may involve only some shapes of a body
         modes = slice(body["c0"], body["c0"] + body["n_modes"])
         mask[modes] = np.any(mask[modes])
     return mask
 
 
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
-    """Name of the joint to which each selected row belongs."""
+    """Return the name of the joint of each selected row."""
     counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
     return [closure.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]

@@ -1,4 +1,4 @@
-"""Where a scene puts its bodies at the start, also where joints, drives and poses do not fit; nothing is compiled."""
+"""Start pose of a scene without compilation, also where joints, drives and poses do not fit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
-from flexclear.pipeline.dynamics.model.assembly import assembled, settled
+from flexclear.pipeline.dynamics.model.assembly import assembled, with_starts
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints
 from flexclear.pipeline.dynamics.model.driving import label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: residuals below these are rounding of a closed mechanism: a fraction of its size, and an angle [rad]
+#: residuals below these are rounding of a closed mechanism: as a fraction of its size, and an angle [rad]
 CLOSED_POSE, STRAIGHT = 1e-8, 1e-7
 
 
 @dataclass(frozen=True)
 class Gap:
-    """What a joint or its drive misses: from where its second frame would have to be to where it is, world axes [m].
+    """Residual of a joint or its drive: from the required to the actual position of its second frame, world axes [m].
 
-    distance: length of that way [m].  angle: by which the joint or its drive is turned away, besides [rad].
+    angle: residual angle of the joint or its drive [rad].
     """
 
     joint: str
@@ -45,15 +45,15 @@ class Gap:
 
     @property
     def distance(self) -> float:
-        """Between the two places [m]."""
+        """Distance between the two positions [m]."""
         return float(np.linalg.norm(self.end - self.start))
 
 
 @dataclass(frozen=True)
 class StartPose:
-    """data: a run (schema RUN, in part) of one output at which nothing moves.  gaps: of joints that do not fit.
+    """data: a run (schema RUN, in part) of one output, at rest.  gaps: of joints that do not fit.
 
-    refused: why the start is refused; None where it fits.
+    refused: error with which the start is refused; None where the joints fit.
     """
 
     data: xr.Dataset
@@ -62,10 +62,10 @@ class StartPose:
 
 
 def start_pose(scene: Scene, bundles: Mapping[str, Labelled], drawn: Mapping[str, xr.Dataset]) -> StartPose:
-    """The start of a scene as its joints place it, or, where they cannot fit, as the poses and the joints' tree do.
+    """Return the start that the joints allow or, where they do not fit, the start by poses and the tree of the joints.
 
-    bundles: of flexible bodies, undeformed (mass, inertia, frames), by name.  drawn: the same of all bodies with a
-    mesh.  Raises InputError where not even the tree of the joints can be built.
+    bundles: mass, inertia, frames of undeformed flexible bodies, by name.  drawn: the same for all bodies with a mesh.
+    Raises InputError where not even the tree of the joints can be built.
     """
     mechanism, refused = build(scene, bundles), None
     try:
@@ -79,10 +79,10 @@ def start_pose(scene: Scene, bundles: Mapping[str, Labelled], drawn: Mapping[str
 
 
 def _open(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with bodies without poses put where one joint each has them; loops may stay open."""
+    """Return the mechanism with each body without a pose put where one joint has it; loops may stay open."""
     starts, placed = given_coordinates(mechanism.scene), given_start.given_links(mechanism)
     joints = constraints(mechanism, starts=starts)
-    return settled(mechanism, guess(mechanism, joints, placed, targets(joints, starts)[1]))
+    return with_starts(mechanism, guess(mechanism, joints, placed, targets(joints, starts)[1]))
 
 
 def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> list[Gap]:
@@ -102,7 +102,7 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
 
 
 def _loose(mechanism: Mechanism) -> list[Gap]:
-    """Balls and pins that start outside of their sockets."""
+    """Return gaps of balls and pins that start outside their sockets."""
     result = []
     for contact, away, inner in offsets(mechanism):
         if np.linalg.norm(away) > 2.0 * contact.joint.clearance:
@@ -153,7 +153,7 @@ def _data(mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def _pose(mechanism: Mechanism, body: str) -> Placement:
-    """Of a body's frame in the world."""
+    """Return the pose of a body's frame in the world."""
     link = mechanism.links[mechanism.link_of[body]]
     here = link.start.of(link.places[body])
     return here if link is mechanism.links[0] else Placement(here.p + mechanism.origin, here.R)

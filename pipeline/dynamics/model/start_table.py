@@ -1,4 +1,4 @@
-"""What the table ``[start]`` says of joints and modes, in SI numbers; what cannot be meant is refused."""
+"""Start values of joints and modes from the table ``[start]``, in SI and validated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Given:
     """Start of coordinate `number` of a joint: position and near [m or rad], velocity [m/s or rad/s]; None: not given.
 
-    place: where the scene says so.
+    place: key path in the scene.
     """
 
     joint: str
@@ -35,14 +35,14 @@ class Given:
 
     @property
     def name(self) -> str:
-        """As records call it, shortened where the joint has but one coordinate."""
+        """Name of the coordinate in records, which is the joint's where the joint has only one."""
         return self.place.removeprefix("[start.joint.").removesuffix("]")
 
 
 def given_coordinates(scene: Scene) -> list[Given]:
-    """The joint coordinates that the scene gives a start.
+    """Return the joint coordinates to which the scene gives a start.
 
-    Raises InputError for joints and coordinates that are not there, and for units that do not fit.
+    Raises InputError for unknown joints and coordinates, and for units that do not fit.
     """
     rows = []
     for joint, coordinates in (scene.start.joint if scene.start is not None else {}).items():
@@ -63,7 +63,7 @@ def given_coordinates(scene: Scene) -> list[Given]:
 
 
 def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coordinate") -> dict[str, np.ndarray]:
-    """Modal coordinates [m], or by another key velocities [m/s], of the bodies that the scene gives some; (mode,).
+    """Return modal coordinates [m], or with key "velocity" modal velocities [m/s], by body; (mode,) each.
 
     Raises InputError for bodies that are not flexible, and for more numbers than modes.
     """

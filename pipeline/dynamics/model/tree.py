@@ -1,4 +1,4 @@
-"""Spanning tree of links and joints; what is left over are closures."""
+"""Spanning tree of links and joints; the joints that the tree does not use are closures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexclear.pipeline.dynamics.joints import HELD
 from flexclear.pipeline.dynamics.model.driving import joint_drives, joint_type
 from flexclear.pipeline.dynamics.model.merge import Frame, Group, find_frame
 
-#: kind of an edge that is no joint of the scene: a frame's pose in the world, prescribed in part or whole
+#: kind of an edge for a frame's pose in the world, prescribed in part or whole, instead of a joint of the scene
 PATH = "path"
 
 
@@ -21,7 +21,7 @@ class Edge:
     """A joint between two groups, or the path of a frame in the world (PATH).
 
     drives: prescribed coordinate of each freedom, or None; empty when none is prescribed.
-    vector: whether a path turns by a rotation vector.
+    vector: True when the path gives a rotation vector.
     """
 
     name: str
@@ -36,9 +36,9 @@ class Edge:
 
 @dataclass(frozen=True)
 class Branch:
-    """A link of the tree: its group, its parent link, and the joint that carries it.
+    """A link of the tree: its group, its parent link, and the joint that carries the link.
 
-    reverse: the joint's second frame is on the parent.  edge: None for a body that nothing holds.
+    reverse: the joint's second frame is on the parent.  edge: None for a body without joint.
     """
 
     group: int
@@ -48,12 +48,12 @@ class Branch:
 
     @property
     def frame(self) -> str | None:
-        """The joint's frame on the link itself; None for a body that nothing holds."""
+        """The joint's frame on the link itself; None for a body without joint."""
         return None if self.edge is None else self.edge.frame_a if self.reverse else self.edge.frame_b
 
 
 def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
-    """Joints between different groups, and paths. Of a clearance joint, what it holds next to its contact."""
+    """Return joints between different groups, and paths; of a clearance joint, its constraints beyond the contact."""
     driven = joint_drives(scene)
     result = []
     contacts = scene.contacts()
@@ -76,7 +76,7 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
 
 
 def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
-    """Edges from the ground to the frames whose pose is prescribed."""
+    """Return edges from the ground to the frames whose pose is prescribed."""
     result: list[Edge] = []
     for name, drive in scene.drive.items():
         if not isinstance(drive, PathDrive):
@@ -96,10 +96,10 @@ def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int
 
 
 def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Edge]]:
-    """Links in an order where parents come first (link 0 is the ground), and the closures.
+    """Return links, parents first (link 0 is the ground), and the closures.
 
-    The tree takes joints with prescribed coordinates first, then those with the fewest free
-    coordinates, then those nearest to the ground: that keeps the unknowns and the chains short.
+    The tree takes joints with prescribed coordinates first, then those with the fewest free coordinates, then those
+    nearest to the ground: that keeps the unknowns few and the chains short.
     """
     branches = [Branch(0, -1, None)]
     link_of = {0: 0}

@@ -1,4 +1,4 @@
-"""Index tables of the equations: mass-matrix entries, envelopes, closure supports."""
+"""Index tables of the equations: entries of the mass matrix, envelopes, supports of the closures."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
 def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
-    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE.
+    """Return the tables PAIRS, KNOWN_PAIRS and ENVELOPE.
 
-    A coordinate's momentum (that of all it moves) times the column of a coordinate nearer to the
-    ground is their entry of the mass matrix.  Articulated inertias store a number per coordinate of a joint instead,
-    and behind these the entries between the modes of each body.
+    An entry of the mass matrix is the momentum of one coordinate (of all that it moves) times the column of a
+    coordinate nearer to the ground.  Articulated inertias store a number per coordinate of a joint instead, and behind
+    these the entries between the modes of each body.
     """
     products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
     for i in range(1, len(numbering.mechanism.links)):
@@ -37,7 +37,7 @@ def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
         if c < numbering.nv and d < numbering.nv:
             first[max(c, d)] = min(first[max(c, d)], c, d)
     for link, modes in numbering.modal_coordinates.items():
-        # held shapes are coupled to moving ones where the body moves with these, and by stiffness (`projection`)
+        # stiffness couples held and moving shapes (`projection`), and so does mass where the latter move the body
         if numbering.bases[link].held or flexible_bodies.coupled(numbering.mechanism, link):
             for c in numbering.moving(link):
                 first[c] = min(first[c], modes.start)
@@ -63,7 +63,7 @@ def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
 
 
 def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, int]]:
-    """Entries between the moving shapes of a flexible parent through the link i that it carries."""
+    """Return the entries between the moving shapes of a flexible parent that come from the link i which it carries."""
     port = numbering.port_of(i - 1)
     if port < 0:
         return []
@@ -74,7 +74,7 @@ def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, in
 def closures(
     numbering: Numbering, closing: Sequence[Closure | Coupling]
 ) -> tuple[dict[Any, Any], tuple[Closure | Coupling, ...]]:
-    """Tables of the closures, and these in their order there, for a thin envelope; closing: joints, then couplings."""
+    """Return the closures' tables, and the closures ordered for a thin envelope; closing: joints, then couplings."""
     ends = [[(numbering.site(a), numbering.site(b)) for a, b in one.ends] for one in closing]
     routes = [[closure_route(numbering, a, b) for a, b in parts] for parts in ends]
     order = _order([{c for route in parts for c, _, _ in route} for parts in routes])
@@ -117,7 +117,7 @@ def closures(
 
 
 def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tuple[int, ...]]:
-    """Rows of the table PATHS between the ground and some sites; slots: coordinates of the closure's support."""
+    """Return the rows of the table PATHS from some sites to the ground; slots: coordinates of the closure's support."""
     links: set[int] = set()
     for site in sites:
         link = numbering.sites[site].link
@@ -126,7 +126,7 @@ def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tupl
             link = numbering.mechanism.links[link].branch.parent
 
     def slot(coordinates: range) -> int:
-        """Slot of the first of some coordinates, or -1 where there are none that are free."""
+        """Return the slot of the first of some coordinates, or -1 where none of them is free."""
         return slots.index(coordinates.start) if coordinates and coordinates.start < numbering.nv else -1
 
     shapes = {i: slot(numbering.moving(i)) for i in links & numbering.bases.keys()}
@@ -135,24 +135,24 @@ def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tupl
 
 
 def threes(count: int) -> int:
-    """Into how many groups of three, the last of which may be smaller, so many rows of a closure go."""
+    """Return the number of groups of three, the last perhaps smaller, that hold `count` rows of a closure."""
     return -(-count // 3)
 
 
 def closure_route(numbering: Numbering, a: int, b: int) -> list[tuple[int, int, int]]:
-    """(coordinate, column, sign) of both sides."""
+    """Return (coordinate, column, sign) of all motions that move site b (sign 1) or site a (sign -1)."""
     return [(c, col, 1) for c, col in numbering.route(b)] + [(c, col, -1) for c, col in numbering.route(a)]
 
 
 def uncommon(route: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
-    """What is left after motions common to both sides cancel."""
+    """Return a route without the motions that move both sides, which cancel."""
     plus = {col for _, col, sign in route if sign > 0}
     minus = {col for _, col, sign in route if sign < 0}
     return [(c, col, sign) for c, col, sign in route if col not in plus & minus]
 
 
 def _order(supports: list[set[int]]) -> list[int]:
-    """Reverse Cuthill-McKee on "shares a coordinate"."""
+    """Return an order of the closures for a thin envelope; closures that share a coordinate are neighbours."""
     n = len(supports)
     if n < 2:
         return list(range(n))
@@ -162,8 +162,8 @@ def _order(supports: list[set[int]]) -> list[int]:
 def reverse_cuthill_mckee(joined: np.ndarray) -> list[int]:
     """Return an order of the nodes for a thin envelope; joined: symmetric (n, n), true between neighbours.
 
-    Breadth first from nodes of low degree, neighbours by rising degree, and all of it backwards.  A node that is its
-    own neighbour counts twice.  As of `scipy.sparse.csgraph`, whose import takes 0.7 s of a run's 2.5 s.
+    Breadth first from nodes of low degree, neighbours by rising degree, then reversed.  A node that is its own
+    neighbour counts twice, as in `scipy.sparse.csgraph`, whose import takes 0.7 s of a run's 2.5 s.
     Source: Cuthill & McKee (1969), Proc. 24th Nat. Conf. ACM, 157-172; George & Liu (1981), sec. 4.3.
     """
     degree = (joined.sum(axis=1) + np.diag(joined)).astype(np.int32)
@@ -184,7 +184,7 @@ def reverse_cuthill_mckee(joined: np.ndarray) -> list[int]:
 
 
 def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]:
-    """Pairs of closures with common coordinates, the common slots, and the envelope of J M^-1 J^T."""
+    """Return the tables of pairs of closures with common coordinates, of the common slots, and of the envelope."""
     pairs: list[tuple[int, ...]] = []
     common: list[tuple[int, int]] = []
     users: dict[int, list[int]] = {}
@@ -203,7 +203,7 @@ def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]
 
 
 def closure_envelope(closures: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """First column and origin of each selected row of J M^-1 J^T, shape (rows, 2); pairs: rows of CLOSURE_PAIRS."""
+    """Return first column and origin of each selected row of J M^-1 J^T, (rows, 2); pairs: rows of CLOSURE_PAIRS."""
     first = closures["kept0"].copy()
     for a, b in zip(pairs["a"], pairs["b"], strict=True):
         first[b] = min(first[b], closures["kept0"][a])

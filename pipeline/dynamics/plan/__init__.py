@@ -1,2 +1,2 @@
-"""Which effects of a scene its requested accuracy calls for: bounds first, then short runs, then what is left is
-kept."""
+"""Plans: which effects of a scene its requested accuracy requires. Bounds come first, then short runs; remaining
+effects are kept."""

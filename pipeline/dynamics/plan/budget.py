@@ -1,4 +1,4 @@
-"""The budget of a plan: the error that is requested, what dropped effects have spent of it, and what was decided."""
+"""Error budget of a plan: the requested accuracy, the part that dropped effects use up, and the decisions."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene.plan_decisions import PILOT, Decision
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE
-from flexclear.pipeline.dynamics.plan.screening_runs import Pilots
+from flexclear.pipeline.dynamics.plan.screening_runs import ScreeningRuns
 
-#: fraction of the requested accuracy that dropped effects may use up together; the rest is for what is not estimated
+#: fraction of the requested accuracy that dropped effects may use up together; the rest is for errors without estimate
 BUDGET = 0.75
-#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a fraction of that
+#: uncertainty of the effect of rigid bodies' impacts on rates and forces where bodies are flexible, as a fraction
 OF_IMPACTS = 0.5
-#: what an influence measured with pilots' tolerance may be wrong by, as a fraction of it
-OF_PILOT = 0.15
-#: what the rest of the time may add to what a run over a part of it shows, as a fraction
+#: uncertainty of an effect size measured with the tolerance of screening runs, as a fraction of the effect size
+OF_SCREENING = 0.15
+#: possible increase of an effect size over the rest of the time, when a run covers only a part, as a fraction
 WHOLE = 1.0
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown.
+    """Integration of the planned scene. level: of modes, None: all.  error: by quantity [SI], NaN where unknown.
 
-    ledger_tolerance: energy error beyond which the run is refused, where it is not the usual one.
-    evaluations, reference: that a run of all the time takes, and one by what it was compared with, where that is known.
+    ledger_tolerance: energy error beyond which the run is refused, where it differs from the default.
+    evaluations, reference: evaluations of a run over all the time, and of its reference run, where known.
     """
 
     integrator: str
@@ -40,35 +40,35 @@ class Chosen:
     reference: float = np.nan
 
 
-#: the planned run is that of the scene: its integrator and tolerance stay
-AS_IT_IS = Chosen("", 0.0, {})
+#: the planned run equals that of the scene: integrator and tolerance stay
+UNCHANGED = Chosen("", 0.0, {})
 
 
 @dataclass
 class Search:
-    """The state of the decisions. used: of the budget, by quantity, as fractions of the requested accuracy."""
+    """State of the decisions. used: spent budget by quantity, as fractions of the requested accuracy."""
 
-    pilots: Pilots
+    runs: ScreeningRuns
     requested: dict[str, float]
     used: dict[str, float] = field(default_factory=dict)
     decisions: dict[str, Decision] = field(default_factory=dict)
 
     @property
-    def gone(self) -> list[Effect]:
-        """What has been dropped."""
+    def dropped(self) -> list[Effect]:
+        """Effects that have been dropped."""
         return [d.effect for d in self.decisions.values() if not d.kept]
 
-    def fits(self, most: Mapping[str, float], budget: float = BUDGET) -> bool:
-        """Whether influences of at most this much fit into what is left of the budget, for all quantities."""
+    def fits(self, upper: Mapping[str, float], budget: float = BUDGET) -> bool:
+        """Return True when effect sizes of at most `upper` fit into the remaining budget, for all quantities."""
         return all(
-            self.used.get(name, 0.0) + most.get(name, np.inf) / self.requested[name] <= budget
+            self.used.get(name, 0.0) + upper.get(name, np.inf) / self.requested[name] <= budget
             for name in self.requested
         )
 
-    def spend(self, most: Mapping[str, float]) -> None:
-        """Take influences out of the budget."""
+    def spend(self, upper: Mapping[str, float]) -> None:
+        """Subtract effect sizes from the budget."""
         for name in self.requested:
-            self.used[name] = self.used.get(name, 0.0) + most[name] / self.requested[name]
+            self.used[name] = self.used.get(name, 0.0) + upper[name] / self.requested[name]
 
     def decide(
         self,
@@ -79,42 +79,40 @@ class Search:
         estimate: Mapping[str, float] | None = None,
         uncertainty: Mapping[str, float] | None = None,
     ) -> None:
-        """Write down what becomes of an effect."""
+        """Record the decision about an effect."""
         self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
 
     def judge(
-        self, effect: Effect, why: str, most: Mapping[str, float], seen: Mapping[str, Influence], besides: str = ""
+        self, effect: Effect, why: str, upper: Mapping[str, float], sizes: Mapping[str, Influence], besides: str = ""
     ) -> None:
-        """Record what short runs show of an effect, at most and as it was seen.
+        """Record what screening runs show of an effect: upper bounds `upper`, and effect sizes `sizes`.
 
-        why: reason to drop it; empty where it stays, with `besides` before the reason of that.
+        why: reason to drop the effect; empty where it stays, for a reason that `besides` precedes.
         """
-        difference = {name: influence.difference for name, influence in seen.items()}
-        uncertainty = {name: influence.uncertainty for name, influence in seen.items()}
-        reason = why or besides + too_much(most, self.requested)
+        difference = {name: influence.difference for name, influence in sizes.items()}
+        uncertainty = {name: influence.uncertainty for name, influence in sizes.items()}
+        reason = why or besides + too_much(upper, self.requested)
         self.decide(effect, not why, PILOT, reason, difference, uncertainty)
 
 
-def most_of(seen: Mapping[str, Influence]) -> dict[str, float]:
-    """What influences may come to."""
-    return {name: influence.most for name, influence in seen.items()}
+def upper_bounds(sizes: Mapping[str, Influence]) -> dict[str, float]:
+    """Return the upper bounds of effect sizes."""
+    return {name: influence.most for name, influence in sizes.items()}
 
 
-def with_doubt(
-    search: Search, effect_sizes: Mapping[str, Influence], soft: bool, more: float = 0.0
-) -> dict[str, Influence]:
-    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a fraction `more`."""
-    kinds = {q.name: q.kind for q in search.pilots.chosen}
-    doubled = {}
-    for name, i in effect_sizes.items():
-        fraction = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
-        doubled[name] = Influence(i.difference, i.uncertainty + fraction * i.difference)
-    return doubled
+def widened(search: Search, sizes: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
+    """Return effect sizes with uncertainties: of screening runs, of flexible bodies' impacts, a fraction `more`."""
+    kinds = {q.name: q.kind for q in search.runs.chosen}
+    result = {}
+    for name, i in sizes.items():
+        fraction = more + OF_SCREENING + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
+        result[name] = Influence(i.difference, i.uncertainty + fraction * i.difference)
+    return result
 
 
-def too_much(most: Mapping[str, float], requested: Mapping[str, float]) -> str:
-    """Why an effect stays: what it may change most, in words."""
-    name = max(requested, key=lambda n: most[n] / requested[n])
-    if not np.isfinite(most[name]):
+def too_much(upper: Mapping[str, float], requested: Mapping[str, float]) -> str:
+    """Return the reason why an effect stays: its largest possible change, in words."""
+    name = max(requested, key=lambda n: upper[n] / requested[n])
+    if not np.isfinite(upper[name]):
         return f"without it {name} cannot be determined, or has other events"
-    return f"without it {name} may be off by {most[name] / requested[name]:.2g} times what is requested"
+    return f"without it {name} may be off by {upper[name] / requested[name]:.2g} times what is requested"

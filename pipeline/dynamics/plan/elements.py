@@ -1,10 +1,10 @@
-"""How many finite elements a flexible body calls for, from its reduction on a finer mesh.
+"""Number of finite elements that a flexible body needs, from its reduction on a finer mesh.
 
-A run does not know the elements: they cost time once, when the body is reduced, and decide how right its frequencies
-and its compliance are. So the reduction on twice as many elements is enough: by how much frequencies and
-compliance change, and by how much at most what bending does to a quantity changes with them. Errors of beam elements
+Elements do not enter a run: they cost time once, when the body is reduced, and determine the errors of its frequencies
+and its compliance. The reduction on twice as many elements is therefore enough: it gives the changes of frequencies and
+compliance, and a bound for the change of the effect of bending on a quantity. Errors of beam elements
 fall as the fourth power of their length (Strang and Fix, *An Analysis of the Finite Element Method*, ch. 1.6 and 6),
-so the number that an accuracy calls for follows.
+so the number for a requested accuracy follows.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.plan_decisions import Mesh
 
-#: twice as many elements are compared with; errors fall with this power of their length
+#: refinement of the compared mesh; errors decrease with this power of the element length
 TWICE, ORDER = 2, 4
-#: fraction of the requested accuracy that the mesh may err by
+#: fraction of the requested accuracy that the error of the mesh may take
 FRACTION = 0.1
-#: vibrations whose phase has gone wrong by more than this differ by twice their amplitude [rad]
+#: vibrations with a phase error above this differ by twice their amplitude [rad]
 TURNED = 2.0
 
 
@@ -33,26 +33,26 @@ def mesh(
     requested: Mapping[str, float],
     duration: float,
 ) -> Mesh:
-    """The elements of a body.
+    """Return the required number of elements of a body.
 
-    given: its number of elements.  bundle, finer: reduced from these and from twice as many.  bending: what its
-    flexibility does to each quantity, at most.  duration: of the run [s], over which phases of vibrations part.
+    given: its number of elements.  bundle, finer: reduced from these and from twice as many.  bending: bound of its
+    flexibility's effect on each quantity.  duration: of the run [s], over which phases of vibrations diverge.
     """
-    beyond = 1.0 / (1.0 - TWICE ** -float(ORDER))  # what twice as many elements lack still
+    beyond = 1.0 / (1.0 - TWICE ** -float(ORDER))  # includes the remaining error of twice as many elements
     frequency, phase = _frequencies(bundle, finer, duration)
     compliance = _compliance(bundle, finer)
     fraction = beyond * max(compliance, min(TURNED, phase))
     error = {name: fraction * bending.get(name, np.inf) for name in requested}
-    most = max(error[name] / (FRACTION * requested[name]) for name in requested)
-    called_for = given * max(most, np.finfo(float).tiny) ** (1.0 / ORDER) if np.isfinite(most) else given
+    largest = max(error[name] / (FRACTION * requested[name]) for name in requested)
+    called_for = given * max(largest, np.finfo(float).tiny) ** (1.0 / ORDER) if np.isfinite(largest) else given
     return Mesh(given, max(1, int(np.ceil(called_for))), beyond * frequency, beyond * compliance, error)
 
 
 def _frequencies(bundle: Labelled, finer: xr.Dataset, duration: float) -> tuple[float, float]:
-    """Largest change of a frequency, as a fraction, and phase by which the lowest vibration is off in the end [rad]."""
+    """Return the largest relative change of a frequency, and the final phase error of the lowest vibration [rad]."""
     one, two = (np.sort(b["frequency"].values) for b in (bundle, finer))
-    there = min(len(one), len(two))
-    one, two = one[:there], two[:there]
+    count = min(len(one), len(two))
+    one, two = one[:count], two[:count]
     firm = two > 0.0
     if not firm.any():
         return 0.0, 0.0
@@ -61,7 +61,7 @@ def _frequencies(bundle: Labelled, finer: xr.Dataset, duration: float) -> tuple[
 
 
 def _compliance(bundle: Labelled, finer: xr.Dataset) -> float:
-    """Largest change of an entry of the frames' compliance, as a fraction of those of its two directions."""
+    """Return the largest change of an entry of the frames' compliance, as a fraction of those of its two directions."""
     one, two = (_matrix(b) for b in (bundle, finer))
     scale = np.sqrt(np.abs(np.outer(np.diag(two), np.diag(two))))
     least = np.finfo(float).eps * scale.max(initial=0.0)
@@ -69,7 +69,7 @@ def _compliance(bundle: Labelled, finer: xr.Dataset) -> float:
 
 
 def _matrix(bundle: Labelled) -> np.ndarray:
-    """Motions of all frames under unit loads there, shape (6 frames, 6 frames), in the body frame."""
+    """Return motions of all frames under unit loads there, shape (6 frames, 6 frames), in the body frame."""
     shapes = np.concatenate([bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values], axis=1)
     moved = shapes.reshape(-1, shapes.shape[-1])
     compliance: np.ndarray = moved @ np.linalg.solve(bundle["modal_stiffness"].values, moved.T)

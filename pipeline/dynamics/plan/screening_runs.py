@@ -1,4 +1,4 @@
-"""Short runs of a scene's variants, each made once, and what they took."""
+"""Screening runs: short runs of a scene's variants, each made once, with their costs."""
 
 from __future__ import annotations
 
@@ -24,59 +24,57 @@ from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.run import placed
 
-#: starts of pilots with contacts: enough to see whether the motion parts
+#: starts of screening runs with contacts: enough to see whether the motion diverges
 MEMBERS = 3
-#: rigid pilots without contact are integrated to this tolerance; flexible ones by the method for stiff motions to the
-#: second
+#: tolerance of rigid screening runs without contact; tolerance and method of flexible ones, whose motion is stiff
 RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
-#: tolerance of pilots with contacts: this fraction of the least clearance over the mechanism's size, between two limits
-#: (errors of positions are the tolerance times that size, and must stay small next to the clearance)
+#: tolerance of screening runs with contacts: this fraction of the least clearance over the mechanism's size, between
+#: two limits (errors of positions are the tolerance times that size, and must be small compared to the clearance)
 OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
-#: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
-#: 0.2 s on one core.  What takes longer is run over a part of the time, at least so much of it
+#: evaluations times variables of the screening runs of one variant with contacts, all members together: measured, some
+#: 0.2 s on one core.  Longer runs cover a part of the time, at least this much, and shorten by this factor
 ALLOWED, LEAST_PART, SHORTER = 5e6, 0.0625, 0.25
-#: the beginning that is run to know how long the rest takes
+#: initial part of the time whose run predicts the cost of the rest
 BEGINNING = 0.03125
-#: where clearance stays, decisions rest on runs over so many times that part: in most scenes over all of the time
+#: with clearance, decisions rest on runs over this multiple of that part: in most scenes over all of the time
 WHOLE_TIME = 8
-#: a pilot is given up at so many times the evaluations that it is expected to take at most, and is then as one that was
-#: refused
+#: a screening run stops at this multiple of its expected evaluations, and then counts as refused
 GIVEN_UP = 4.0
-#: runs at tight tolerances may take so many times more
+#: runs at tight tolerances may take this many times more
 OF_TIGHT = 2
-#: how refusals name that limit
+#: key path that refusals name for that limit
 TAKES_LONG = "[solver.evaluations]"
-#: what a variant is: the effects that it lacks, and its solver
+#: identity of a variant: the effects that it lacks, and its solver
 Key = tuple[frozenset[str], str]
 
 
 def longest(fraction: float, run: Callable[[float], Point]) -> tuple[float, Point]:
-    """The part of the time, from a fraction down, that does not take too long, and the run over it."""
-    while TAKES_LONG in (there := run(fraction)).refused and fraction > LEAST_PART:
+    """Return the largest part of the time, from a fraction down, whose run is not too long, and that run."""
+    while TAKES_LONG in (point := run(fraction)).refused and fraction > LEAST_PART:
         fraction = max(LEAST_PART, SHORTER * fraction)
-    return fraction, there
+    return fraction, point
 
 
 @dataclass(frozen=True)
 class Extent:
-    """What decides how dear a scene's runs are. size: of the mechanism [m].  variables: of its state."""
+    """Cost of a scene's runs. size: of the mechanism [m].  variables: of its state."""
 
     size: float
     variables: int
 
     @property
     def most(self) -> int:
-        """Evaluations of one run at which it is given up."""
+        """Number of evaluations at which a run stops."""
         return int(GIVEN_UP * WHOLE_TIME * ALLOWED / (MEMBERS * self.variables))
 
 
 @dataclass
-class Pilots:
+class ScreeningRuns:
     """Variants of a scene that have been run.
 
-    bundles: reduced flexible bodies.  fewer: the same of fewer modes, where there are such, levels with the fewest
-    first.  filled: fills in what recipes describe rigid bodies.  points: by what was run.  evaluations: of all.
-    work: these times the variables of each.  refused_loose: whether the loose tolerance was refused.
+    bundles: reduced flexible bodies.  fewer: those with fewer modes, where available, levels with the fewest
+    first.  filled: fills in rigid bodies that recipes describe.  points: results by variant.  evaluations: of all runs.
+    work: evaluations times variables, summed.  refused_loose: True when the loose tolerance was refused.
     """
 
     scene: Scene
@@ -97,14 +95,14 @@ class Pilots:
         """All effects of the scene."""
         return effects(self.scene)
 
-    def _names(self, gone: Collection[Effect]) -> frozenset[str]:
-        """Of effects, and of those within them, which go with them."""
-        names = {effect.name for effect in gone}
+    def _names(self, dropped: Collection[Effect]) -> frozenset[str]:
+        """Return the names of effects, and of the effects within them, which are dropped with them."""
+        names = {effect.name for effect in dropped}
         return frozenset(names | {effect.name for effect in self.every if effect.within in names})
 
-    def variant(self, gone: Collection[Effect]) -> Scene:
-        """The scene without some effects and what lies within them, integrated as pilots are."""
-        names = self._names(gone)
+    def variant(self, dropped: Collection[Effect]) -> Scene:
+        """Return the scene without some effects and those within them, with the integration of screening runs."""
+        names = self._names(dropped)
         if (names, self.refused_loose) not in self._variants:
             bare = without(self.scene, [effect for effect in self.every if effect.name in names])
             self._variants[names, self.refused_loose] = self._made(bare)
@@ -119,7 +117,7 @@ class Pilots:
         return self.filled(edited(bare, {"solver": usual}))
 
     def loose(self, variant: Scene) -> float:
-        """The tolerance of a variant with contacts."""
+        """Return the tolerance of a variant with contacts."""
         clearances = [joint.clearance for joint in variant.contacts().values()]
         if self.refused_loose:
             return RTOL
@@ -129,39 +127,39 @@ class Pilots:
 
     @cached_property
     def extent(self) -> Extent:
-        """Of the full scene."""
+        """Cost parameters of the full scene."""
         model = tabulate(build(placed(self.scene), self.bundles))
         return Extent(model.mechanism.length, model.nq + model.nv)
 
-    def part(self, gone: Collection[Effect]) -> float:
-        """The part of the time over which a variant is compared with others, so that it does not take too long.
+    def part(self, dropped: Collection[Effect]) -> float:
+        """Return the part of the time over which a variant is compared with others, so that it does not take too long.
 
-        Its beginning is run from one start to know, and less where the part then takes too long all the same.
+        A run of the beginning from one start predicts that part; it shrinks where the part still takes too long.
         """
-        begun = self.must_run(gone, BEGINNING, 0)
+        begun = self.must_run(dropped, BEGINNING, 0)
         fraction = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
         fraction = LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
-        return longest(fraction, lambda part: self.must_run(gone, part))[0]
+        return longest(fraction, lambda part: self.must_run(dropped, part))[0]
 
-    def whole(self, gone: Collection[Effect]) -> float:
-        """The part of the time over which a variant that stays loose is examined: all of it where that can be had."""
-        return min(1.0, WHOLE_TIME * self.part(gone))
+    def whole(self, dropped: Collection[Effect]) -> float:
+        """Return the part of the time over which a variant with clearance is examined: all of it where affordable."""
+        return min(1.0, WHOLE_TIME * self.part(dropped))
 
     def point(
         self,
-        gone: Collection[Effect],
+        dropped: Collection[Effect],
         *,
         level: int | None = None,
         fraction: float = 1.0,
         members: int = MEMBERS,
         **solver: object,
     ) -> Point:
-        """What is watched of a variant over a fraction of its time; a refusal of the solver is in the point.
+        """Return the watched quantities of a variant over a fraction of its time; the point holds a solver's refusal.
 
-        level: with so few modes of those bodies that have a choice; None: with all.  members: starts, where there are
-            contacts.
+        level: of modes, for bodies with several levels; None: all modes.  members: number of starts, with
+            contacts only.
         """
-        scene, names = self.variant(gone), self._names(gone)
+        scene, names = self.variant(dropped), self._names(dropped)
         key = (names, json.dumps([scene.solver.model_dump(mode="json") | solver, level, fraction, members]))
         if key not in self.points:
             mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
@@ -181,39 +179,39 @@ class Pilots:
         return self.points[key]
 
     def modes(self, level: int, bodies: Collection[str]) -> dict[str, int]:
-        """Numbers of modes of a level, of those bodies that have a choice."""
+        """Return the numbers of modes of a level, for those bodies that have a choice."""
         return {name: int(bundle.sizes["mode"]) for name, bundle in self.fewer[level].items() if name in bodies}
 
     def saved(self, level: int) -> float:
-        """Variables of the full scene for each one that is left with so few modes."""
+        """Return the ratio of the full scene's number of variables to that with this level of modes."""
         return self.extent.variables / self._variables({**self.bundles, **self.fewer[level]})
 
     def _variables(self, bundles: Mapping[str, Labelled]) -> int:
-        """Of the full scene with these flexible bodies."""
+        """Return the number of variables of the full scene with these flexible bodies."""
         left_out = sum(b.sizes["mode"] for b in self.bundles.values()) - sum(b.sizes["mode"] for b in bundles.values())
         return max(self.extent.variables - 2 * int(left_out), 1)
 
-    def must_run(self, gone: Collection[Effect], fraction: float, members: int = MEMBERS) -> Point:
-        """What is watched of a variant that the decisions need, at a tight tolerance where the loose one is refused.
+    def must_run(self, dropped: Collection[Effect], fraction: float, members: int = MEMBERS) -> Point:
+        """Return the point of a variant that the decisions need, at a tight tolerance where the loose one is refused.
 
-        Raises SolverError where it is refused then, too, for another reason than that it takes long.
+        Raises SolverError where the tight one is refused too, for another reason than its cost.
         """
-        point = self.point(gone, fraction=fraction, members=members)
+        point = self.point(dropped, fraction=fraction, members=members)
         if point.refused and TAKES_LONG not in point.refused:
             self.refused_loose = True
-            point = self.point(gone, fraction=fraction, members=members, rtol=RTOL)
+            point = self.point(dropped, fraction=fraction, members=members, rtol=RTOL)
         if point.refused and TAKES_LONG not in point.refused:
             raise SolverError(f"{self.scene.name}: the scene cannot be run as it is: {point.refused}")
         return point
 
     def between(self, a: Point, b: Point) -> dict[str, Influence]:
-        """Difference of two of them in each quantity; infinitely where one of them was refused."""
+        """Return the difference of two points in each quantity; infinite where one of them was refused."""
         if a.refused or b.refused:
             return {q.name: Influence(np.inf) for q in self.chosen}
         return {q.name: influence(a, b, q, MEMBERS) for q in self.chosen}
 
     def same_starts(self, a: Point, b: Point, requested: Mapping[str, float]) -> dict[str, Influence]:
-        """Difference of two ways to integrate one variant, in each quantity; infinite where one was refused."""
+        """Return the difference of two integrations of a variant, in each quantity; infinite if one was refused."""
         if a.refused or b.refused:
             return dict.fromkeys(requested, Influence(np.inf))
         return {q.name: same_starts(a, b, q, requested[q.name]) for q in self.chosen}

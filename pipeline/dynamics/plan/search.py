@@ -1,10 +1,10 @@
-"""The decisions of a plan: the error that is requested is a budget, and what is dropped spends it.
+"""Decisions of a plan: the requested error is a budget, and each dropped effect spends a part of it.
 
 Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.clearance_response`),
-which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without,
-which are cheap;
-then, where clearance stays, a loose run of the whole scene to see whether flexible bodies change what it does.
-Effects that are not shown to be small stay.
+which cost one run of the ideal mechanism; then cheap runs of variants, rigid ones with clearance and flexible ones
+without;
+then, where clearance stays, a loose run of the whole scene, which shows whether flexible bodies change its motion.
+Effects stay unless a result shows that they are small.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, lessened, uncoupled
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, pruned, uncoupled
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.pipeline.dynamics.linear.response import Response, response
-from flexclear.pipeline.dynamics.plan.budget import AS_IT_IS, BUDGET, WHOLE, Chosen, Search, most_of, with_doubt
+from flexclear.pipeline.dynamics.plan.budget import BUDGET, UNCHANGED, WHOLE, Chosen, Search, upper_bounds, widened
 from flexclear.pipeline.dynamics.plan.elements import mesh
-from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
-from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
-from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer, smooth
+from flexclear.pipeline.dynamics.plan.impacts import cheapest, decide_bending
+from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, ScreeningRuns
+from flexclear.pipeline.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 
-#: what bounds of clearances, which hold whatever happens, may use up of the budget
+#: fraction of the budget that bounds of clearances may use up; bounds hold under all circumstances
 BY_BOUND = 0.9
-#: by how much the first-order response of flexible bodies counts for more: it leaves out that the pose turns meanwhile,
-#: and that loads follow the vibration; next to runs it is 0.7 to 10 times what is true
+#: factor on the first-order response of flexible bodies, which neglects that the pose turns during a vibration and that
+#: loads follow the vibration; compared with runs the response is 0.7 to 10 times the true effect
 OF_RESPONSE = 2.0
 #: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
 SOFTER = 0.5
 #: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
-#: why parts go that the requested motion never feels
+#: reason to drop parts that do not affect the requested motion
 UNCOUPLED = "nothing couples it to the requested quantities"
 
 
@@ -55,26 +55,26 @@ def plan(
     filled: Callable[[Scene], Scene],
     progress: Progress,
 ) -> Plan:
-    """The decisions for a scene with `[accuracy]`.
+    """Return the decisions for a scene with `[accuracy]`.
 
-    bundles: reduced flexible bodies.  fewer: the same of fewer modes, of those that have a choice, levels with the
-    fewest first.  meshes: numbers of elements, and the bodies as reduced from twice as many.  filled: a variant
-    with the rigid bodies that recipes describe filled in.
-    Raises InputError where nothing is requested, or the motion itself is below it; SolverError where the scene, or what
-    is left of it, cannot be run.
+    bundles: reduced flexible bodies.  fewer: those with fewer modes, for bodies with a choice, levels with the
+    fewest first.  meshes: numbers of elements, and the bodies reduced from twice as many.  filled: fills a variant
+    with the rigid bodies that recipes describe.
+    Raises InputError where nothing is requested, or the motion is smaller than the request; SolverError where the
+    scene, or its planned variant, cannot be run.
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
     uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
     plain = edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
-    bare = lessened(plain, uncoupled_parts)
+    bare = pruned(plain, uncoupled_parts)
     mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
-    pilots = Pilots(bare, mine, less, filled, quantities, progress)
-    _ = pilots.extent  # a scene that cannot be built is refused before anything is run
-    pilots.must_run((), BEGINNING, 0)
-    loose, soft = ([effect for effect in pilots.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
-    ideal = pilots.point([*loose, *soft], rtol=RTOL)
-    search = Search(pilots, _requested(scene, quantities, ideal, lambda: pilots.point(soft)))
+    runs = ScreeningRuns(bare, mine, less, filled, quantities, progress)
+    _ = runs.extent  # refuses a scene that cannot be built, before anything is run
+    runs.must_run((), BEGINNING, 0)
+    loose, soft = ([effect for effect in runs.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
+    ideal = runs.point([*loose, *soft], rtol=RTOL)
+    search = Search(runs, _requested(scene, quantities, ideal, lambda: runs.point(soft)))
     rigid = _rigid(search, [*loose, *soft]) if loose or soft else None
     _clearances(search, loose, soft, rigid)
     _interactions(search, soft)
@@ -87,11 +87,11 @@ def plan(
 def _requested(
     scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]
 ) -> dict[str, float]:
-    """What is requested by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with
-    rigid bodies, half of it where bodies are flexible.
+    """Return the requested accuracy by quantity [SI]; relative ones refer to the size in the ideal mechanism. For
+    quantities of contacts the size is that with rigid bodies, half of it where bodies are flexible.
 
     rigid: runs the scene with clearance and rigid bodies.
-    Raises InputError where a quantity never changes, or everything requested is above what the quantities do;
+    Raises InputError where a quantity never changes, or all requested errors exceed the quantities' sizes;
     SolverError where the mechanism with rigid bodies cannot be run.
     """
     accuracies, sizes = {}, {}
@@ -111,11 +111,11 @@ def _requested(
                 "a relative accuracy of a quantity that never changes in the ideal mechanism",
                 "give an absolute one, with a unit",
             )
-    if all(accuracies[name] >= most for name, most in sizes.items()):
+    if all(accuracies[name] >= size for name, size in sizes.items()):
         # forces and rates may come from impacts alone
         more = rigid() if scene.contacts() or scene.stop else ideal
         sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else effect_size.size(more, q)) for q in quantities}
-    if all(accuracies[name] >= most for name, most in sizes.items()):
+    if all(accuracies[name] >= size for name, size in sizes.items()):
         q = quantities[0]
         raise InputError(
             f"{where} {q.name}",
@@ -126,25 +126,25 @@ def _requested(
     return accuracies
 
 
-def _rigid(search: Search, gone: Sequence[Effect]) -> Run:
-    """The run of the ideal mechanism."""
-    run = integrate(search.pilots.variant(gone), {}, silent)
-    search.pilots.evaluations += int(run.trajectory.counters["evaluations"])
+def _rigid(search: Search, dropped: Sequence[Effect]) -> Run:
+    """Run the ideal mechanism."""
+    run = integrate(search.runs.variant(dropped), {}, silent)
+    search.runs.evaluations += int(run.trajectory.counters["evaluations"])
     return run
 
 
 def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
-    """Which joints stay loose: by bounds where only the pose is requested, else by runs of rigid bodies."""
-    asked = {t.owner for q in search.pilots.chosen for t in q.terms() if KINDS[t.kind].owner in OF_CLEARANCE}
+    """Decide which joints keep their clearance: by bounds if only poses are requested, else by runs of rigid bodies."""
+    asked = {t.owner for q in search.runs.chosen for t in q.terms() if KINDS[t.kind].owner in OF_CLEARANCE}
     for effect in loose:
         if effect.owner in asked:
             search.decide(effect, True, NONE, "a quantity of this contact is requested")
     free = [effect for effect in loose if effect.owner not in asked]
     if not free:
         return
-    pilots, bounded = search.pilots, dict[str, Mapping[str, float]]()
-    if rigid is not None and any(q.kind in OF_POSE for q in pilots.chosen):
-        bounded = dict(bounds(pilots.scene, rigid, pilots.chosen))
+    runs, bounded = search.runs, dict[str, Mapping[str, float]]()
+    if rigid is not None and any(q.kind in OF_POSE for q in runs.chosen):
+        bounded = dict(bounds(runs.scene, rigid, runs.chosen))
     reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
     total = summed(reach.values(), search.requested)
     if search.fits(total, BY_BOUND):
@@ -154,7 +154,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
                 effect, False, BOUND, "its clearance cannot move the requested quantities by more", reach[effect.name]
             )
         return
-    shaken = any(effect.kind == FLEXIBILITY or effect.within for effect in pilots.every)
+    shaken = any(effect.kind == FLEXIBILITY or effect.within for effect in runs.every)
     ordered = sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf))
     _in_turn(search, ordered, soft, reach, "its impacts change the requested quantities by less", shaken)
 
@@ -167,63 +167,63 @@ def _in_turn(
     why: str,
     shaken: bool,
 ) -> None:
-    """Drop effects one after the other, as long as what they change together fits into the budget.
+    """Drop effects one after the other, as long as their joint effect size fits into the budget.
 
-    others: that no run has.  reach: bounds by effect, where there are some.  shaken: as `soft` of `with_doubt`.
+    others: effects that no run has.  reach: bounds by effect, where known.  shaken: see `soft` of `widened`.
     """
-    pilots, dropped, left = search.pilots, list[Effect](), dict[str, float]()
-    there = pilots.point(others)
+    runs, dropped, left = search.runs, list[Effect](), dict[str, float]()
+    reference = runs.point(others)
     for effect in ordered:
         trial = [*dropped, effect]
-        seen = with_doubt(search, pilots.between(pilots.point([*others, *trial]), there), shaken)
+        sizes = widened(search, runs.between(runs.point([*others, *trial]), reference), shaken)
         bound = summed([reach.get(e.name, {}) for e in trial], search.requested)
-        most = {name: min(value, bound[name]) for name, value in most_of(seen).items()}
-        small = search.fits(most)
-        search.judge(effect, why if small else "", most, seen)
+        upper = {name: min(value, bound[name]) for name, value in upper_bounds(sizes).items()}
+        small = search.fits(upper)
+        search.judge(effect, why if small else "", upper, sizes)
         if small:
-            dropped, left = trial, most
+            dropped, left = trial, upper
     if dropped:
         search.spend(left)
 
 
 def _interactions(search: Search, soft: Sequence[Effect]) -> None:
-    """Clearances that rigid bodies may do without stay where flexible ones, shaken by impacts, may not.
+    """Keep clearances that rigid bodies can do without but flexible bodies, excited by impacts, cannot.
 
-    Rates and forces only: vibrations that impacts excite are small in positions and large in these.
+    This concerns rates and forces only: vibrations after impacts are small in positions and large in rates and forces.
     """
-    pilots = search.pilots
-    dropped = [e for e in search.gone if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
-    if not soft or not dropped or all(q.kind in OF_POSE for q in pilots.chosen):
+    runs = search.runs
+    dropped = [e for e in search.dropped if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
+    if not soft or not dropped or all(q.kind in OF_POSE for q in runs.chosen):
         return
-    fraction = pilots.part(())
-    seen = pilots.between(pilots.point(dropped, fraction=fraction), pilots.point((), fraction=fraction))
-    seen = with_doubt(search, seen, False, 0.0 if fraction == 1.0 else WHOLE)
-    most = most_of(seen)
-    if all(most[name] <= BUDGET * requested for name, requested in search.requested.items()):
+    fraction = runs.part(())
+    sizes = runs.between(runs.point(dropped, fraction=fraction), runs.point((), fraction=fraction))
+    sizes = widened(search, sizes, False, 0.0 if fraction == 1.0 else WHOLE)
+    upper = upper_bounds(sizes)
+    if all(upper[name] <= BUDGET * requested for name, requested in search.requested.items()):
         return
     search.used = {}
     for effect in dropped:
-        search.judge(effect, "", most, seen)
+        search.judge(effect, "", upper, sizes)
 
 
 def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
-    """The sum by quantity, infinite where one of them does not say."""
+    """Return the sum by quantity, infinite where a part lacks the quantity."""
     return {name: sum(part.get(name, np.inf) for part in parts) for name in requested}
 
 
 def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effect], rigid: Run | None) -> None:
-    """Which bodies stay flexible."""
+    """Decide which bodies stay flexible."""
     if not soft:
         return
     if any(search.decisions[e.name].kept for e in loose):
-        bent(search, soft)
+        decide_bending(search, soft)
         return
-    bundles, bending = search.pilots.bundles, dict[str, Mapping[str, float]]()
+    bundles, bending = search.runs.bundles, dict[str, Mapping[str, float]]()
     if rigid is not None:
-        together = response(rigid, bundles, search.pilots.chosen)
+        together = response(rigid, bundles, search.runs.chosen)
         for effect in soft:
             mine = {effect.owner: bundles[effect.owner]}
-            alone = together if len(soft) == 1 else response(rigid, mine, search.pilots.chosen)
+            alone = together if len(soft) == 1 else response(rigid, mine, search.runs.chosen)
             bending[effect.name] = _with_margin(alone.influence)
         total = _with_margin(together.influence)
         if search.fits(total):
@@ -233,16 +233,16 @@ def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effec
                 search.decide(effect, False, RESPONSE, why, bending[effect.name])
             return
     ordered = sorted(soft, key=lambda e: max(bending.get(e.name, {}).values(), default=np.inf))
-    _in_turn(search, ordered, search.gone, {}, "its deformation changes the requested quantities by less", False)
+    _in_turn(search, ordered, search.dropped, {}, "its deformation changes the requested quantities by less", False)
 
 
 def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
-    """A first-order response with what it may be wrong by."""
+    """Return a first-order response with its uncertainty."""
     return {name: OF_RESPONSE * value for name, value in influence.items()}
 
 
 def _vibrating(estimated: Response) -> str:
-    """The first vibration of the assembled mechanism, and how large loads of the motion make the first they excite."""
+    """Describe the mechanism's first vibration, and the amplification of the first one that the loads excite."""
     first = f"the mechanism's first frequency is {estimated.first:.3g} Hz"
     if np.isnan(estimated.excited):
         return f"{first}, and the loads of the ideal motion excite no vibration"
@@ -256,26 +256,26 @@ def _vibrating(estimated: Response) -> str:
 
 
 def _confirm(search: Search, soft: Sequence[Effect]) -> None:
-    """Clearances that go next to bodies that stay flexible: one run of all shows whether the estimate holds.
+    """Test dropped clearances together with bodies that stay flexible, by one run of the whole scene.
 
-    Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
+    Bounds hold along the motion of rigid bodies, and flexible bodies may move differently.
     """
-    pilots = search.pilots
-    dropped = [effect for effect in search.gone if effect.kind == CLEARANCE]
-    if not dropped or all(effect in search.gone for effect in soft):
+    runs = search.runs
+    dropped = [effect for effect in search.dropped if effect.kind == CLEARANCE]
+    if not dropped or all(effect in search.dropped for effect in soft):
         return
-    fraction = min(1.0, MEMBERS * pilots.part(()))
-    seen = pilots.between(pilots.point(search.gone, fraction=fraction), pilots.must_run((), fraction, 0))
-    most = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in seen.items()}
-    if all(most[name] <= requested for name, requested in search.requested.items()):
+    fraction = min(1.0, MEMBERS * runs.part(()))
+    sizes = runs.between(runs.point(search.dropped, fraction=fraction), runs.must_run((), fraction, 0))
+    upper = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in sizes.items()}
+    if all(upper[name] <= requested for name, requested in search.requested.items()):
         return
     for effect in dropped:
-        search.judge(effect, "", most, seen)
+        search.judge(effect, "", upper, sizes)
 
 
 def _others(search: Search) -> None:
-    """Gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows that they do little."""
-    every = {effect.name: effect for effect in search.pilots.every}
+    """Decide on gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows a small effect."""
+    every = {effect.name: effect for effect in search.runs.every}
     others = [effect for effect in every.values() if effect.kind not in (CLEARANCE, FLEXIBILITY)]
     remaining = {d.effect.name: d.effect.kind for d in search.decisions.values() if d.kept}
     dear = {CLEARANCE, FLEXIBILITY} <= set(remaining.values())
@@ -289,46 +289,46 @@ def _others(search: Search) -> None:
         if dear:
             search.decide(effect, True, NONE, NOT_WORTH)
             continue
-        gone = search.gone
-        there, lost = search.pilots.point(gone), search.pilots.point([*gone, effect])
-        seen = search.pilots.between(lost, there)
-        most = most_of(seen)
-        small = search.fits(most)
-        free = effect.kind in FREE or bool(effect.within)  # friction of a contact goes along with it
-        if small and free and not search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)):
-            search.judge(effect, "", most, seen, "it costs no time, and ")
+        dropped = search.dropped
+        reference, changed = search.runs.point(dropped), search.runs.point([*dropped, effect])
+        sizes = search.runs.between(changed, reference)
+        upper = upper_bounds(sizes)
+        small = search.fits(upper)
+        free = effect.kind in FREE or bool(effect.within)  # friction is dropped together with its contact
+        if small and free and not search.fits(upper, NEGLIGIBLE + max(search.used.values(), default=0.0)):
+            search.judge(effect, "", upper, sizes, "it costs no time, and ")
             continue
         if small:
-            search.spend(most)
-        search.judge(effect, "what it does is small" if small else "", most, seen)
+            search.spend(upper)
+        search.judge(effect, "what it does is small" if small else "", upper, sizes)
 
 
 def _chosen(search: Search) -> Chosen:
-    """Numbers of modes, integrator and tolerance of what is left."""
-    pilots, gone = search.pilots, search.gone
-    scene = pilots.variant(gone)
+    """Choose number of modes, integrator and tolerance for the remaining effects."""
+    runs, dropped = search.runs, search.dropped
+    scene = runs.variant(dropped)
     if scene.contacts() or scene.stop:
-        return quickest(search)
-    for level in range(len(pilots.fewer)):
-        if not pilots.modes(level, scene.flexible()):
+        return cheapest(search)
+    for level in range(len(runs.fewer)):
+        if not runs.modes(level, scene.flexible()):
             continue
-        seen = with_doubt(search, pilots.between(pilots.point(gone, level=level), pilots.point(gone)), False)
-        most = most_of(seen)
-        if search.fits(most):
-            search.spend(most)
-            return smooth(pilots, gone, search.requested, level)
-    return smooth(pilots, gone, search.requested, None)
+        sizes = widened(search, runs.between(runs.point(dropped, level=level), runs.point(dropped)), False)
+        upper = upper_bounds(sizes)
+        if search.fits(upper):
+            search.spend(upper)
+            return smooth(runs, dropped, search.requested, level)
+    return smooth(runs, dropped, search.requested, None)
 
 
 def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
-    """The finite elements of bodies that stay flexible, judged by what their flexibility does."""
-    scene, numbers = search.pilots.scene, {}
+    """Return the finite elements that flexible bodies need, judged by the effect of their flexibility."""
+    scene, numbers = search.runs.scene, {}
     for body, (given, finer) in meshes.items():
         decision = search.decisions.get(f"body.{body}.modes")
         if decision is not None and decision.kept:
             bending = {n: v + decision.uncertainty.get(n, 0.0) for n, v in decision.estimate.items()}
             duration = scene.time.end - scene.time.start
-            numbers[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.requested, duration)
+            numbers[body] = mesh(given, search.runs.bundles[body], finer, bending, search.requested, duration)
     return numbers
 
 
@@ -339,18 +339,18 @@ def _finished(
     meshes: Mapping[str, tuple[int, xr.Dataset]],
 ) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
-    chosen = no_dearer(search, _chosen(search))
-    if as_it_is(search, chosen):
-        chosen = AS_IT_IS
+    chosen = cheaper_method(search, _chosen(search))
+    if scene_is_cheaper(search, chosen):
+        chosen = UNCHANGED
         for decision in [d for d in search.decisions.values() if not d.kept]:
             search.decisions[decision.effect.name] = replace(decision, kept=True, reason=NO_CHEAPER)
-    left = search.pilots.variant(search.gone).flexible()
-    modes = {} if chosen.level is None else search.pilots.modes(chosen.level, left)
+    left = search.runs.variant(search.dropped).flexible()
+    modes = {} if chosen.level is None else search.runs.modes(chosen.level, left)
     for effect in every:
         if ".".join(effect.name.split(".")[:2]) in uncoupled_parts:
             search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.requested, 0.0))
     decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
-    pilots = search.pilots
+    runs = search.runs
     return Plan(
         tuple(decisions),
         dict(search.requested),
@@ -358,8 +358,8 @@ def _finished(
         chosen.rtol,
         chosen.error,
         modes,
-        pilots.evaluations,
-        len(pilots.points),
+        runs.evaluations,
+        len(runs.points),
         uncoupled_parts,
         _meshes(search, meshes),
         chosen.ledger_tolerance,

@@ -1,8 +1,8 @@
-"""From observed rows to the run dataset: named bodies, frames, joints, contacts, energies.
+"""Record: from observed rows to the run dataset of named bodies, frames, joints, contacts and energies.
 
-What is recorded only where a scene's ``[output]`` asks for it is a module called like its key there, which
-core/scene/output declares together with the variables that it adds. The module has
-``record(motions, asked)``, which returns them and their coordinates; asked is the key's value.
+Variables that are recorded only where a scene's ``[output]`` requests them have a module called like their key there;
+core/scene/output declares the keys with their variables. Such modules have ``record(motions, asked)``, which returns
+variables and coordinates; asked is the key's value.
 """
 
 from flexclear.pipeline.core.scene.output import VARIABLES

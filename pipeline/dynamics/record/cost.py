@@ -1,7 +1,7 @@
-"""What a run costs, part by part: its integration, and its record.
+"""Processor time of a run, separately for integration and record.
 
-A record is of as many rows whatever the integration took; for a smooth motion it costs far more than that. Times of
-both together say little of either.
+A record has as many rows whatever the integration took, and costs far more than the integration of a smooth motion.
+The sum of both times says little of either.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
 
-#: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
-#: that: a disturbance of a millisecond is a tenth of some. What has taken LONG_RUN is an average by itself [s]
+#: least number of repeats of an integration; short ones are repeated until they have taken this time [s] together, at
+#: most that often: a disturbance of a millisecond is a tenth of some. A run of LONG_RUN [s] is not repeated
 REPEATS, ENOUGH_TIME, MOST_REPEATS, LONG_RUN = 3, 0.05, 15, 1.5
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Processor times [s] of warm repeats, each one's integration and of some its record; and what was run.
+    """Processor times [s] of repeated integrations and records, with warm caches, and the run.
 
-    run: the same dataset as every run's (schema RUN).  length: size of the mechanism [m].  No time includes the
-    perturbed run of a scene with contacts, nor setting up and checking the ledger.
+    run: the dataset of any run (schema RUN).  length: size of the mechanism [m].  The times exclude the perturbed run
+    of a scene with contacts, set-up, and the check of the energy ledger.
     """
 
     run: xr.Dataset
@@ -54,18 +54,18 @@ def measure(
     checked: bool = True,
     brief: bool = False,
 ) -> Cost:
-    """The cost of a scene's run, its code fetched before; the scene's `[accuracy]` is not examined.
+    """Measure the cost of a scene's run, with compiled code loaded before; the scene's `[accuracy]` is ignored.
 
-    checked: whether a run whose energy ledger does not close is refused, as every run is.
-    brief: whether the perturbed run of a scene with contacts and repeats of the record are left out; the first run is
-    then the first measurement.
+    checked: refuse a run whose energy ledger does not close, as every run does.
+    brief: leave out the perturbed run of a scene with contacts and repeats of the record; the first run is then the
+    first measurement.
     Raises InputError and SolverError as a run does.
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    begun, alone = process_time(), brief or not engine.model.contacts
-    last, trajectory, switched, perturbed = _followed(engine, start, progress, other, alone)
-    first = (process_time() - begun,) if alone else ()
+    begun, single = process_time(), brief or not engine.model.contacts
+    last, trajectory, switched, perturbed = _followed(engine, start, progress, other, single)
+    first = (process_time() - begun,) if single else ()
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
@@ -77,10 +77,10 @@ def measure(
 
 
 def _followed(
-    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine], alone: bool
+    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine], single: bool
 ) -> tuple[Engine, Trajectory, str, PerturbedRun | None]:
-    """The run, and unless it runs alone the perturbed run after it: a measured run has no other next to it."""
-    if alone:
+    """Return the run and, unless `single`, the perturbed run, which follows so that it does not slow the run down."""
+    if single:
         return *follow(engine, start, progress, other), None
     from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
 
@@ -94,7 +94,7 @@ def _followed(
 
 
 def _repeated(task: Callable[[], object], most: int, first: tuple[float, ...] = ()) -> tuple[float, ...]:
-    """Processor times [s] of a task, `first` among them: REPEATS, or up to `most` of a short one."""
+    """Return processor times [s] of a task, `first` among them: REPEATS, or up to `most` of a short one."""
     seconds = [*first]
     while not seconds or (sum(seconds) < LONG_RUN and len(seconds) < REPEATS):
         seconds.append(_once(task))

@@ -1,4 +1,4 @@
-"""The run dataset (schema RUN) of a trajectory."""
+"""Run dataset (schema RUN) of a trajectory."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.effects.stops.model import ends_an_angle
 from flexclear.pipeline.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.plausibility import forgotten
+from flexclear.pipeline.dynamics.model.plausibility import missing_joints
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench
@@ -40,19 +40,19 @@ if TYPE_CHECKING:
 
 
 def dataset(run: Run) -> xr.Dataset:
-    """All that is recorded of a run (schema RUN), as a dataset."""
+    """Return all recorded variables of a run (schema RUN), as a dataset."""
     return recorded(run).to_xarray()
 
 
 def recorded(run: Run) -> LabelledArrays:
-    """All that is recorded of a run (schema RUN)."""
+    """Return all recorded variables of a run (schema RUN)."""
     model, trajectory = run.model, run.trajectory
     motions = Motions(model, run.observed)
     frames, joints = list(model.mechanism.frames), list(model.scene.joint)
     parts = list(_motion(motions, motions.moving_bodies, joints, frames))
     parts += [_names(model), *(made() for _, made in _makers(run.scene, motions))]
     if model.contacts:
-        parts.append((_events(model, trajectory), {}))
+        parts.append((events_of(model, trajectory), {}))
     if run.perturbed is not None:
         horizon: Variables = {"horizon": ((), np.array(run.perturbed.horizon))}
         separation: Variables = {"separation": (("separation_time",), run.perturbed.separation)}
@@ -66,10 +66,13 @@ def recorded(run: Run) -> LabelledArrays:
     return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
 
 
-def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray) -> LabelledArrays:
-    """What of a run these quantities are read from (`core.artifacts.quantities.series`), and little else.
+def variables_for(
+    scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray, events: Variables | None = None
+) -> LabelledArrays:
+    """Return the run variables from which these quantities are computed (`core.artifacts.quantities.series`).
 
-    terms: no expressions, but what they consist of.  time: of the rows [s].
+    terms: terms of quantities, no expressions.  time: of the rows [s].  events: from `events_of`, for quantities of
+    events.
     """
     names: dict[str, list[str]] = {}
     for term in terms:
@@ -80,16 +83,16 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in requested)]
     parts.append(({"time": (("time",), time)}, {}))
     variables = {name: values for part in parts for name, values in part[0].items() if name in requested}
-    return labelled(variables, {name: values for part in parts for name, values in part[1].items()})
+    return labelled(variables | (events or {}), {name: values for part in parts for name, values in part[1].items()})
 
 
 def series(scene: Scene, motions: Motions, requested: Collection[Quantity], time: np.ndarray) -> dict[str, np.ndarray]:
-    """Quantities over time, (rows, components), by name; time: of the rows [s]."""
-    arrays = chosen(scene, motions, {term for one in requested for term in one.terms()}, time)
+    """Return quantities over time, (rows, components), by name; time: of the rows [s]."""
+    arrays = variables_for(scene, motions, {term for one in requested for term in one.terms()}, time)
     return {one.name: quantities.series(arrays, one) for one in requested}
 
 
-#: beginnings of the variables that the ledger makes
+#: beginnings of the names of the ledger's variables
 _LEDGER = (
     *("kinetic", "potential", "elastic", "dissipated", "drive_work", "energy_error", "constraint_error", "load_work"),
     *("load_loss", "joint_friction_loss", "modal_damping_loss", "contact_elastic", "contact_damping_loss"),
@@ -98,7 +101,7 @@ _LEDGER = (
 
 
 def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], Callable[[], Series]]]:
-    """What makes the variables of this scene but those of bodies, frames and joints, by how their names begin."""
+    """Yield name beginnings and the maker of these variables, without those of bodies, frames and joints."""
     model, seen = motions.model, motions.seen
     yield ("modal_",), lambda: _modes(motions)
     yield ("drive_force", "drive_position"), lambda: _drives(scene, model, seen)
@@ -117,7 +120,7 @@ def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], C
 
 
 def subject(scene: Scene) -> str:
-    """What moves, in words, for titles; nothing that a scene is only called."""
+    """Return a description of the moving bodies for titles, with flexible bodies and clearance joints."""
     moving = [name for name, body in scene.body.items() if body.type != "ground"]
     shown = moving if len(moving) < 5 else [*moving[:3], f"{len(moving) - 3} more bodies"]
     words = ", ".join(shown[:-1]) + " and " + shown[-1] if len(shown) > 1 else "".join(shown)
@@ -127,7 +130,7 @@ def subject(scene: Scene) -> str:
 
 
 def references(scene: Scene) -> str:
-    """Publications of the methods that the scene's parts represent, one a line."""
+    """Return the publications of the methods that the scene's parts represent, one a line."""
     sources = list[str]()
     for name in sorted(named(scene)):
         module = import_module(name)
@@ -138,9 +141,9 @@ def references(scene: Scene) -> str:
 
 
 def attributes(scene: Scene) -> dict[str, str]:
-    """What the run was made from: parameters, references, versions; no times, no file names.
+    """Return the attributes that describe the run's input: parameters, references, versions; no times, no file names.
 
-    Where values come from is in what is derived from the run: a sentence about a value runs nothing again.
+    Sources of values are stored in what is derived from the run, so that editing their text starts no run again.
     """
     parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
@@ -153,11 +156,11 @@ def attributes(scene: Scene) -> dict[str, str]:
 
 
 def warnings(run: Run) -> list[str]:
-    """Sentences about what a run is to be doubted for."""
+    """Return sentences that state doubts about a run."""
     choice = [run.model.mechanism.choice] if run.model.mechanism.choice else []
     return [
         *choice,
-        *(f"{text} ({remedy})" for _, text, remedy in forgotten(run.model.mechanism)),
+        *(f"{text} ({remedy})" for _, text, remedy in missing_joints(run.model.mechanism)),
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),
@@ -168,7 +171,7 @@ def warnings(run: Run) -> list[str]:
 
 
 def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
-    """Fixed steps are not made shorter where the method is unstable: what happens there is not resolved."""
+    """Return a warning if fixed steps were too long for the method to be stable, which leaves fast rates unresolved."""
     solver, stiff = model.scene.solver, trajectory.counters.get("stiff_steps", 0)
     if solver.step is None or not stiff:
         return []
@@ -180,7 +183,7 @@ def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
 
 
 def _contact_warnings(run: Run) -> list[str]:
-    """Sentences about contacts that left the range for which their laws were made."""
+    """Return sentences about contacts that left the range of validity of their laws."""
     if not run.model.contacts:
         return []
     from flexclear.pipeline.dynamics.contact import validity
@@ -193,7 +196,7 @@ def _contact_warnings(run: Run) -> list[str]:
 
 
 def _flexible_warnings(run: Run) -> list[str]:
-    """Sentences about flexible bodies that left the range of linear modes."""
+    """Return sentences about flexible bodies that left the range of validity of linear modes."""
     if not run.model.numbering.flexible:
         return []
     from flexclear.pipeline.dynamics.run.refusals import validity
@@ -202,7 +205,7 @@ def _flexible_warnings(run: Run) -> list[str]:
 
 
 def _report(run: Run) -> dict[str, float | int | str]:
-    """How the run was made, for the attributes; and in words what is to be doubted."""
+    """Return attributes that describe integration, method and contact laws of a run, with its warnings."""
     counters, redundant = run.trajectory.counters, run.engine.mobility.redundant
     facts: dict[str, float | int | str] = {
         **counters,
@@ -232,7 +235,7 @@ def _report(run: Run) -> dict[str, float | int | str]:
 def _motion(
     motions: Motions, bodies: list[str] | None, joints: list[str] | None, frames: list[str] | None
 ) -> Iterator[Series]:
-    """Motion of some bodies, wrenches of joints, places of frames; nothing of what is None."""
+    """Yield motion of some bodies, wrenches of joints, positions of frames; None leaves out a kind."""
     origin = motions.model.mechanism.origin
     if bodies is not None:
         moved = motions.several(bodies)
@@ -248,7 +251,7 @@ def _motion(
 
 
 def _names(model: Model) -> Series:
-    """Bodies of the frames; types of the joints, and what they join."""
+    """Return bodies of the frames; types of the joints, their frames and bodies."""
     joints, frames = model.scene.joint, model.mechanism.frames
     coordinates: dict[str, object] = {"frame_body": ("frame", [name.partition(".")[0] for name in frames])}
     if not joints:
@@ -285,7 +288,7 @@ def _drives(scene: Scene, model: Model, seen: Observed) -> Series:
     force, position = model.drive_signs * seen.drive_force, model.drive_signs * seen.positions[:, model.nq :]
     turning = {coordinate.name: coordinate.dimension == "angle" for coordinate in prescribed(model.scene)}
     sharing = [name for name in model.scene.forces() if name not in scene.load]
-    if sharing:  # actuators beyond the freedoms, which the engine has as loads
+    if sharing:  # actuators beyond the freedoms, which are loads in the engine
         from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_loads
 
         names += sharing
@@ -343,7 +346,7 @@ def _contacts(model: Model, seen: Observed) -> Series:
 
 
 def contact_names(model: Model) -> dict[str, object]:
-    """Names of the contacts, of what joints or stops they are, and whether they end an angle."""
+    """Return names of the contacts, types of their joints or stops, and whether their gaps are angles or lengths."""
     return {
         "contact": [contact.name for contact in model.contacts],
         "contact_type": ("contact", [contact.joint.type for contact in model.contacts]),
@@ -351,7 +354,8 @@ def contact_names(model: Model) -> dict[str, object]:
     }
 
 
-def _events(model: Model, trajectory: Trajectory) -> Variables:
+def events_of(model: Model, trajectory: Trajectory) -> Variables:
+    """The events of a run, by variable."""
     events, names = trajectory.events, np.array([contact.name for contact in model.contacts], dtype=str)
     columns = {
         "event_time": events["time"],

@@ -1,7 +1,6 @@
-"""Members of an ensemble: the same scene from starts that differ by a hair.
+"""Ensemble: runs of the same scene from starts that differ by tiny amounts.
 
-Beyond the horizon of pointwise validity single values of a chaotic run mean nothing; mean and
-spread of such members do.
+Beyond the predictability horizon single values of a chaotic run mean nothing; mean and spread of the members do.
 """
 
 from __future__ import annotations
@@ -43,18 +42,19 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: by how much starts of members differ where the scene does not say: a fraction of a contact's clearance or depth;
-#: depths count as at least the second fraction, of the mechanism's size
+#: default difference of the members' starts: a fraction of a contact's clearance or penetration; penetrations count as
+#: at least the second fraction, of the mechanism's size
 FRACTION_OF_CLEARANCE, LEAST_OF_SIZE = 1e-3, 2.5e-8
-#: members that are evaluated at once: few, or many; the code gives the same bits for any number, which depends on the
-#: machine. Of fewer than `FEW` each is evaluated alone
+#: numbers of members that are evaluated together, chosen by the number of threads without effect on the bits; fewer
+#: than `FEW` are evaluated one by one
 FEW, LANES = 2, (4, 8)
-#: variables of one member by name, with the dimensions of the schema but `member`, and why its method was `switched`
+#: variables of one member by name, with the schema's dimensions except `member`, and the reason `switched` of a change
+#: of method
 Member = dict[str, np.ndarray]
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
-    """All members (schema ENSEMBLE) of a scene with clearance joints."""
+    """Return all members (schema ENSEMBLE) of a scene with clearance joints."""
     try:
         return _members(scene, bundles, progress)
     except DearError as dear:
@@ -66,7 +66,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     requested = scene.ensemble or Ensemble()
     require_scatter(scene, "[ensemble]")
     engine, other = engines(scene, bundles, progress)
-    names = kept_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
+    names = recorded_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     select_rows(engine, start, engine.start)
     jacobian = offset_jacobian(engine, start)
@@ -79,8 +79,8 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, place: Place | None) -> Member:
-        """A member on an engine of its own, so that it does not depend on who ran before."""
+    def run_member(k: int, alive: Progress, place: Place | None) -> Member:
+        """Run a member with an engine of its own, so that the result does not depend on previous members."""
         mine = another(engine)
         mine.straight.place = place
         last, trajectory, switched = follow(mine, starts[k], alive, heir, judges and judges.run)
@@ -96,7 +96,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if stored is not None and (earlier := stored.find(name)) is not None:
             return earlier
         with places.place() if places else nullcontext() as place:
-            made = alone(k, alive, place)
+            made = run_member(k, alive, place)
         if stored is not None:
             stored.store(name, lambda: made)
         return made
@@ -114,9 +114,9 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def places_of(engine: Engine, members: int, threads: int, progress: Progress) -> Places | None:
-    """Places for so many engines like this one, in so many threads; None where each is to take its own steps.
+    """Return places for as many engines like this one, in so many threads; None where each is evaluated alone.
 
-    Either way they, as `another` makes them of it, evaluate with the same bits.
+    Copies of the engine by `another` evaluate with the same bits in both cases.
     """
     engine.straight.exact, rows = True, engine.selected.tobytes()
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
@@ -128,31 +128,31 @@ def places_of(engine: Engine, members: int, threads: int, progress: Progress) ->
 
 
 def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
-    """By how much starts of members differ [m] where the scene does not say.
+    """Return the default difference of the members' starts [m].
 
-    That is FRACTION_OF_CLEARANCE of the least clearance: no start is known better. It is at least LEAST_OF_SIZE of the
-    mechanism's size, since the errors of a loose tolerance would make members that are nearer look like influences.
-    Contacts that the start presses together hold it in equilibrium, so that members differ by the same fraction of
-    their depth at most: more would change the force itself and shake the mechanism.
+    It is FRACTION_OF_CLEARANCE of the least clearance: no start is known better. It is at least LEAST_OF_SIZE of the
+    mechanism's size, since with closer members the errors of a loose tolerance would look like effects of parameters.
+    Contacts that are closed at the start hold it in equilibrium, so the difference is at most the same fraction of
+    their penetration: a larger one would change the force itself and shake the mechanism.
     """
     model = engine.model
     engine.attempt(start, engine.start)
-    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model)
+    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model.mechanism)
     clearance = min((joint.clearance for joint in model.scene.contacts().values()), default=0.0)
     pressed = max(least, depths[depths > 0.0].min(initial=np.inf))
     return Ensemble(perturbation=min(max(least, FRACTION_OF_CLEARANCE * clearance), FRACTION_OF_CLEARANCE * pressed))
 
 
 def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np.ndarray]:
-    """By which each member's start offsets the balls [m], shape (3 contacts,): random directions, equal lengths."""
+    """Yield the offset of the balls for each member's start [m], (3 contacts,): random directions, equal lengths."""
     random = np.random.default_rng(requested.seed)
     for _ in range(members):
         offsets = random.normal(size=(len(model.contacts), 3))
         yield (offsets * (requested.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
 
 
-def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
-    """Bodies whose motion is recorded: those requested, else those that have contacts, without contacts all."""
+def recorded_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
+    """Return the bodies to record: those requested, else those with contacts, or all where none has contacts."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
     if requested is None:
         frames = model.mechanism.frames
@@ -174,7 +174,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     return {
         **{name: values[rows] for name, (_, values) in series.items()},
-        # of the rows at events, too: an impact is shorter than the output interval
+        # rows at events count, too: an impact is shorter than the output interval
         "peak_acceleration": np.abs(series["acceleration"][1]).max(axis=0),
         "contact_normal_force": seen.touch["normal_force"][rows],
         "contact_offset": seen.touch["offset"][rows],
@@ -185,7 +185,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
 
 
 def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest force [N], impacts, and fraction of the time in contact, per contact."""
+    """Return largest force [N], number of impacts, and fraction of the time in contact, per contact."""
     closings = trajectory.events[trajectory.events["kind"] == CLOSING]
     peak, count, fraction = [], [], []
     for c in range(trajectory.contacts):

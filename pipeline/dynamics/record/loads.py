@@ -1,4 +1,4 @@
-"""What loads do, for the run dataset and for the balance of each body."""
+"""Forces, moments and powers of loads, for the run dataset and for the balance of each body."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 
 
 def load_series(model: Model, seen: Observed) -> Variables:
-    """Forces and moments on the (second) frame, lengths and powers, loads in the order of the scene."""
+    """Return forces and moments on the (second) frame, lengths and powers, with loads in the order of the scene."""
     force, moment = seen.loads["force"], seen.loads["moment"]
     wiring = model.arrays.table(m.LOADS)
     power = np.zeros(seen.loads.shape)
@@ -32,7 +32,7 @@ def load_series(model: Model, seen: Observed) -> Variables:
 
 
 def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndarray:
-    """Force [N] or torque [N m] of loads along their joint coordinates, shape (time, names)."""
+    """Return force [N] or torque [N m] of loads along their joint coordinates, shape (time, names)."""
     forces, numbers = [], {name: k for k, (name, _) in enumerate(model.loads)}
     for k in (numbers[name] for name in names):
         row = model.arrays.table(m.GAUGES)[model.arrays.table(m.LOADS)[k]["gauge"]]
@@ -43,7 +43,7 @@ def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndar
 
 
 def turning_loads(model: Model, names: list[str], *, measured: bool = False) -> list[bool]:
-    """Which loads act along an angle; measured: whose length is one, which of controllers is another coordinate."""
+    """Return True for each load that acts along an angle; measured: for each whose measured coordinate is an angle."""
     wiring, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
     looks = np.where((wiring["measured"] >= 0) & measured, wiring["measured"], wiring["gauge"])
     rows = dict(zip((name for name, _ in model.loads), looks.tolist(), strict=True))
@@ -51,10 +51,10 @@ def turning_loads(model: Model, names: list[str], *, measured: bool = False) -> 
 
 
 def on_loaded_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Each load on every frame that it acts on: frame, moment about the kernels' origin, force; (time, 3) each."""
+    """Return each load on each of its frames: frame, moment about the kernels' origin, force; (time, 3) each."""
     ends = [
         (k, frame, sign)
         for k, (_, frames) in enumerate(model.loads)
-        for frame, sign in zip(reversed(frames), (1.0, -1.0), strict=False)  # the last frame is acted on
+        for frame, sign in zip(reversed(frames), (1.0, -1.0), strict=False)  # the load acts on the last frame
     ]
     return [(frame, sign * seen.loads["moment"][:, k], sign * seen.loads["force"][:, k]) for k, frame, sign in ends]

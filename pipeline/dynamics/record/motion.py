@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import continued, cross, turned
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics.equations.observation import Observed, Variables
-from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
+from flexclear.pipeline.dynamics.model.flexible_bodies import shift, shortening
 from flexclear.pipeline.dynamics.model.interface_basis import frame_index
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
@@ -21,7 +21,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 class Motion:
     """Motion of a point of a body and of the body's axes, over time; world axes, kernels' origin.
 
-    p, v, a, omega, alpha: shape (time, 3); R: rotation body -> world, shape (time, 3, 3).  In Fortran's order, see
+    p, v, a, omega, alpha: shape (time, 3); R: rotation body -> world, shape (time, 3, 3).  Fortran order, see
     `core.numerics.rotations.cross`.
     """
 
@@ -33,14 +33,14 @@ class Motion:
     alpha: np.ndarray
 
     def at(self, arm: np.ndarray, turn: np.ndarray | None = None) -> Motion:
-        """Motion of a fixed point `arm`, and of axes turned by `turn`, both given in the body; (3,) and (3, 3)."""
+        """Return the motion of a fixed point `arm` (3,) and of axes turned by `turn` (3, 3), given in the body."""
         r = turned(self.R, arm)
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing)
         return Motion(self.p + r, self.R if turn is None else self.R @ turn, self.v + swing, self.omega, a, self.alpha)
 
     def moving(self, arm: np.ndarray, rate: np.ndarray, second: np.ndarray) -> Motion:
-        """Motion of a point that moves in the body: its position, rate and second rate there, (time, 3)."""
+        """Return the motion of a point that moves in the body: its position, rate and second rate there, (time, 3)."""
         r, s, t = (turned(self.R, x) for x in (arm, rate, second))
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing + 2.0 * s) + t
@@ -51,7 +51,7 @@ class Motion:
 class Bodies:
     """Motion of the centres of mass and axes of several bodies, over time; world axes, kernels' origin.
 
-    Shape (time, body, 3), of quaternions w x y z (time, body, 4).
+    Shape (time, body, 3); quaternions w x y z (time, body, 4).
     """
 
     position: np.ndarray
@@ -70,14 +70,14 @@ class Modal:
     u: np.ndarray
     du: np.ndarray
 
-    def shift(self, shape: np.ndarray, bow: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Displacement of a point in the body frame, its rate and second rate; see `model.flexible_bodies.shift`."""
-        return shift(shape, bow, self.q, self.u, self.du)
+    def shift(self, shape: np.ndarray, shortening: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return displacement, rate and second rate of a point in the body frame; see `model.flexible_bodies.shift`."""
+        return shift(shape, shortening, self.q, self.u, self.du)
 
 
 @dataclass(frozen=True)
 class Motions:
-    """Motions of all links, bodies and named frames in observed rows, each worked out when it is first asked for."""
+    """Motions of all links, bodies and named frames in observed rows, each computed at its first use."""
 
     model: Model
     seen: Observed
@@ -87,16 +87,16 @@ class Motions:
         return {}
 
     def link(self, i: int) -> Motion:
-        """Motion of a link's frame."""
+        """Return the motion of a link's frame."""
         if i not in self._links:
             known = ("origin", "axes", "velocity", "omega", "acceleration", "alpha")
             p, R, v, omega, a, alpha = (np.asfortranarray(self.seen.links[field][:, i]) for field in known)
-            # gravity is an upward acceleration of the ground there
+            # the kernels represent gravity as an upward acceleration of the ground
             self._links[i] = Motion(p, R, v, omega, a + self.model.gravity, alpha)
         return self._links[i]
 
     def modal(self, link: int) -> Modal:
-        """Modal coordinates of a flexible link."""
+        """Return the modal coordinates of a flexible link."""
         numbering, seen = self.model.numbering, self.seen
         q, c = numbering.modal_positions[link], numbering.modal_coordinates[link]
         return Modal(seen.positions[:, q], seen.speeds[:, c], seen.accelerations[:, c])
@@ -120,15 +120,15 @@ class Motions:
         return Bodies(position, seen.body_quaternion, velocity, seen.body_omega, acceleration, seen.body_alpha)
 
     def several(self, names: Sequence[str]) -> Bodies:
-        """The same of some bodies."""
+        """Return the motion of the centres of mass and axes of some moving bodies."""
         every = self.every_body
-        if names == self.moving_bodies:  # megabytes are copied only where it must be
+        if names == self.moving_bodies:  # avoids a copy of megabytes
             return every
         places = [self.moving_bodies.index(name) for name in names]
         return Bodies(**{field.name: np.take(getattr(every, field.name), places, axis=1) for field in fields(Bodies)})
 
     def body(self, name: str) -> Motion:
-        """Motion of one moving body's centre of mass and axes."""
+        """Return the motion of one moving body's centre of mass and axes."""
         i = self.model.mechanism.link_of[name]
         link, body = self.model.links[i], self.model.scene.body[name]
         if isinstance(body, RigidBody):
@@ -136,7 +136,7 @@ class Motions:
             return self.link(i).at(placement.point(np.array(body.com)), placement.R)
         assert link.bundle is not None
         shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
-        arm, rate, second = self.modal(i).shift(shape, bow(self.model.mechanism, i))
+        arm, rate, second = self.modal(i).shift(shape, shortening(self.model.mechanism, i))
         return self.link(i).moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
 
     @cached_property
@@ -144,7 +144,7 @@ class Motions:
         return {name: k for k, name in enumerate(self.model.mechanism.frames)}
 
     def positions(self, names: Sequence[str]) -> np.ndarray:
-        """Origins of named frames, kernels' origin, shape (time, frame, 3)."""
+        """Return the origins of named frames from the kernels' origin, shape (time, frame, 3)."""
         rigid = self.model.mechanism.all_rigid
         if rigid and names == list(self._frames):
             return self.seen.frame_position
@@ -155,7 +155,7 @@ class Motions:
             if bundle is not None:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].values[frame_index(bundle, label)]
-                bent = placement.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
+                bent = placement.p + self.modal(i).shift(S, shortening(self.model.mechanism, i, label))[0]
                 positions[:, k] = link.p + turned(link.R, bent)
         return positions
 
@@ -172,22 +172,22 @@ class Motions:
             label, state = name.partition(".")[2], self.modal(i)
             at = frame_index(bundle, label)
             S, P = (bundle[f"frame_{k}_shape"].values[at] for k in ("translation", "rotation"))
-            arm, rate, second = state.shift(S, bow(self.model.mechanism, i, label))
+            arm, rate, second = state.shift(S, shortening(self.model.mechanism, i, label))
             turning = turned(link.R, _angular_velocity(state.q @ P.T, state.u @ P.T))
             velocities[name] = link.moving(placement.p + arm, rate, second).v, link.omega + turning
         return velocities
 
     def _place(self, name: str) -> tuple[int, Placement]:
-        """Link of a named frame, and the frame's undeformed placement there."""
+        """Return the link of a named frame, and the frame's undeformed placement there."""
         frame = self.model.mechanism.frames[name]
         i = self.model.mechanism.link_of[frame.body]
         return i, self.model.links[i].places[frame.body].of(frame.place)
 
 
 def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Angular velocity, parent axes, of rotations exp(theta) whose vectors change at `rate`; shape (time, 3)."""
+    """Return the angular velocity, parent axes, of rotations exp(theta) with vectors' rates `rate`; shape (time, 3)."""
     angle = np.linalg.norm(theta, axis=1, keepdims=True)
-    small = angle < 1e-4  # both series are exact to rounding there with their first two terms
+    small = angle < 1e-4  # two terms of both series are exact to rounding there
     safe = np.where(small, 1.0, angle)
     first = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
     second = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (safe - np.sin(safe)) / safe**3)
@@ -196,7 +196,7 @@ def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:
 
 
 def motion_series(bodies: Bodies, origin: np.ndarray) -> Variables:
-    """Position, orientation, velocities and acceleration of several bodies over time, by variable."""
+    """Return position, orientation, velocities and acceleration of several bodies over time, by variable."""
     series = {
         ("position", "axis"): shifted(bodies.position, origin),
         ("quaternion", "quat"): continued(bodies.quaternion),
@@ -208,7 +208,7 @@ def motion_series(bodies: Bodies, origin: np.ndarray) -> Variables:
 
 
 def shifted(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Points (time, point, 3) from the kernels' origin, in the world."""
+    """Return points (time, point, 3), given from the kernels' origin, in the world."""
     rows, count, _ = points.shape
     # added to whole rows, since three numbers at a time take five times as long
     return (points.reshape(rows, 3 * count) + np.tile(origin, count)).reshape(points.shape)

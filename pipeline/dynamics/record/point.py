@@ -1,4 +1,4 @@
-"""One point of a sweep: a run of which only the recorded numbers are made."""
+"""One point of a sweep: a run of which only the requested numbers are computed."""
 
 from __future__ import annotations
 
@@ -11,19 +11,16 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.points import Point, Values
-from flexclear.pipeline.core.artifacts.quantities import IMPACT, SAME_TIME, of_impacts, reduced, regular_times
-from flexclear.pipeline.core.scene.event_kinds import CLOSING
+from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.quantity import MAGNITUDES, Recorded
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
-from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.contacts import arms
-from flexclear.pipeline.dynamics.record.dataset import series
+from flexclear.pipeline.dynamics.record.dataset import events_of, series, variables_for
 from flexclear.pipeline.dynamics.record.ensemble import ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
@@ -41,21 +38,21 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: where only final values are recorded, the ledger of energy is examined so often
+#: number of outputs at which the energy ledger is checked where only final values are recorded
 LOOKS = 50
-#: how much tighter the tolerance of the run is by which the error is estimated
+#: tolerance of the run from which the error is estimated, as a fraction of the point's
 TIGHTER = 1e-2
-#: points that step side by side, and the fewest that do: of less, each is evaluated alone all the same
+#: number of points that step together, and the least number: of fewer points, each is evaluated alone
 TOGETHER, FEWEST = 8, 3
 
 
 @dataclass
 class Runner:
-    """Runs points of one family, all edits of one scene with the same bundles; keeps the engine that it made first.
+    """Runs points of one family, all edits of one scene with the same bundles, and reuses its first engine.
 
-    recorded: the quantities.  members: starts of each point that differ by a hair; 0: the one of the scene.
-    error: whether each point is run at a tighter tolerance as well.  scaled: whether starts differ by what clearances,
-    depths and the size allow, where the scene has no ensemble; else by the default of ensembles.
+    recorded: the quantities.  members: number of perturbed starts per point; 0: the scene's start alone.
+    error: run each point at a tighter tolerance as well.  scaled: starts differ by what clearances, penetrations and
+    the size allow, where the scene has no ensemble; else by the default of ensembles.
     """
 
     bundles: Mapping[str, Labelled]
@@ -65,14 +62,14 @@ class Runner:
     scaled: bool = True
     engine: Engine | None = None
     _making: Lock = field(default_factory=Lock)
-    #: what is seen of all rows is large, and seen in turn it is there once
+    #: the observed rows of a point are large: one thread at a time holds them in memory
     _looking: Lock = field(default_factory=Lock)
 
     def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
-        """One point; what physics or the input of this point refuses is reported in the point, not raised.
+        """Run one point; errors from physics or input of this point are reported in the result, not raised.
 
-        place: where its steps may be taken next to those of other points, which changes no bit of it.  alive: called
-        now and then; what it raises ends the work.
+        place: where its steps may be evaluated together with those of other points, with the same bits.  alive: called
+        now and then; an exception from it ends the work.
         """
         scene = thinned(scene, self.recorded)
         try:
@@ -92,7 +89,7 @@ class Runner:
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
 
     def places(self, scene: Scene, points: int) -> Places | None:
-        """Where so many points like that of a scene may step together; None where each is to be run alone."""
+        """Return places in which points like a scene's step together; None where each is run alone."""
         return Places(TOGETHER, 1) if points >= FEWEST and self._steps_together(scene) else None
 
     def _steps_together(self, scene: Scene) -> bool:
@@ -101,15 +98,15 @@ class Runner:
         try:
             self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
-            return False  # as each point reports by itself
+            return False  # each point reports the error itself
         return self.engine is not None and self.engine.staged
 
     def _rows(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[list[Values], int]:
-        """Recorded values of each start, and the evaluations of all."""
+        """Return the recorded values of each start, and the number of evaluations of all."""
         if scene.event:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
-        # exact, since how many points are run side by side depends on the machine and on how long they take
+        # exact: the number of points evaluated together depends on the machine and on their durations
         engine.straight.exact = True
         engine.straight.place = place
         if in_sections(self.recorded):
@@ -119,30 +116,22 @@ class Runner:
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other, judges and judges.run)
             with self._looking:
-                rows.append(_kept(scene, last, trajectory, self.recorded))
+                rows.append(_recorded_values(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         return rows, count
 
     def _over_events(self, scene: Scene, alive: Progress) -> tuple[list[Values], int]:
-        """Recorded values of a scene with events, read from its whole run."""
+        """Return the recorded values of a scene with events, from its whole run."""
         if in_sections(self.recorded) or self.members:
             raise InputError("[event]", "a run with events has neither sections nor members", "record other reductions")
         run = lookup(EVENTS, "phases", where="[event]")(scene, self.bundles, alive, affordable(scene))
         time = run["time"].values
         after = np.searchsorted(time, regular_times(scene.time, scene.output) * (1.0 - SAME_TIME))
-        values: Values = {}
-        for one in self.recorded:
-            if one.quantity.over_time:
-                over_time = quantities.series(run, one.quantity)
-                values[one.name] = _recorded(one, time, over_time, np.minimum(after, len(time) - 1))
-            elif one.quantity.kind == "impact_times":
-                values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
-            else:
-                values[one.name] = np.asarray(quantities.events(run, one.quantity)[0])
+        values = _values(run, self.recorded, time, np.minimum(after, len(time) - 1))
         return [values], int(run.attrs["evaluations"])
 
     def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
-        """What runs a point, and the maker of what continues with another integrator; made one at a time."""
+        """Return the engine of a point, and a function that makes engines with another integrator; one at a time."""
         with self._making:
             engine, other = engines_alike(self.engine, scene, self.bundles)
             self.engine = self.engine or engine
@@ -160,12 +149,12 @@ class Runner:
         jacobian = offset_jacobian(engine, start)
         given = model.scene.ensemble or (None if self.scaled else Ensemble())
         offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.members)
-        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model)
+        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model.mechanism)
         return [perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3)) for moved in offsets]
 
 
 def _statistics(rows: Sequence[Values]) -> tuple[Values, Values]:
-    """Means over starts and their standard deviations; of one start its values alone."""
+    """Return means over starts and their standard deviations; for one start its values, without deviations."""
     if len(rows) == 1:
         return rows[0], {}
     stacked = {name: np.stack([values[name] for values in rows]) for name in rows[0]}
@@ -174,14 +163,14 @@ def _statistics(rows: Sequence[Values]) -> tuple[Values, Values]:
 
 
 def in_sections(recorded: Sequence[Recorded]) -> bool:
-    """Whether points are motions that their laws repeat, sampled once in each period."""
+    """Return True when points are periodic motions, sampled once in each period."""
     return any(one.reduction == "sections" for one in recorded)
 
 
 def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
-    """The scene with no more regular outputs than the recorded quantities need."""
+    """Return the scene with no more regular outputs than the recorded quantities need."""
     if in_sections(recorded):
-        # only the states between the stretches of a period are examined
+        # only the states at the waypoints of a period are examined
         return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
     if any(one.throughout for one in recorded):
         return scene
@@ -189,30 +178,37 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
+def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    over_time = {one.quantity for one in kept if one.quantity.over_time}
-    known = series(scene, Motions(engine.model, seen), over_time, trajectory.time)
+    events = {} if all(one.quantity.over_time for one in kept) else events_of(engine.model, trajectory)
+    terms = {term for one in kept for term in one.quantity.terms()}
+    arrays = variables_for(scene, Motions(engine.model, seen), terms, trajectory.time, events)
+    return _values(arrays, kept, trajectory.time, _regular(engine, trajectory.time))
+
+
+def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regular: np.ndarray) -> Values:
+    """Recorded values of a run, or of what of it they are read from; regular: rows of the regular output times."""
     values: Values = {}
-    for one in kept:
+    for one in recorded:
         if one.quantity.over_time:
-            regular = _regular(engine, trajectory.time)
-            values[one.name] = _recorded(one, trajectory.time, known[one.quantity.name], regular)
+            values[one.name] = _recorded(one, time, quantities.series(run, one.quantity), regular)
+        elif one.quantity.kind == "impact_times":
+            values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
         else:
-            values[one.name] = np.asarray(_of_contact(engine, trajectory, seen, one))
+            values[one.name] = np.asarray(quantities.events(run, one.quantity)[0])
     return values
 
 
 def _recorded(one: Recorded, time: np.ndarray, over_time: np.ndarray, regular: np.ndarray) -> np.ndarray:
-    """What is recorded of a series, shape (time, ...); regular: rows of the regular output times."""
+    """Return the recorded value of a series, shape (time, ...); regular: rows of the regular output times."""
     value = over_time[regular] if one.reduction == "series" else reduced(time, over_time, one.reduction)
     return np.asarray(value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0])
 
 
 def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
-    """Recorded values, once in each period, after the transient, and the evaluations that all periods took."""
+    """Return the recorded values once per period, after the transient, and the evaluations of all periods."""
     requested, period = scene.sections or Sections(), section_period(scene)
     start, parts = consistent_start(engine), stretches(engine, period, requested.phase)
     require_periodic(parts, start)
@@ -233,21 +229,8 @@ def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive:
     return {name: np.array(rows) for name, rows in values.items()}, evaluations
 
 
-def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Recorded) -> float:
-    contact = [c.name for c in engine.model.contacts].index(one.quantity.owner)
-    if one.quantity.kind == "impulse":
-        ledger = seen.state[-1, engine.model.speeds.stop :]
-        slots = ledger[m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(engine.model.contacts)]
-        return float(m.named(m.CONTACT_LEDGER, slots[None])["impulse"][0, contact])
-    events = trajectory.events
-    closings = events[(events["contact"] == contact) & (events["kind"] == CLOSING)]
-    if one.quantity.kind == "peak_force":
-        return float(closings["peak_force"].max(initial=0.0))
-    return of_impacts(closings["time"][closings["speed"] > IMPACT], one.reduction)
-
-
 def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:
-    """Rows at the regular output times; a break that replaces one is the same but for rounding."""
+    """Return the rows at the regular output times; a break that replaces one differs only by rounding."""
     requested = regular_times(engine.model.scene.time, engine.model.scene.output)
     after = np.clip(np.searchsorted(time, requested), 1, len(time) - 1)
     nearer = np.where(np.abs(time[after - 1] - requested) < np.abs(time[after] - requested), after - 1, after)

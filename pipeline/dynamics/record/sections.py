@@ -1,4 +1,4 @@
-"""Sections of a periodic motion (schema SECTIONS): the state once in each period, impacts, how neighbours part."""
+"""Sections of a periodic motion (schema SECTIONS): the state once per period, impacts, growth of small differences."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Variables
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
-from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
+from flexclear.pipeline.dynamics.record.ensemble import recorded_bodies
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -41,12 +41,12 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: numbers of impacts
+#: recorded numbers of each impact
 OF_IMPACTS = ("section", "contact", "phase", "approach_speed", "peak_force", "duration")
 
 
 def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
-    """Sections of a scene whose laws repeat (schema SECTIONS).
+    """Return the sections of a scene whose laws repeat (schema SECTIONS).
 
     Raises InputError for laws that do not repeat, SolverError when the run cannot continue.
     """
@@ -59,9 +59,9 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
                 "use a continuous 'pid' here",
             )
     period = section_period(scene)
-    # between waypoints only their states are requested
+    # only the states at waypoints are requested
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
-    names = kept_bodies(engine.model, requested.bodies, "[sections.bodies]")
+    names = recorded_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)
     parts = stretches(engine, period, requested.phase)
     require_periodic(parts, start)
@@ -70,7 +70,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     tape, begin = _Tape(names, engine.start + requested.phase), Cursor()
     stored, name = journal.current(), f"periods-{digest(engine, start)}"
     arrays = stored.find(name) if stored is not None else None
-    if arrays is not None:  # what an earlier attempt left
+    if arrays is not None:  # stored by an interrupted run
         remember(engine, arrays)
         tape.unpack(arrays)
         begin = Cursor.unpacked(arrays)
@@ -81,7 +81,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if done.number + 1 == count:
             orbit = tape.orbit(parts, done)
             break
-        if stored is not None:  # packed now: the tape has changed in part where the next period fails or is stopped
+        if stored is not None:  # packed now: a failure in the next period would leave the tape half changed
             state = {**memory(engine), **done.after.packed(), **tape.packed()}
             stored.store(name, lambda state=state: state)  # type: ignore[misc]
     growth, lost = np.array(tape.columns["growth"][: len(followed)]), int(sum(tape.columns["lost"]))
@@ -99,7 +99,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def section_period(scene: Scene) -> float:
-    """Period of the sections [s], the run's length where the scene gives none; InputError where it does not fit in."""
+    """Return the period of the sections [s], by default the run's length; raise InputError for one too long."""
     requested, span = scene.sections or Sections(), scene.time.end - scene.time.start
     period = requested.period or span
     if period > span * (1.0 + 1e-12):
@@ -119,10 +119,10 @@ def section_period(scene: Scene) -> float:
 
 @dataclass
 class _Tape:
-    """Recorded values of bodies. at: when sections are [s].
+    """Recorded values of bodies; at: time of the sections [s].
 
-    columns: `growth`, `lost` and `motion.*` have an entry per period, `impact.*` one per impact; what is known when an
-    impact ends is NaN until then.  open: number of the last impact of each contact.
+    columns: `growth`, `lost` and `motion.*` have an entry per period, `impact.*` one per impact; force and duration of
+    an impact are NaN until it ends.  open: index of the last impact of each contact.
     """
 
     names: list[str]
@@ -131,7 +131,7 @@ class _Tape:
     open: dict[int, int] = field(default_factory=dict)
 
     def add(self, parts: list[Engine], done: Period, number: int) -> None:
-        """Keep of one period what is asked for."""
+        """Record the requested values of one period."""
         self._append(growth=done.growth, lost=done.lost)
         for part, trajectory in zip(parts, done.parts, strict=True):
             if part.start == self.at:
@@ -145,7 +145,7 @@ class _Tape:
             self.columns[name].append(value)
 
     def orbit(self, parts: list[Engine], done: Period) -> Variables:
-        """Motion of the recorded bodies where the stretches of a period begin, as far as the schema has it."""
+        """Return the motion of the recorded bodies at the waypoints of a period, for the variables of the schema."""
         motions = [self._motion(*one, np.array([0])) for one in zip(parts, done.parts, strict=True)]
         return {
             f"orbit_{name}": (("waypoint", *_inner(name)), np.concatenate([motion[name] for motion in motions]))
@@ -154,14 +154,14 @@ class _Tape:
         }
 
     def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """Motion of the recorded bodies, and the contacts' offsets, at some rows."""
+        """Return the motion of the recorded bodies, and the contacts' offsets, at some rows."""
         seen, model = observed(part, replace(trajectory, rows=trajectory.rows[rows])), part.model
         series = motion_series(Motions(model, seen).several(self.names), model.mechanism.origin)
         offsets = {"contact_offset": seen.touch["offset"].copy()} if model.contacts else {}
         return {name: values for name, (_, values) in series.items()} | offsets
 
     def _note(self, part: Engine, trajectory: Trajectory, number: int, begin: float) -> None:
-        """Impacts of a stretch: those that begin in it, and of those that end in it force and duration."""
+        """Record the impacts that begin in a stretch, and force and duration of those that end in it."""
         closings = trajectory.events[trajectory.events["kind"] == m.CLOSING]
         new = closings[(closings["time"] >= part.start) & (closings["speed"] > IMPACT)]
         rows = np.clip(np.searchsorted(trajectory.time, new["time"]), 0, len(trajectory.time) - 1)
@@ -179,19 +179,19 @@ class _Tape:
                 durations[begun], forces[begun] = event["duration"], event["peak_force"]
 
     def packed(self) -> dict[str, np.ndarray]:
-        """All of it so far as arrays."""
+        """Return all recorded values as arrays."""
         return {name: np.array(values) for name, values in self.columns.items()} | {
             "open": np.array(list(self.open.items()), int).reshape(-1, 2)
         }
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Take up what `packed` gave, among other arrays."""
+        """Restore the values that `packed` returned, from a mapping with other arrays."""
         mine = ("growth", "lost", "motion.", "impact.")
         self.columns |= {name: list(values) for name, values in arrays.items() if name.startswith(mine)}
         self.open = {int(c): int(k) for c, k in arrays["open"]}
 
     def variables(self, model: Model) -> Variables:
-        """All of it, by the names of the schema SECTIONS."""
+        """Return all recorded values by the names of the schema SECTIONS."""
         motion = [name.removeprefix("motion.") for name in self.columns if name.startswith("motion.")]
         kept: Variables = {
             name: (("section", *_inner(name)), np.array(self.columns[f"motion.{name}"])) for name in motion
@@ -211,7 +211,7 @@ class _Tape:
 
 
 def _inner(name: str) -> tuple[str, ...]:
-    """Dimensions of a series of the motion (`motion_series`) but the first."""
+    """Return the dimensions of a series of the motion (`motion_series`) without the first one."""
     if name == "contact_offset":
         return ("contact", "axis")
     return ("body", "quat" if name == "quaternion" else "axis")

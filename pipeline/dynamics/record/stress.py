@@ -5,8 +5,8 @@ The forces in a section balance, for all that lies beyond it, interface loads ag
 .. math:: F = \sum f_i - \int_{beyond}\rho\,(a - g)\,dV ,
 
 with the acceleration of every slice of mass under rigid and modal motion. So the interface loads act in full, whatever
-they excite, and modes that were left out lack only by their inertia, which falls with the square of frequency over
-theirs; stresses from the modal coordinates alone, :math:`E\,S' q`, lack the static answer too.
+they excite, and omitted modes lack only their inertia, which falls with the square of the ratio of excitation to
+natural frequency; stresses from the modal coordinates alone, :math:`E\,S' q`, lack the static response, too.
 Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (mode acceleration); Bisplinghoff, Ashley
 & Halfman, *Aeroelasticity* (1955), sec. 10-3 (force summation).
 """
@@ -23,20 +23,20 @@ from flexclear.pipeline.core.numerics.rotations import components, first_largest
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.equations.observation import Series, Variables
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import Acting, Wrench, joint_wrenches, on_frames, path_wrenches
+from flexclear.pipeline.dynamics.record.wrenches import FrameWrench, Wrench, joint_wrenches, on_frames, path_wrenches
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-#: components of stress of solids that are held at once; bounds the memory
+#: largest number of stress components of solids in memory
 COMPONENTS_AT_ONCE = 10_000_000
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of the body frame, its own axes, and of the modal coordinates; each (time, 3) or (time, mode).
+    """Motion of the body frame, in its own axes, and of the modal coordinates; each (time, 3) or (time, mode).
 
-    a: acceleration of the origin less gravity.
+    a: acceleration of the origin minus gravity.
     """
 
     a: np.ndarray
@@ -49,7 +49,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Gauged:
-    """Stress at the gauges of one body: names, components (time, gauge, 6) in body axes, and where (time, gauge, 3)."""
+    """Stress at a body's gauges: names, components (time, gauge, 6) in body axes, positions (time, gauge, 3)."""
 
     names: list[str]
     stress: np.ndarray
@@ -57,9 +57,9 @@ class Gauged:
 
 
 def record(motions: Motions, names: tuple[str, ...]) -> Series:
-    """Stresses of the bodies `names`, rods and solids: variables and coordinates of the run dataset.
+    """Return stresses of the bodies `names`, rods and solids: variables and coordinates of the run dataset.
 
-    InputError for a bundle that was made without what this needs.
+    Raises InputError for a bundle without stress data.
     """
     bundles = {name: motions.model.links[motions.model.mechanism.link_of[name]].bundle for name in names}
     rods = {name: bundle for name, bundle in bundles.items() if bundle is not None and "section_place" in bundle}
@@ -93,7 +93,7 @@ def _of_gauges(gauged: Mapping[str, Gauged]) -> Series:
 
 
 def _of_solids(motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
-    """The factors of the stress fields; what follows from them into `gauged`."""
+    """Return the factors of the stress fields; store the stresses at gauges in `gauged`."""
     every, fields, owners = [], list[str](), list[str]()
     for body, bundle in solids.items():
         factor = factors(bundle, *motion_and_loads(motions, body))
@@ -111,9 +111,9 @@ def _of_solids(motions: Motions, solids: Mapping[str, Labelled], gauged: dict[st
 
 
 def _of_rods(motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
-    """Section forces and peak stresses; the latter are left out when a rod has a section without known outline.
+    """Return section forces and peak stresses; the latter only when all sections have a known outline.
 
-    The largest of all sections into `gauged`, at the centre of its section.
+    Stores the largest stress of all sections in `gauged`, at the centre of its section.
     """
     forces, peaks, owners = [], [], []
     for name, bundle in rods.items():
@@ -145,9 +145,9 @@ def _of_rods(motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, G
 
 
 def motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
-    """Motion of a flexible body, and moments about its origin [N m] and forces [N] on its frames, body axes.
+    """Return motion of a flexible body, and moments about its origin [N m] and forces [N] on its frames, body axes.
 
-    Both of shape (time, frame, 3), frames in the order of the mechanism, as the bundle has them.
+    Shape (time, frame, 3) each, frames in the order of the mechanism and of the bundle.
     """
     model = motions.model
     link = model.mechanism.link_of[name]
@@ -163,9 +163,9 @@ def motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, n
     return Motion(a, omega, alpha, state.q, state.u, state.du), moment, force
 
 
-def _loads(motions: Motions, name: str) -> list[Acting]:
-    """What joints, paths and loads do to a body: its frame, moment about the kernels' origin, force, world axes."""
-    model, seen, acting = motions.model, motions.seen, list[Acting]()
+def _loads(motions: Motions, name: str) -> list[FrameWrench]:
+    """Return wrenches on a body by joints, paths and loads: frame, moment about kernels' origin, force; world axes."""
+    model, seen, acting = motions.model, motions.seen, list[FrameWrench]()
     for joint, (n, f) in joint_wrenches(motions).items():
         between = model.scene.joint[joint].between
         about_origin = n + np.cross(motions.positions([between[1]])[:, 0], f)
@@ -176,10 +176,10 @@ def _loads(motions: Motions, name: str) -> list[Acting]:
 
 
 def section_forces(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """N, Qy, Qz [N], T, My, Mz [N m] of every section, in axes of the deformed section, shape (time, section, 6).
+    """Return N, Qy, Qz [N], T, My, Mz [N m] of each section, in axes of the deformed section, (time, section, 6).
 
-    moment, force: of joints and loads at every named frame, body axes, moments about the body's origin [N m, N],
-    shape (time, frame, 3).
+    moment, force: of joints and loads at every named frame, body axes, moments about the body's origin [N m, N], shape
+    (time, frame, 3).
     """
     slices, frames = (bundle[f"{name}_beyond"].values.astype(float) for name in ("slice", "frame"))
     spin, push = _inertia(bundle, motion)
@@ -192,11 +192,11 @@ def section_forces(bundle: Labelled, motion: Motion, moment: np.ndarray, force: 
 
 
 def peak_stresses(bundle: Labelled, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Axial stress that is largest in size, and largest von Mises stress [Pa], shape (time, section) each.
+    """Return axial stress of largest magnitude, largest von Mises stress, (time, section), and its components [Pa].
 
-    And the six components of stress at the fibre of the latter, axes of the section, (time, section, 6).
+    The six components are the stress at the fibre of the latter, axes of the section, (time, section, 6).
     forces: as `section_forces` returns them.  A round section is turned so that a fibre lies in the plane of bending.
-    Of stresses that are equally large that of the first fibre counts.
+    Among equally large stresses that of the first fibre counts.
     """
     axial, mises, stress = np.empty(forces.shape[:2]), np.empty(forces.shape[:2]), np.zeros(forces.shape)
     maps, is_round = bundle["fibre_stress"].values, bundle["section_round"].values
@@ -214,18 +214,18 @@ def peak_stresses(bundle: Labelled, forces: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _at(values: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """One value of each row."""
+    """Return one value of each row."""
     result: np.ndarray = values[np.arange(len(values)), column]
     return result
 
 
 def _bending(forces: np.ndarray) -> np.ndarray:
-    """Angle from y to the fibre that bending stretches most, of forces (time, 6)."""
+    """Return the angle from y to the fibre with the largest tension by bending; forces: (time, 6)."""
     return np.arctan2(forces[:, 4], -forces[:, 5])
 
 
 def _turned(forces: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Forces (time, 6) in axes turned about x by an angle."""
+    """Return forces (time, 6) in axes turned about x by an angle."""
     c, s = np.cos(angle), np.sin(angle)
     turned = forces.copy()
     for k in (1, 4):
@@ -235,7 +235,7 @@ def _turned(forces: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def _inertia(bundle: Labelled, motion: Motion) -> Wrench:
-    """Rate of momentum of every slice less its weight: moment about the body's origin, force, (time, slice, 3)."""
+    """Return each slice's rate of momentum minus weight: moment about the body's origin, force, (time, slice, 3)."""
     S = [_moved(bundle, "slice_translation_shape", x) for x in (motion.q, motion.u, motion.du)]
     theta = [skew(_moved(bundle, "slice_rotation_shape", x)) for x in (motion.q, motion.u, motion.du)]
     a, omega, alpha = (x[:, None] for x in (motion.a, motion.omega, motion.alpha))
@@ -252,24 +252,24 @@ def _inertia(bundle: Labelled, motion: Motion) -> Wrench:
 
 
 def _moved(bundle: Labelled, name: str, q: np.ndarray) -> np.ndarray:
-    """Shapes (point, 3, mode) times coordinates (time, mode): (time, point, 3)."""
+    """Return shapes (point, 3, mode) times coordinates (time, mode): (time, point, 3)."""
     return np.einsum("pim,tm->tpi", bundle[name].values, q, optimize=True)
 
 
 def _turn(v: np.ndarray) -> np.ndarray:
-    """Rotation matrices of rotation vectors (..., 3) (Rodrigues)."""
+    """Return rotation matrices of rotation vectors (..., 3) (Rodrigues)."""
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     X = skew(v)
     return np.eye(3) + np.sinc(angle / np.pi) * X + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * (X @ X)
 
 
-# Solids: the fields of their bundles times what their factors are in each row. These are modal coordinates, forces and
-# moments of the frames, accelerations of the body frame and of the modes (`structure/stress/solid` says why that is the
-# method of mode acceleration)
+# Solids: the fields of their bundles times the factors of each row. These factors are modal coordinates, forces and
+# moments of the frames, accelerations of the body frame and of the modes (`structure/stress/solid` explains why that is
+# the method of mode acceleration)
 
 
 def factors(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """What each field of a solid's bundle is multiplied by, in SI, shape (time, field).
+    """Return the factor of each field of a solid's bundle, in SI, shape (time, field).
 
     moment, force: as `motion_and_loads` returns them.
     """
@@ -284,7 +284,7 @@ def factors(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndar
 
 
 def gauge_nodes(bundle: Labelled) -> dict[str, np.ndarray]:
-    """Nodes of the whole surface, by the empty name, where stress is none of an artefact; and of each gauge."""
+    """Return the nodes of each gauge, and by the empty name those of the whole surface where stress is no artefact."""
     nodes = {"": np.flatnonzero(bundle["node_doubtful"].values == 0)}
     for k, name in enumerate(bundle["gauge"].values.tolist()):
         nodes[name] = bundle["gauge_node"].values[bundle["gauge_index"].values == k]
@@ -292,7 +292,7 @@ def gauge_nodes(bundle: Labelled) -> dict[str, np.ndarray]:
 
 
 def largest(field: np.ndarray, factor: np.ndarray, groups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Stress of each group at its node of largest von Mises stress (time, group, 6), and that node, (time, group).
+    """Return each group's stress at its node of largest von Mises stress (time, group, 6), and that node (time, group).
 
     field: shape (node, 6, field).  factor: shape (time, field).
     """

@@ -16,15 +16,15 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 #: singular values of the selected closure rows below this fraction of the largest count as zero in the rank
 ZERO_ROW = 1e-9
-#: condition numbers below which no row's rank is in doubt, in whatever units, and with which eigenvalues of J J^T, the
-#: squares of the singular values, still have ten of their digits: their roundings are 1e-16 of the largest one
-WELL = 1e3
-#: so many rows are examined together: the matrices of all take longer to get from the system than to work out
+#: condition numbers below this leave no doubt about a row's rank, in any units, and leave ten digits to the eigenvalues
+#: of J J^T, the squares of the singular values: their roundings are 1e-16 of the largest one
+WELL_CONDITIONED = 1e3
+#: number of rows examined together: allocating the matrices of all rows takes longer than the computation
 ROWS_AT_ONCE = 256
 
 
 def topology(run: Run) -> Series:
-    """Variables and coordinates of the run dataset."""
+    """Return rank, mobility, condition, singular passes and redundant reactions for the run dataset."""
     engine, trajectory, seen = run.engine, run.trajectory, run.observed
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
@@ -34,7 +34,7 @@ def topology(run: Run) -> Series:
     if indicators.shape[1]:
         least = np.maximum(indicators[:, -1], indicators[:, 0] / INFINITE)
         condition = variables["condition"] = (("time",), np.minimum(indicators[:, 0] / least, INFINITE))
-        singular_rows = condition[1] > WELL
+        singular_rows = condition[1] > WELL_CONDITIONED
         if singular_rows.any():
             values = _singular_values(engine, trajectory, seen, closure_rows.natural)[singular_rows]
             rank[singular_rows] = np.sum(values > ZERO_ROW * values[:, :1], axis=1)
@@ -54,7 +54,7 @@ def topology(run: Run) -> Series:
 def _singular_values(
     engine: Engine, trajectory: Trajectory, seen: Observed, scale: Callable[..., np.ndarray]
 ) -> np.ndarray:
-    """Singular values of every row's closure Jacobian, with the rows solved for there; shape (time, rank)."""
+    """Return the singular values of every row's Jacobian of the selected closure rows; shape (time, rank)."""
     parts = []
     for part, selected in trajectory.parts():
         engine.keep(selected)
@@ -66,12 +66,12 @@ def _singular_values(
 
 
 def _values(J: np.ndarray) -> np.ndarray:
-    """Singular values of matrices (..., rank, nv), largest first."""
+    """Return the singular values of matrices (..., rank, nv), largest first."""
     if not J.size:
         return np.zeros(J.shape[:2])
     squares = np.linalg.eigvalsh(J @ np.swapaxes(J, 1, 2))[:, ::-1]
     values = np.sqrt(np.maximum(squares, 0.0))
-    poor = ~(values[:, -1] * WELL > values[:, 0])
+    poor = ~(values[:, -1] * WELL_CONDITIONED > values[:, 0])
     if poor.any():
         values[poor] = np.linalg.svd(J[poor], compute_uv=False)
     return values

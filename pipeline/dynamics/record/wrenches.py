@@ -1,4 +1,4 @@
-"""Forces and moments of every joint, also of those between rigidly joined bodies."""
+"""Wrenches of every joint, including joints between rigidly joined bodies."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
-Acting = tuple[str, np.ndarray, np.ndarray]  #: the same with the frame on which it acts
+FrameWrench = tuple[str, np.ndarray, np.ndarray]  #: frame on which a wrench acts, and the wrench
 
 
 def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> dict[str, Wrench]:
-    """Wrench of joints on their second bodies: moment about that body's frame origin [N m], force [N].
+    """Return the wrenches of joints on their second bodies: moment about that body's frame origin [N m], force [N].
 
     names: of the joints; all when None.
     """
@@ -29,11 +29,11 @@ def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> di
 
 
 def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
-    """The same of several joints at once, (time, joint, 3)."""
+    """Return moments [N m] and forces [N] of several joints, as `joint_wrenches` does, (time, joint, 3) each."""
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
     for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
-        moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds next to its contact
+        moment, force = known.get(contact.name, (0.0, 0.0))  # constraints of a clearance joint beyond its contact
         push = seen.touch["force"][:, c]
         known[contact.name] = (moment + cross(seen.touch["point"][:, c], push), force + push)
     if any(name not in known for name in names):
@@ -47,16 +47,16 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     return moments, forces
 
 
-def path_wrenches(model: Model, seen: Observed) -> list[Acting]:
-    """For every frame that a drive leads along a path: its name, moment about the kernels' origin, force."""
+def path_wrenches(model: Model, seen: Observed) -> list[FrameWrench]:
+    """Return for each frame that a drive moves along a path: its name, moment about the kernels' origin, force."""
     tree, drives = _tree(model, seen), model.scene.drive
     paths = {f"drive.{name}": drive.frame for name, drive in drives.items() if isinstance(drive, PathDrive)}
     return [(frame, *tree[edge]) for edge, frame in paths.items() if edge in tree]
 
 
-def on_frames(model: Model, seen: Observed, body: str) -> list[Acting]:
-    """What acts on a body besides joints and paths: loads and effects."""
-    on_each: list[Acting] = []
+def on_frames(model: Model, seen: Observed, body: str) -> list[FrameWrench]:
+    """Return the wrenches on a body from loads and effects, without joints and paths."""
+    on_each: list[FrameWrench] = []
     if model.loads:
         from flexclear.pipeline.dynamics.record.loads import on_loaded_frames
 
@@ -83,13 +83,13 @@ def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
 
 
 def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, Wrench]:
-    """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
+    """Return the wrenches of fixed joints inside each link, by Newton and Euler for the bodies on one side."""
     model, rows, inside = motions.model, len(motions.seen.state), dict[str, Wrench]()
     beyond = list[tuple[str, list[str], float]]()  # bodies on the far side; +1 where they are the second body's
     for link in model.links:
         others = {name: _joined(model, name) for name in model.scene.joint if name not in known}
         inner = [name for name, bodies in others.items() if link.places.keys() >= set(bodies)]
-        # a second path between bodies that are joined already carries nothing here
+        # a redundant joint between bodies of one link gets a zero wrench
         inside |= {name: (np.zeros((rows, 3)), np.zeros((rows, 3))) for name in inner}
         tree = dict[str, tuple[str, str]]()
         for name in inner:
@@ -119,7 +119,7 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
 
 
 def _joined(model: Model, name: str) -> tuple[str, str]:
-    """Bodies of a joint; of a path, which holds against the world, its body alone."""
+    """Return the two bodies of a joint; for a path, which acts from the world, an empty name and its body."""
     scene, frames = model.scene, model.mechanism.frames
     if name in scene.joint:
         a, b = scene.joint[name].between
@@ -130,7 +130,7 @@ def _joined(model: Model, name: str) -> tuple[str, str]:
 
 
 def reached(start: str, pairs: Collection[tuple[str, str]]) -> set[str]:
-    """Bodies that joined pairs connect to one, itself among them."""
+    """Return the bodies that joined pairs connect to one body, including that body."""
     there, ends = {start}, [start]
     while ends:
         here = ends.pop()

@@ -1,7 +1,7 @@
 """Integration of a scene's motion.
 
-What the runs of some scenes call for and those of others never do is listed here; which those are, `effects.ways`
-says. It is imported by `effects.way` alone, so that it is in the keys of those runs and of no others.
+Modules that only some scenes need are listed here; `effects.ways` decides which scenes. Only `effects.way` imports
+them, so that they are in the keys of those runs and of no others.
 """
 
 KIND = "way of a run"
@@ -13,6 +13,6 @@ NAMES = {
     "frames to a tolerance": ".model.fitting",
     "horizon": "horizon.horizon:Pair",
     "inverse dynamics": "inverse:actuated",
-    "method selection": "method_choice.method_selection:suit",
+    "method selection": "method_choice.method_selection:method_costs",
     "passing": "singular_poses.passing",
 }

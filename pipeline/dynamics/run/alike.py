@@ -1,4 +1,4 @@
-"""Engines of other edits of a scene, from one that is known."""
+"""Engines of edited scenes, built from the engine of another edit."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from flexclear.pipeline.dynamics.run.run import engine_of, engines
 def engines_alike(
     known: Engine | None, scene: Scene, bundles: Mapping[str, Labelled]
 ) -> tuple[Engine, Callable[[str], Engine]]:
-    """What `engines` gives, to the last bit, at less cost where an engine of another edit of the scene is `known`.
+    """Return the same as `engines`, to the last bit, at less cost when `known` is the engine of another edit.
 
-    What has been compiled and judged for that serves this.  known: with the same bundles; it is not changed.  Errors as
-    of `engines`.
+    Compiled functions and checks of the known engine serve the new one.  known: engine with the same bundles; it is not
+    changed.  Raises as `engines` does.
     """
     model = None if known is None or not _may_serve(known, scene) else refilled(known.model, scene)
     if known is None or model is None:
@@ -32,7 +32,7 @@ def engines_alike(
 
 
 def _may_serve(known: Engine, scene: Scene) -> bool:
-    """Whether the scene runs on the same kernels, no other run finds its motion, and its start is no special one."""
+    """Return True when the scene uses the same kernels, needs no preceding run, and has an ordinary start."""
     old = known.model.scene
     paths = any(isinstance(drive, PathDrive) for drive in [*old.drive.values(), *scene.drive.values()])
     return not paths and scheme_of(scene.solver) == scheme_of(old.solver) and not known.mobility.singular_start

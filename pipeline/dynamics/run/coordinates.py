@@ -1,4 +1,4 @@
-"""Joint coordinates and their rates, as every joint with named freedoms has them."""
+"""Joint coordinates and their rates, for every joint with named freedoms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and seco
 
 
 def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
-    """By ``joint`` or, where it has several, ``joint.coordinate``; angles continue beyond half a turn."""
+    """Return coordinates and rates by ``joint`` or ``joint.coordinate``; angles continue beyond half a turn."""
     series: dict[str, Series] = {}
     for i, link in enumerate(model.links):
         edge = link.branch.edge
@@ -39,7 +39,7 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
 
 
 def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
-    """Coordinates of all joints, as the scene lists them: name in records, joint, whether it is an angle."""
+    """List the coordinates of all joints in the scene's order: name in records, joint, whether it is an angle."""
     contacts = scene.contacts()
     kinds = {name: joint.type for name, joint in scene.joint.items() if name not in contacts}
     return [
@@ -50,7 +50,7 @@ def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
 
 
 def _measured(a: np.ndarray, b: np.ndarray, coordinate: Coordinate) -> Series:
-    """Coordinate of a joint that closes a loop, from the frames of its two sites, named fields over the rows."""
+    """Return the coordinate of a loop-closing joint from the frames of its two sites, named fields over the rows."""
     F, G = a["axes"], b["axes"]
     along = (G if coordinate.side else F)[:, :, coordinate.axis]
     omega, turning = a["omega"], b["omega"] - a["omega"]

@@ -1,18 +1,18 @@
 r"""Inverse dynamics: the forces of named actuators that move a frame along its path.
 
-The run is made twice. First the path itself is prescribed, and whatever it leaves free moves by the
-equations of motion. Then the actuators' coordinates are prescribed as they moved, and their drive
-forces, all joint forces and works are those of the mechanism without any help from outside.
+Two runs are needed. The first one prescribes the path itself; whatever it leaves free moves by the equations of motion.
+The second one prescribes the actuators' coordinates as they moved; its drive forces, joint forces and works are those
+of the mechanism without external help.
 
-Both runs have one motion if the actuators can supply what the path did: with the admissible speeds
+Both runs have the same motion if the actuators can supply the path's forces: with the admissible speeds
 :math:`v = N z`, :math:`N_P z` those of the path and :math:`N_B z` those of the actuators, every
 generalised force :math:`N_P^T\mu` must be some :math:`N_B^T\tau`, and :math:`\tau` is unique if the
 rows of :math:`N_B` are independent.
 
-Of more actuators than freedoms some, as many as there are freedoms, make the motion alone in a second run, with the
+With more actuators than freedoms, as many actuators as freedoms produce the motion alone in a second run, with the
 forces :math:`\tau_S`. With the rates of all :math:`\dot q = T \dot q_S`, any :math:`\tau` with
-:math:`T^T\tau = \tau_S` does too, and :math:`T (T^T T)^{-1} \tau_S` is the least of them. The other actuators then act
-as loads, linear between two outputs, so that joint forces and works are those of this sharing.
+:math:`T^T\tau = \tau_S` produces it, too, and :math:`T (T^T T)^{-1} \tau_S` is the least of them. In a third run the
+other actuators act as loads, linear between two outputs, so that joint forces and works belong to this distribution.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import coordinate_of
-from flexclear.pipeline.dynamics.model.laws import NONE
+from flexclear.pipeline.dynamics.model.laws import NO_LAWS
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
@@ -49,7 +49,7 @@ RANK_TOLERANCE = 1e-8
 
 
 def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, dict[str, Pieces]]:
-    """The scene with its actuators driven instead of the paths, and the laws by which they move.
+    """Return the scene with driven actuators instead of driven paths, and the actuators' laws of motion.
 
     Raises InputError when the actuators cannot produce the motion, or could in more than one way.
     """
@@ -71,21 +71,21 @@ def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def _started(
-    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, laws: Mapping[str, Pieces] = NONE
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, laws: Mapping[str, Pieces] = NO_LAWS
 ) -> tuple[Engine, np.ndarray]:
-    """An engine and its consistent start."""
+    """Return an engine and its consistent start."""
     engine = prepare(tabulate(build(scene, bundles), laws), progress)
     return engine, consistent_start(engine)
 
 
 def _run(engine: Engine, start: np.ndarray, progress: Progress) -> tuple[Trajectory, Observed, Observed]:
-    """A run, and what is observed of it right before and right after each time."""
+    """Return a run, and its outputs right before and right after each time."""
     trajectory = integrate(engine, start, progress)
     return trajectory, observe(engine, trajectory.rows), observe(engine, trajectory.rows, after=True)
 
 
 def hermite(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
-    """Quintics through value, rate and second rate, (3, times) each, left and right of every time."""
+    """Return quintics through value, rate and second rate, (3, times) each, left and right of every time."""
     pieces = []
     for k, h in enumerate(np.diff(time)):
         (x, v, a), (y, w, b) = after[:, k], before[:, k + 1]
@@ -98,13 +98,13 @@ def hermite(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
 
 
 def _coordinate(scene: Scene, actuator: str, path: str = "[drive]") -> tuple[str, int, Coordinate]:
-    """Joint of an actuator, ``joint`` or ``joint.coordinate``; number and declaration of its coordinate."""
+    """Return the joint of an actuator, ``joint`` or ``joint.coordinate``; index and declaration of its coordinate."""
     joint, _, coordinate = actuator.partition(".")
     return coordinate_of(scene, joint, coordinate or None, path)
 
 
 def _with_drives(scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> Scene:
-    """The scene with a drive per actuator, called like it; its law is given later."""
+    """Return the scene with a drive of the same name for each actuator, whose law is given later."""
     others = {n: d for n, d in scene.drive.items() if n not in requested}
     made = {}
     for path, drive in requested.items():
@@ -118,12 +118,12 @@ def _with_drives(scene: Scene, requested: Mapping[str, PathDrive], names: list[s
 
 
 def _named(actuator: str) -> str | None:
-    """The coordinate that an actuator's name gives, if any."""
+    """Return the coordinate in an actuator's name, if any."""
     return actuator.partition(".")[2] or None
 
 
 def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> list[str]:
-    """As many of the actuators as there are freedoms; all of them, unless the scene allows for more."""
+    """Select as many actuators as there are freedoms: all of them, unless the scene allows redundant ones."""
     nv, drives = engine.model.nv, engine.model.drives
     free = null_space(_closure_jacobian(engine), rcond=RANK_TOLERANCE)
     known = [k for k, name in enumerate(drives) if name.partition(".")[0] in requested]
@@ -158,7 +158,7 @@ def _rank(matrix: np.ndarray) -> int:
 
 
 def _closure_jacobian(engine: Engine) -> np.ndarray:
-    """Rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
+    """Return the rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
     model, columns = engine.model, _columns(engine)
     rows = engine.view(m.ROWS.place).reshape(-1, m.ROWS.size)
     J = np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), model.nv + len(model.drives)))
@@ -176,12 +176,12 @@ def _closure_jacobian(engine: Engine) -> np.ndarray:
 
 
 def _columns(engine: Engine) -> np.ndarray:
-    """Twists of all columns after an evaluation, shape (columns, 6)."""
+    """Return the twists of all columns after an evaluation, shape (columns, 6)."""
     return engine.view(m.COLUMNS.place).reshape(-1, m.COLUMNS.size)
 
 
 def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
-    """Rate of an actuator's coordinate per speed of the mechanism, free ones first, then prescribed."""
+    """Return the rate of an actuator's coordinate per speed of the mechanism, free ones first, then prescribed."""
     model, (joint, k, coordinate) = engine.model, _coordinate(scene, actuator)
     rates = np.zeros(model.nv + len(model.drives))
     for i, link in enumerate(model.links):
@@ -198,7 +198,7 @@ def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
 
 
 def _unit_wrench(sites: np.ndarray, a: int, b: int, coordinate: Coordinate) -> np.ndarray:
-    """Moment about the kernels' origin and force of a unit force along a coordinate, shape (6,)."""
+    """Return moment about the kernels' origin and force of a unit force along a coordinate, shape (6,)."""
     along = sites["axes"][b if coordinate.side else a][:, coordinate.axis]
     if coordinate.turning:
         return np.concatenate([along, np.zeros(3)])
@@ -208,9 +208,9 @@ def _unit_wrench(sites: np.ndarray, a: int, b: int, coordinate: Coordinate) -> n
 def _shared(
     scene: Scene, laws: dict[str, Pieces], names: list[str], bundles: Mapping[str, Labelled], progress: Progress
 ) -> tuple[Scene, dict[str, Pieces]]:
-    """The scene in which the actuators without a law act as loads, and the laws of all.
+    """Return the scene in which the actuators without a law act as loads, and the laws of all actuators.
 
-    laws: motion of the actuators that make the scene's motion alone.
+    laws: of the actuators that produce the scene's motion alone.
     """
     engine, start = _started(scene, bundles, progress, laws)
     trajectory, *sides = _run(engine, start, progress)
@@ -229,7 +229,7 @@ def _shared(
 def _least(
     engine: Engine, scene: Scene, time: np.ndarray, seen: Observed, names: list[str], alone: list[str]
 ) -> np.ndarray:
-    """Forces of all actuators at every time, shape (times, actuators); alone: those that make the motion."""
+    """Return the least forces of all actuators, (times, actuators); alone: those that produce the motion alone."""
     model = engine.model
     made = [model.drives.index(name) for name in alone]
     forces = seen.drive_force[:, made] * model.drive_signs[made]
@@ -246,6 +246,6 @@ def _least(
 
 
 def _linear(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
-    """Straight lines from the value right of each time to the value left of the next."""
+    """Return straight lines from the value right of each time to the value left of the next."""
     slopes = (before[1:] - after[:-1]) / np.diff(time)
     return Pieces(tuple(Piece(float(t), (float(x), float(s))) for t, x, s in zip(time, after, slopes, strict=False)))

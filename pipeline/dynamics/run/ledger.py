@@ -1,4 +1,4 @@
-"""The ledger of energy: what came in, what is stored, what was lost and to what; and that it closes."""
+"""The energy ledger: energy supplied, stored and lost, by cause; and its balance."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from flexclear.pipeline.dynamics.model.mechanism import Site
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
-#: what an effect loses, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
-#: dimension; of each loss the sites between which it is, and to what in words
+#: losses of an effect, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
+#: dimension; for each loss its two sites, and its cause in words
 Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
-#: rounding of the largest energies, which may cancel in the balance
+#: roundings of the largest energies, which may cancel in the balance
 BALANCE_ROUNDING = 1e-12
-#: energies below this are nothing: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
+#: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
 NO_ENERGY = 1e-30
-#: no contact law is known to a thousandth of its energy; a run of chosen steps that is off by more says something
-#: else. Where more is requested, the balance is better: of three hundred hard cases at rtol 1e-10
-#: (benchmarks/atlas.py) none is off by 1e-6, unless something is wrong; what damps by its order is not distinguished
-#: from a fault that soon. Fixed steps are for comparison: their error is to be seen, up to a tenth of all energy
+#: no contact law is known to a thousandth of its energy; a larger error of a run with adaptive steps has another cause.
+#: Tighter tolerances have a better balance: of three hundred hard cases at rtol 1e-10 (benchmarks/atlas.py) none is off
+#: by 1e-6, unless something is wrong; numerical damping is not distinguished from a fault that soon. Fixed steps serve
+#: comparisons: their error is to be visible, up to a tenth of all energy
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
-#: fraction of the exchanged energy above which an error is a warning: no force or speed can be trusted to a per cent
+#: fraction of the exchanged energy above which an error is a warning: forces and speeds are wrong by about a per cent
 DOUBTFUL = 1e-2
 #: speed above which a run diverges [m/s]: a hundredth of that of light, where Newton's mechanics is off by 1e-4
 DIVERGED = 3e6
-#: what keeps a motion bounded
+#: remedy for an unbounded motion
 REMEDY = "a controller with a smaller gain or a shorter period, or a longer time constant of a load, keeps it bounded"
-#: steps of many vibrations leave up to half of this in the work of forces that swing while the drives' speeds change
+#: steps over many vibrations leave up to half of this in the work of oscillating forces while the drives' speeds change
 LONG_STEPS, LONG_PER_RTOL = 2e-2, 50.0
 
 
 def _of_effects(model: Model) -> list[tuple[int, Losses]]:
-    """Index in the ledger of what each effect loses."""
+    """Return the index in the ledger of each effect's losses."""
     losing = [effect for effect in model.parts.present if effect.losses]
     return [(model.arrays.size(m.SIZES[f"{one.name}_slot"]), one.load(one.losses)(model)) for one in losing]
 
 
 def series(model: Model, seen: Observed, component: int | None = None) -> Variables:
-    """The variables of the ledger, total and by cause.
+    """Return the variables of the ledger, total and by cause.
 
     component: the independent mechanism to which totals are restricted; None for all.
     """
@@ -56,13 +56,13 @@ def series(model: Model, seen: Observed, component: int | None = None) -> Variab
     kinetic, potential, elastic = (energy[name].sum(axis=1) for name in ("kinetic", "potential", "elastic"))
 
     def total(values: np.ndarray, owners: Iterable[tuple[Site, Site]]) -> np.ndarray:
-        """Sum over what acts between the sites; values: shape (rows, owners)."""
+        """Sum over the parts that act between the sites; values: shape (rows, owners)."""
         mine = [component in (None, parts.of(a.link, b.link)) for a, b in owners]
         return np.asarray((values if all(mine) else values[:, mine]).sum(axis=1))
 
     slots = ledger[:, m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(model.contacts)]
     lost = m.named(m.CONTACT_LEDGER, slots)
-    # friction's slot is its work; what bent bristles still hold of it is not lost
+    # the ledger has friction's work; the energy that bent bristles still store is not lost
     damping, friction = lost["damping"], lost["friction"] - seen.touch["bent"]
     work, modal = (ledger[:, books[name]].sum(axis=1) for name in ("work", "loss"))
     touching = [(contact.outer, contact.inner) for contact in model.contacts]
@@ -99,7 +99,7 @@ def series(model: Model, seen: Observed, component: int | None = None) -> Variab
 
 
 def usual(solver: Solver) -> float:
-    """Energy error, as a fraction of what is turned over, beyond which a run is refused when the scene does not say."""
+    """Return the default energy error above which a run is refused, as a fraction of the exchanged energy."""
     if solver.step is not None:
         return FIXED
     if INTEGRATORS[solver.integrator].dissipative:
@@ -114,7 +114,7 @@ def usual(solver: Solver) -> float:
 class Balance:
     """Energy error at the rows of a run, the energy exchanged, and the rounding of the largest energy [J].
 
-    of: whose energies these are, in words; nothing where they are of all bodies.
+    of: the mechanism whose energies these are, in words; empty for all bodies.
     """
 
     of: str
@@ -125,15 +125,15 @@ class Balance:
 
     @property
     def worst(self) -> int:
-        """Row of the largest error, or of the first that is no number."""
+        """Row of the largest error, or of the first that is not finite."""
         finite = np.isfinite(self.error)
         return int(np.argmax(self.error)) if finite.all() else int(np.argmin(finite))
 
 
 def balances(model: Model, seen: Observed) -> list[Balance]:
-    """The energy balance of each independent mechanism in observed rows.
+    """Return the energy balance of each independent mechanism in observed rows.
 
-    Methods that follow all vibrations together book them as one, and so they are judged.
+    Methods that integrate all vibrations together account for them as one mechanism, which has one balance.
     """
     count = len(model.mechanism.components.lengths)
     if count == 1 or INTEGRATORS[model.scene.solver.integrator].long_steps:
@@ -159,7 +159,7 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:
     """Return the largest energy exchanged [J], by this run or before it.
 
-    exchanged: before it, of a run that continues another one.
+    exchanged: energy before it, of a run that continues another one.
     Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance.
     """
     for refuse in model.parts.functions("refuses"):
@@ -187,7 +187,7 @@ def _require(model: Model, trajectory: Trajectory, result: Balance, exchanged: f
 
 
 def warnings(model: Model, seen: Observed) -> list[str]:
-    """Sentence about an energy error above a hundredth of what is exchanged, which the scene's tolerance allows."""
+    """Warn of an energy error above a hundredth of the exchanged energy, which the scene's tolerance allows."""
     return [
         f"the energy balance{one.of} is off by {error:.3g} J, {100.0 * error / one.exchanged:.2g} % of the "
         f"{one.exchanged:.3g} J that are exchanged: choose a smaller rtol or step"
@@ -197,7 +197,7 @@ def warnings(model: Model, seen: Observed) -> list[str]:
 
 
 def _require_bounded(model: Model, trajectory: Trajectory, seen: Observed) -> None:
-    """SolverError for a motion beyond all bounds, as under a controller that makes it unstable."""
+    """Raise SolverError for an unbounded motion, for instance under a controller that makes it unstable."""
     speeds = np.linalg.norm(seen.body_velocity, axis=2).max(axis=1, initial=0.0)
     beyond = np.flatnonzero(~(speeds <= DIVERGED))
     if len(beyond):

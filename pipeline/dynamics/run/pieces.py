@@ -1,7 +1,7 @@
-"""What an integration has, as arrays: its record, what it hands over to another method, what it continues from.
+"""State of an integration as arrays: its record, the handover to another method, the data from which it continues.
 
-The work space, the topology with the rows solved for and the integers are all that steps depend on, whatever the method
-stores there; so a motion that continues from them is the same to the last bit.
+Steps depend only on the work array, the topology with the selected rows and the integers, whatever the method stores
+there; so a motion that continues from them is the same to the last bit.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 MEMORY = ("w", "n", "h", "selected")
 
 
-#: closure rows solved for, each from a time on [s]
+#: selected closure rows, each selection from a time on [s]
 Selections = tuple[tuple[float, np.ndarray], ...]
 
 
@@ -36,8 +36,8 @@ Selections = tuple[tuple[float, np.ndarray], ...]
 class Tape:
     """The arrays of one integration; rows and events may be replaced by larger ones.
 
-    doubted: flexible bodies of which has been said that they left the range of their modes.
-    looks: where the run was when its pace was examined, and where it began.
+    doubted: flexible bodies with a warning that they left the range of linear modes.
+    looks: samples of the progress rate, the first at the start.
     """
 
     outputs: np.ndarray
@@ -51,19 +51,19 @@ class Tape:
 
 
 class Jumps(Protocol):
-    """What changes the state where the equations change: given the engine, which is there, and the tape."""
+    """Changes of the state where the equations change; both take the engine, which has arrived there, and the tape."""
 
     def at_events(self, engine: Engine, tape: Tape) -> None:
-        """Contacts have begun or ended at the end of the last step."""
+        """Apply the change where contacts have begun or ended at the end of the last step."""
 
     def at_break(self, engine: Engine, before: np.ndarray, after: np.ndarray) -> None:
-        """Pieces of the laws give way to others."""
+        """Apply the change at a break, from the pieces of laws before it to those after it."""
 
 
 def in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
-    """The rows by time: those of a step's inner events were written before its outputs.
+    """Return the rows by time, since those of a step's inner events precede its outputs.
 
-    An event on an output time is one row, the later.
+    Of rows with the same time, as of an event on an output time, the last one remains.
     """
     time = recording.record(rows, contacts).time
     order = np.argsort(time, kind="stable")
@@ -72,10 +72,10 @@ def in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Moment:
-    """All that a motion continues from.
+    """The data from which a motion continues.
 
-    y: state.  modes, latched, watched: of the contacts, as in the work space.  events: of the event table, among them
-    those of the contacts that are closed, to which `watched` refers.
+    y: state.  modes, latched, watched: of the contacts, as in the work array.  events: rows of the event table, with
+    those of the closed contacts, to which `watched` refers.
     """
 
     y: np.ndarray
@@ -86,20 +86,20 @@ class Moment:
 
     @staticmethod
     def of(engine: Engine, watched: np.ndarray, events: np.ndarray) -> Moment:
-        """Where the stepper is, copied."""
+        """Return a copy of the stepper's present data."""
         return Moment(engine.view(m.Y).copy(), engine.modes.copy(), engine.latched.copy(), watched.copy(), events)
 
     def enter(self, engine: Engine) -> None:
-        """Put it into the work space."""
+        """Store the data in the work array."""
         engine.view(m.Y)[:], engine.view(m.WATCH.place)[:] = self.y, self.watched
         engine.modes[:], engine.latched[:] = self.modes, self.latched
 
 
 @dataclass(frozen=True)
 class Handover:
-    """What the next method must know, copied, at the end of the last accepted step.
+    """Copies for the next method, at the end of the last accepted step.
 
-    counters: integers from m.STATUS on.  lasting: control floats LASTING.  tape: what was recorded.
+    counters: integers from m.STATUS on.  lasting: control floats LASTING.  tape: the record.
     """
 
     here: Moment
@@ -109,17 +109,17 @@ class Handover:
 
     @property
     def time(self) -> float:
-        """Where the next method begins [s]."""
+        """Time at which the next method begins [s]."""
         return float(self.lasting[0])
 
 
 def memory(engine: Engine) -> dict[str, np.ndarray]:
-    """All that an engine holds, copied."""
+    """Return copies of an engine's arrays."""
     return {name: getattr(engine, name).copy() for name in MEMORY}
 
 
 def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
-    """Let an engine hold what `memory` gave, but for the addresses of functions, which are this process's own."""
+    """Restore the arrays from `memory`, except the addresses of functions, which belong to this process."""
     addresses = engine.h[list(m.ADDRESSES)].copy()
     for name in MEMORY:
         getattr(engine, name)[:] = arrays[name]
@@ -128,7 +128,7 @@ def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def digest(engine: Engine, *arrays: np.ndarray) -> str:
-    """Of all that decides what an engine makes of some arrays, the processor included."""
+    """Return a digest of all that decides how an engine continues from its arrays, the processor included."""
     scene = engine.model.scene.model_dump_json(exclude={"title", "description", "view", "limits"})
     described = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {scene}"
     hashed = hashlib.sha256(described.encode())

@@ -1,4 +1,4 @@
-"""Whether a run gets on, and who decides that another method continues with it."""
+"""Progress rate of a run, and the decision that another method continues it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.refusals import refusal
 
-#: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
+#: an explicit method ends when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
-#: a scene that leaves its integration open is run at the default tolerance where that takes no more evaluations than
-#: this, which are some seconds; they are predicted from so many on
+#: a scene without method and tolerance runs at the default tolerance if that takes at most so many evaluations, some
+#: seconds; the prediction starts after so many
 AFFORDABLE, EARLIEST = 1_500_000, 100_000
-#: tolerance of dear runs that none is compared with: members start a hundredth of a micrometre apart
+#: tolerance of expensive runs that are compared with no other: members' starts differ by a hundredth of a micrometre
 UNVERIFIED = 1e-7
 
 
@@ -29,7 +29,7 @@ class DearError(SolverError):
 
 
 class Look(NamedTuple):
-    """Where a run was when it was examined: time [s], and counts of evaluations, steps and steps that were stiff."""
+    """Progress of a run: time [s], and counts of evaluations, steps and stiff steps."""
 
     time: float
     evaluations: int
@@ -39,44 +39,44 @@ class Look(NamedTuple):
 
 @dataclass(frozen=True)
 class Judge:
-    """Who looks at a run now and then, whether another method should continue with it.
+    """A periodic decision whether another method continues a run.
 
-    every: evaluations between two looks; None: as often as the run pauses.  verdict: why another one should, or
-    nothing; given the looks so far, of which the first is where the method began and the last the present one.
+    every: evaluations between two decisions; None: whenever the run pauses.  verdict: returns the reason why another
+    method should continue, or nothing, from the samples so far: the first at the method's start, the last the present.
     """
 
     every: int | None
     verdict: Callable[[Engine, Sequence[Look]], str]
 
 
-#: by integrator, who judges its run, and which one continues if not
+#: by integrator its judge, and the integrator that continues
 Panel = Mapping[str, tuple[Judge, str]]
 
 
 class Judges(NamedTuple):
-    """Judges of a run and of its perturbed run; two panels, since judges may store what they have seen."""
+    """Judges of a run and of its perturbed run; two panels, since judges may have memory."""
 
     run: Panel
     perturbed: Panel
 
 
 def look(engine: Engine) -> Look:
-    """Where the run is now."""
+    """Return the present progress of the run."""
     n = engine.n
     counts = (int(n[k]) for k in (m.EVALUATIONS, m.STEPS, m.STIFF_STEPS))
     return Look(float(engine.control[m.TIME]), *counts)
 
 
 def half(looks: Sequence[Look]) -> Look:
-    """The last look at which at most half of what the method has used by now was used."""
+    """Return the last sample with at most half of the method's evaluations so far."""
     middle = 0.5 * (looks[0].evaluations + looks[-1].evaluations)
     return looks[bisect_right(looks, middle, key=lambda one: one.evaluations) - 1]
 
 
 def pace(looks: Sequence[Look], patience: float) -> float:
-    """Evaluations per second of motion by which to judge a method: as of late, since half of its evaluations.
+    """Return the evaluations per second of motion in the last half of a method's evaluations.
 
-    patience: evaluations up to which the average counts where it is less; a fast start or a single impact says little.
+    patience: number of evaluations up to which a lower average counts: a fast start or a single impact says little.
     """
     first, middle, now = looks[0], half(looks), looks[-1]
     average, late = (
@@ -86,13 +86,13 @@ def pace(looks: Sequence[Look], patience: float) -> float:
 
 
 def limited(looks: Sequence[Look]) -> bool:
-    """Whether of late stability, not accuracy, limits the steps that the method chooses."""
+    """Return True when recently stability, not accuracy, limited the method's steps."""
     before, now = half(looks), looks[-1]
     return now.stiff - before.stiff > refusal.STIFF_SHARE * (now.steps - before.steps)
 
 
 def crawls(engine: Engine, looks: Sequence[Look]) -> str:
-    """Why the run would take far too long, where stability limits the steps; else nothing."""
+    """Return the reason why a run whose steps stability limits would take far too long; else nothing."""
     n, control, now = engine.n, engine.control, looks[-1]
     if not engine.method.traits.hands_over_to or control[m.FIXED] or now.evaluations < TRIAL or not limited(looks):
         return ""
@@ -101,9 +101,9 @@ def crawls(engine: Engine, looks: Sequence[Look]) -> str:
 
 
 def affordable(scene: Scene) -> Judges | None:
-    """Judges that end a run at the default tolerance by DearError when it is predicted to be dear.
+    """Return judges that raise DearError when a run at the default tolerance is predicted to be expensive.
 
-    None where the scene says how it is integrated, or how accurately.
+    Return None for a scene that gives its method, tolerance or accuracy.
     """
     if scene.accuracy is not None or not scene.solver.by_need:
         return None
@@ -111,7 +111,7 @@ def affordable(scene: Scene) -> Judges | None:
 
 
 def unverified(scene: Scene) -> Scene:
-    """The scene, whose run is dear, at the method and tolerance of runs that none is compared with: members, points."""
+    """Return the scene of an expensive run with method and tolerance of runs without comparison: members, points."""
     return with_numbers(scene, {"solver.integrator": STIFF, "solver.rtol": UNVERIFIED})
 
 

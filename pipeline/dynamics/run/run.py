@@ -1,4 +1,4 @@
-"""One run from scene to observed rows; where an explicit method would crawl, an implicit one takes over."""
+"""One run from scene to observed rows; an implicit method continues where an explicit one would be too slow."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ if TYPE_CHECKING:
 class Run:
     """A finished integration.
 
-    scene: as the user gave it; the engine may hold another, made for it.
-    perturbed: the same run from a perturbed start, of scenes with contacts.
-    mended: what was changed of the start that the scene gives, in words.
-    switched: from when on and why another integrator replaced the first; empty when none did.
+    scene: as the user gave it; the engine may have an edited one.
+    perturbed: the same run from a perturbed start, for scenes with contacts.
+    mended: differences of the start from the scene's, in words.
+    switched: time and reason of the change to another integrator; empty without a change.
     """
 
     scene: Scene
@@ -58,17 +58,17 @@ class Run:
 
     @property
     def model(self) -> Model:
-        """What was run."""
+        """Model of the run."""
         return self.engine.model
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Engine:
-    """The compiled engine of a scene where its run begins; paths are not searched for."""
+    """Return the compiled engine of a scene at the begin of its run; paths are not solved for."""
     return prepare(tabulate(build(begun(scene, bundles, progress)[0], bundles)), progress)
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene whose joints and drives position the bodies where the run begins, if it begins elsewhere."""
+    """Return the scene with bodies positioned by joints and drives at the begin of the run, if it begins elsewhere."""
     if scene.start is None or scene.start.at is None:
         return scene
     scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
@@ -76,15 +76,15 @@ def placed(scene: Scene) -> Scene:
 
 
 def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
-    """The scene with actuators driven as the paths that they shall produce demand, and the laws of their motion."""
+    """Return the scene whose actuators are driven so that they produce the given paths, and the actuators' laws."""
     actuated = way(scene, "inverse dynamics")
     return actuated(scene, bundles, progress) if actuated else (scene, {})
 
 
 def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
-    """The scene with the poses and velocities of where it says that the run begins, instead of its own.
+    """Return the scene with the poses and velocities of its `[start]`.
 
-    With it which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
+    Return also which of several assemblies was chosen, in words; empty when there is one, or the scene chooses.
     """
     if scene.start is None or scene.start.at is None:
         return scene, ""
@@ -96,13 +96,13 @@ def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 def engines(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress
 ) -> tuple[Engine, Callable[[str], Engine]]:
-    """The engine of a run, and the maker of one that continues with another integrator, given by its name."""
+    """Return the engine of a run, and a function that makes an engine for another integrator, by name."""
     made = maker(scene, bundles, progress)
     return made(), cache(made)
 
 
 def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[..., Engine]:
-    """What makes the engine of a run, by its scene's integrator or one of another name; it reports progress."""
+    """Return a function that makes the engine of a run for an integrator's name, by default the scene's."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
     making = Lock()  # a run and its perturbed run may both continue with another integrator
@@ -124,12 +124,12 @@ def integrate(
     progress: Progress,
     judges: Judges | None = None,
 ) -> Run:
-    """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
+    """Build, start, integrate and observe a scene; actuators of a path are driven so that they produce it.
 
-    bundles: reduced flexible bodies by name.  judges: who looks whether another integrator shall continue; without them
-    the explicit ones hand over where they would crawl.  The perturbed run of a scene with contacts is stepped
-    concurrently where a processor is free.  Raises InputError for a scene that cannot be built, SolverError when the
-    run cannot continue, StoppedError with the run so far as `partial` when it is asked to stop.
+    bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default explicit
+    methods hand over when they would be too slow.  The perturbed run of a scene with contacts steps concurrently when a
+    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run cannot continue,
+    StoppedError with the run so far as `partial` on a request to stop.
     """
     made = maker(scene, bundles, progress)
     engine = made()
@@ -184,10 +184,10 @@ def follow(
     stop: Stop = never,
     outputs: np.ndarray | None = None,
 ) -> Followed:
-    """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
+    """Return the trajectory from a consistent start y, the engine at its end, and why another engine continued, if so.
 
-    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: by integrator;
-    none looks at an integrator that a run comes back to.
+    other: makes the engine of another integrator, called only when needed.  judges: by integrator; an integrator to
+    which a run returns has none.
     stop, outputs: as of `trajectory.integrate`.
     """
     left, reasons, judges = None, list[str](), dict(judges or {})
@@ -205,7 +205,7 @@ def follow(
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
-    """SolverError for a contact so deep that its surfaces mean nothing."""
+    """Raise SolverError for a contact deeper than its surfaces allow."""
     if not model.contacts:
         return
     from flexclear.pipeline.dynamics.contact.validity import deepest, refuse_deep
@@ -216,9 +216,9 @@ def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> Non
 
 
 def observed(engine: Engine, trajectory: Trajectory) -> Observed:
-    """The observed rows of a trajectory, each with the closure rows that were solved for when it was made.
+    """Return the observed rows of a trajectory, each with the closure rows selected at its time.
 
-    Raises SolverError where one of them could not be evaluated.
+    Raises SolverError when a row could not be evaluated.
     """
     parts = list[Blocks]()
     for part, selected in trajectory.parts():
@@ -229,7 +229,7 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
             for name, values in limit.items():
                 out[name][k] = values
         parts.append(out)
-    # megabytes are copied only where there is something to join: that would take as long as a short run
+    # megabytes are copied only when there is something to join: copying takes as long as a short run
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts[1:] else parts[0]
     seen = observation.by_name(joined, engine.model.arrays.size)
     bad = np.flatnonzero(seen.status)
@@ -247,7 +247,7 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 
 
 def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> dict[str, np.ndarray]:
-    """What is observed around a row next to a singular pose; nothing where the row itself is as good."""
+    """Return the outputs around a row next to a singular pose; nothing when the row itself is as accurate."""
     poses = way(engine.model.scene, "collocation")
     limit = poses.observe_around(engine, row, motion, poses.CLEAR)
     if limit is None and lost:
@@ -258,7 +258,7 @@ def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> 
 def _near_singular(
     engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
 ) -> Iterator[tuple[int, Collocation]]:
-    """Rows, by number, that are too close to a singular pose, and the motion over it to which they belong."""
+    """Return the indices of rows too close to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
         blurred = way(engine.model.scene, "collocation").blurred
         engine.select_pieces_after(0.5 * (motion.start + motion.end))

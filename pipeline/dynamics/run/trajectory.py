@@ -1,4 +1,4 @@
-"""From a consistent start to the end, in segments between breaks of the laws; one method may hand over to another."""
+"""Integration from a consistent start to the end, in segments between breaks; one method may hand over to another."""
 
 from __future__ import annotations
 
@@ -29,35 +29,35 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
     from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
-#: evaluations between two looks at the clock and the keyboard
+#: evaluations between two checks of the clock and of interrupts
 SLICE = 20_000
-#: events for which there is room at first
+#: initial capacity of the event table
 EVENT_ROWS = 4096
-#: why the stepper stops that another choice of closure rows may mend
+#: statuses of the stepper that another selection of closure rows may resolve
 STALLED = (m.STEP_TOO_SMALL, m.NO_START, m.LOST_CLOSURE)
-#: why it stops that a polynomial over a singular pose may mend
+#: statuses that a polynomial over a singular pose may resolve
 STOPPED = (*STALLED, m.NO_CONVERGENCE, m.AT_SINGULAR)
-#: control floats of a method that another one continues with
+#: control floats that the next method takes over
 LASTING = [m.TIME, m.DRIFT, m.RATE_DRIFT, m.STEEPEST]
 
 Stop = Callable[[np.ndarray], bool]
 
 
 def never(rows: np.ndarray) -> bool:
-    """A run goes to its end."""
+    """Return False: the run continues to its end."""
     return False
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the stepper left.
+    """Result of an integration.
 
     rows: of the record (see `integrate.recording`); events: of the event table, by time.
-    contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
-    drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
-    steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
-    collocations: polynomial motions that the run followed, over singular poses and out of them.
-    passes: the poses that were passed.
+    contacts: number of clearance joints.  selections: selected closure rows, each from a time on.
+    drift, rate_drift: largest residual of a closure before projection [m or -], and of its rate [1/s of it].
+    steepest: largest rate [1/s] of the equations in any step, as the method estimates it.
+    collocations: polynomial motions of the run, over singular poses and out of them.
+    passes: the singular poses on them.
     """
 
     rows: np.ndarray
@@ -82,7 +82,7 @@ class Trajectory:
         return recording.record(self.rows, self.contacts).state
 
     def parts(self) -> list[tuple[slice, np.ndarray]]:
-        """Stretches of rows, each with the closure rows that were solved for to reach them."""
+        """Return slices of rows, each with the closure rows that were selected for them."""
         starts = [start for start, _ in self.selections]
         firsts = np.searchsorted(self.time, starts, side="right")
         firsts[0] = 0
@@ -90,17 +90,17 @@ class Trajectory:
         return [(slice(a, b), selected) for a, b, (_, selected) in zip(firsts, ends, self.selections, strict=True)]
 
     def without(self, times: np.ndarray) -> Trajectory:
-        """The trajectory without its rows at some times [s], but for those at its events."""
+        """Return the trajectory without its rows at some times [s], except rows of events."""
         dropped = np.isin(self.time, times) & ~np.isin(self.time, self.events["time"])
         return replace(self, rows=self.rows[~dropped]) if dropped.any() else self
 
 
-#: the engine that came to the end, what it followed, and why it is not the one that began
+#: the engine at the end, its trajectory, and the reason if it is not the first engine
 Followed = tuple[Engine, Trajectory, str]
 
 
 class StiffError(SolverError):
-    """An explicit method crawls along at the limit of its stability; an implicit one may continue in long steps."""
+    """Stability limits the steps of an explicit method; an implicit one may continue with long steps."""
 
     def __init__(self, text: str, handover: Handover) -> None:
         super().__init__(text)
@@ -117,15 +117,14 @@ def integrate(
     judge: Judge | None = None,
     jumps: Jumps | None = None,
 ) -> Trajectory:
-    """The trajectory from a consistent start; SolverError when the stepper gives up.
+    """Integrate from a consistent start. Raise SolverError when the stepper gives up.
 
-    stop: asked now and then with the rows recorded so far, whether they are enough.
-    left: what another method left of this run; it is continued from there.
-    outputs: times of output [s], the start first; the scene's where there are none.
-    judge: whether another method continues; by default where this one is explicit and would take far too long.
-    jumps: changes the state at events and breaks.
-    Raises StoppedError, with the engine and the trajectory so far as `partial` if there is any, when the work is asked
-    to stop.
+    stop: called periodically with the rows so far; True ends the run.
+    left: handover of another method, from which this one continues.
+    outputs: times of output [s], the start first; by default the scene's.
+    judge: decides whether another method continues; by default when an explicit one would take far too long.
+    jumps: changes of the state at events and breaks.
+    Raises StoppedError on a request to stop, with the engine and the trajectory so far, if any, as `partial`.
     """
     judge, begun = judge or Judge(SLICE, crawls), engine.start if left is None else left.time
     if outputs is None:
@@ -152,13 +151,13 @@ def integrate(
 
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
-    """What gives the state after what effects do at a break [s], from that before it."""
+    """Return a function that applies the effects' changes of state at a break [s]."""
     samplers = [make(engine) for make in engine.model.parts.functions("samples")]
     return lambda y, t: reduce(lambda state, sample: sample(state, t), samplers, y)
 
 
 def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
-    """A tape with its first row, contacts that are closed at the start, and a way out of a singular pose there."""
+    """Return a tape with its first row; begin contacts that are closed at the start; prepare a singular start."""
     y = _sampler(engine)(y, engine.start)
     tape = _prepare(engine, y, engine.start, outputs)
     first = recording.record(tape.rows[:1], len(engine.model.contacts))
@@ -173,7 +172,7 @@ def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
 
 
 def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
-    """A tape with what another method has recorded; the engine as that method left it."""
+    """Return a tape with another method's record, and set the engine to that method's last state."""
     here, before = left.here, left.tape
     tape, n = _prepare(engine, here.y, left.time, outputs), engine.n
     cap = n[m.CAP]
@@ -189,7 +188,7 @@ def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
 
 
 def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Tape:
-    """Work space and tape of an integration from state y at time t, nothing recorded yet."""
+    """Prepare work array and empty tape of an integration from state y at time t."""
     model, n, control = engine.model, engine.n, engine.control
     solver, contacts = model.scene.solver, len(model.contacts)
     engine.select_pieces_after(t)
@@ -211,7 +210,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
 
 
 def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
-    """Choose the closure rows in a state, from which the integration continues; a copy of the choice."""
+    """Select the closure rows in the state from which integration continues; return a copy of the selection."""
     ratio = closure_rows.select_rows(engine, y, t)
     engine.view(m.Y)[:] = y
     engine.view(m.PIVOT)[:] = 1.0, closure_rows.WORN * ratio if engine.mobility.redundant else 0.0
@@ -219,7 +218,7 @@ def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
 
 
 def _leave_singular_start(engine: Engine, tape: Tape) -> None:
-    """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
+    """Store a polynomial out of the singular start for the stepper, and set the speeds of its branch."""
     first = recording.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
     leaving = way(engine.model.scene, "beginning").start_motion(engine, first.copy())
@@ -231,7 +230,7 @@ def _leave_singular_start(engine: Engine, tape: Tape) -> None:
 
 
 def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
-    """Contacts that the start already has begin there, at the approach speeds that the scene declares."""
+    """Begin the contacts that are closed at the start, at the approach speeds that the scene declares."""
     n, watched, event = engine.n, engine.table(m.WATCH), m.named(m.EVENT, events)[:, 0]
     engine.view(m.WATCH.place)[:] = 0.0
     for c in overlapping(engine, y):
@@ -245,7 +244,7 @@ def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
 
 
 def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: Judge, jumps: Jumps | None) -> bool:
-    """To the end of the segment; True when it was stopped before."""
+    """Integrate to the end of the segment; return True when `stop` ended it before."""
     n, control = engine.n, engine.control
     few = m.ROOM + m.EVENTS_OF_A_CONTACT * len(engine.model.contacts)
     while True:
@@ -291,14 +290,14 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
 
 
 def _stop_when_asked(engine: Engine, tape: Tape) -> None:
-    """Leave what there is in good order, and go."""
+    """Raise StoppedError with the trajectory so far, when there is a request to stop."""
     why = stopping.requested()
     if why:
         raise StoppedError(why, (engine, _collect(engine, tape)), interrupted=why == stopping.INTERRUPTED)
 
 
 def _warn(engine: Engine, tape: Tape, progress: Progress) -> None:
-    """Say once of each flexible body that it leaves the range of its modes, before that may end the run."""
+    """Warn once for each flexible body that leaves the range of linear modes, before that may end the run."""
     if not engine.model.numbering.flexible:
         return
     from flexclear.pipeline.dynamics.run.refusals.validity import doubts
@@ -311,9 +310,9 @@ def _warn(engine: Engine, tape: Tape, progress: Progress) -> None:
 
 
 def _pass_over(engine: Engine, tape: Tape) -> bool:
-    """Get the stepper on where closure rows come to depend on each other; whether there is a way.
+    """Continue when closure rows become dependent; return True on success.
 
-    Other rows, if these alone do; else a polynomial over the singular pose.
+    Other rows serve if only these are dependent; else a polynomial over the singular pose.
     """
     t = float(engine.control[m.TIME])
     if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
@@ -329,7 +328,7 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
 
 
 def _rescued(engine: Engine, tape: Tape) -> bool:
-    """Whether a stepper that cannot continue has got a polynomial: the singular pose ahead may be what stopped it."""
+    """Return True when a stepper that stopped gets a polynomial: a singular pose ahead may be the cause."""
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
@@ -338,7 +337,7 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
 
 
 def _hand_over(engine: Engine, tape: Tape) -> Handover:
-    """What a paused integration leaves to another method."""
+    """Return the handover of a paused integration to another method."""
     n = engine.n
     here = Moment.of(engine, engine.view(m.WATCH.place), tape.events[: n[m.N_EVENTS]].copy())
     recorded = replace(tape, rows=tape.rows[: n[m.N_RECORDED]].copy())
@@ -346,7 +345,7 @@ def _hand_over(engine: Engine, tape: Tape) -> Handover:
 
 
 def _so_far(engine: Engine, tape: Tape) -> np.ndarray:
-    """The rows that have been recorded, by time."""
+    """Return the rows recorded so far, by time."""
     return in_order(tape.rows[: engine.n[m.N_RECORDED]], len(engine.model.contacts))
 
 
@@ -362,7 +361,7 @@ def _collect(engine: Engine, tape: Tape) -> Trajectory:
         "jacobians": int(n[m.JACOBIANS]),
     }
     events = m.named(m.EVENT, tape.events[: n[m.N_EVENTS]])[:, 0]
-    # what happens inside a step is noted when the step is done: one contact after the other
+    # events inside a step are recorded after the step, one contact after the other
     in_order = events[np.argsort(events["time"], kind="stable")]
     drift, rate_drift, steepest = (float(engine.control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
     laid = tuple(tape.collocations), tuple(tape.passes)

@@ -1,1 +1,1 @@
-"""Derivatives of recorded quantities by numbers of the scene."""
+"""Derivatives of recorded quantities with respect to numbers of the scene."""

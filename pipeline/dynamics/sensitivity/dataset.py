@@ -1,4 +1,4 @@
-"""Derivatives of recorded quantities by numbers of the scene, as a dataset."""
+"""Dataset of derivatives of recorded quantities with respect to numbers of the scene."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from flexclear.pipeline.dynamics.sensitivity.series import NORMAL_FORCE, Series,
 if TYPE_CHECKING:
     import xarray as xr
 
-#: step of reductions, which are smooth functions of their series, as a fraction of the largest change
+#: step for the derivative of reductions, smooth functions of their series, as a fraction of the largest change
 REDUCTION_STEP = 1e-6
-#: reductions that a derivative has no use for
+#: reductions without a derivative
 WITHOUT = ("count", "sections")
 
 
 class Requested(NamedTuple):
-    """What is differentiated: a quantity, over time where it has no reduction."""
+    """A quantity to differentiate; over time where it has no reduction."""
 
     name: str
     quantity: Quantity
@@ -43,7 +43,7 @@ class Requested(NamedTuple):
 
 
 def requested_of(scene: Scene, names: Sequence[str]) -> list[Requested]:
-    """Return what names mean; InputError for one that the scene lacks."""
+    """Return the quantities of these names; raise InputError for one that the scene lacks."""
     made = []
     for name in names:
         try:
@@ -70,10 +70,10 @@ def sensitivities(
     to: Sequence[str],
     horizon: float = np.inf,
 ) -> xr.Dataset:
-    """Return derivatives of quantities by numbers of the scene (`flexclear.sensitivities`).
+    """Return derivatives of quantities with respect to numbers of the scene (`flexclear.sensitivities`).
 
-    horizon: time [s] up to which the motion is predictable; values beyond are NaN.  Raises InputError for names that
-    mean nothing, SolverError where the motion has no derivative.
+    horizon: time [s] up to which the motion is predictable; values beyond are NaN.  Raises InputError for unknown
+    names, SolverError where the motion has no derivative.
     """
     import xarray as xr
 
@@ -150,9 +150,9 @@ def _derivative(
 
 
 def _of_largest(time: np.ndarray, series: np.ndarray, change: np.ndarray) -> tuple[float, float]:
-    """Return when a magnitude is largest, and its derivative there.
+    """Return the time of the largest magnitude, and the derivative of that magnitude.
 
-    The largest value of a function of time changes as the function does where it is largest; that time, and the change
+    The maximum of a function of time changes as the function does at the time of the maximum. That time, and the change
     there, are those of parabolas through the largest row and its neighbours.
     """
     sizes = np.linalg.norm(series, axis=1)
@@ -169,7 +169,7 @@ def _of_largest(time: np.ndarray, series: np.ndarray, change: np.ndarray) -> tup
 def _of_contact(
     one: Requested, model: Model, run: Differentiated, k: int, values: Series, changes: Series
 ) -> tuple[float, float]:
-    """Return until when the motion decides what a contact does, and the derivative of that."""
+    """Return the time up to which the motion determines a contact's result, and the derivative of the result."""
     assert one.recorded is not None
     trajectory, events = run.trajectory, run.trajectory.events
     contact = [c.name for c in model.contacts].index(one.quantity.owner)

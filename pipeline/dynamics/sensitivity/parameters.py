@@ -16,10 +16,10 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Direction
 
-#: relative change of a number by which the assembly, a smooth function of it, is differentiated: the error of central
-#: differences over four points is its fourth power, 1e-12, and starts are closed to 1e-13
+#: relative change of a number for the derivative of the assembly, a smooth function of the number: central differences
+#: over four points have an error of the fourth power, 1e-12, and starts are closed to 1e-13
 NUMBER_STEP = 1e-3
-#: families of parts, and settings, whose numbers the motion depends on
+#: families of parts, and settings, whose numbers affect the motion
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "start")
 
 
@@ -33,33 +33,33 @@ class Parameter:
 
     @property
     def unit(self) -> float:
-        """Return the change that directions are for: its size, or 1 of a number that is zero."""
+        """Unit change of the directions: the number's magnitude, or 1 for zero."""
         return abs(self.value) or 1.0
 
     def changed(self, amount: float) -> float | str:
-        """Return the number changed by `amount` of its units, as the scene writes it."""
+        """Return the number changed by `amount` of its units, as the scene writes numbers."""
         number = float(self.value + amount * self.unit)
         return f"{number!r} {self.written_in}" if self.written_in else number
 
 
 @dataclass(frozen=True)
 class Family:
-    """Engines of a scene with one of its numbers changed."""
+    """Engines of a scene with one changed number."""
 
     scene: Scene
     bundles: Mapping[str, Labelled]
     engine: Engine
 
     def parameter(self, path: str) -> Parameter:
-        """Return the number at a path; InputError for what is no number, or none that the motion depends on."""
+        """Return the number at a key path; raise InputError for anything else, or a number that the motion ignores."""
         if path.partition(".")[0] not in FAMILIES:
             raise InputError(path, f"is no number of a part ({', '.join(FAMILIES)})", "name one, as joint.A1.clearance")
         return Parameter(path, *number_at(self.scene, path))
 
     def changed(self, parameter: Parameter, amount: float) -> Engine:
-        """Return the engine with a number changed by `amount` of its units; InputError where the mechanism is another.
+        """Return the engine with a number changed by `amount` of its units; raise InputError if the structure changes.
 
-        Its code and judgements are those of the scene itself.
+        Its code and its choices of method are those of the unchanged scene.
         """
         edited = with_numbers(self.scene, {parameter.path: parameter.changed(amount)})
         made, _ = engines_alike(self.engine, edited, self.bundles)
@@ -68,7 +68,7 @@ class Family:
         return made
 
     def direction(self, parameter: Parameter) -> Direction:
-        """Return how numbers and start change per unit of a parameter."""
+        """Return the change of numbers and start per unit of a parameter."""
         around = {k: self.changed(parameter, k * NUMBER_STEP) for k in (-2, -1, 1, 2)}
         numbers = {k: engine.model.arrays.f for k, engine in around.items()}
         starts = {k: consistent_start(engine) for k, engine in around.items()}

@@ -1,8 +1,8 @@
-"""Derivatives of what is recorded of states, from those of the states.
+"""Derivatives of recorded series, from the derivatives of the states.
 
-A row of the record is observed at four points along the direction of its own change, as fine as the row needs: a
-closed contact moves by a small part of its depth, which is millionths of the clearance. So every quantity that a run
-records is differentiated, by the code that records it.
+A row of the record is observed at four points along the direction of its own change, with a step for each row: a
+closed contact moves by a small part of its penetration, which is millionths of the clearance. So the code that
+records a quantity also differentiates it.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated
 from flexclear.pipeline.dynamics.run.run import observed
 from flexclear.pipeline.dynamics.sensitivity.parameters import Family, Parameter, central
 
-#: steps along a direction, in its units: powers of ten between these; the widest also as a fraction of the size of
-#: what changes most
+#: steps along a direction, in its units: powers of ten between these; the widest also as a fraction of the size of the
+#: quantity that changes most
 WIDEST_STEP, FINEST = 1e-3, 1e-10
-#: fraction of its depth by which a closed contact moves
+#: step of a closed contact, as a fraction of its penetration
 OF_DEPTH = 1e-2
-#: what contacts' normal forces are called among the series
+#: name of the contacts' normal forces among the series
 NORMAL_FORCE = "normal force"
 
 Series = dict[str, np.ndarray]
@@ -42,9 +42,9 @@ def read(family: Family, engine: Engine, run: Differentiated, requested: Collect
 def derivatives(
     family: Family, run: Differentiated, k: int, parameter: Parameter, requested: Collection[Quantity]
 ) -> Series:
-    """Return the derivatives of the same along direction k of a run, per unit of the parameter."""
+    """Return the derivatives of the series of `read` along direction k of a run, per unit of the parameter."""
     made: Series = {}
-    # rows with common steps together
+    # rows with equal steps together
     powers = np.floor(np.log10(_steps(family, run, k, parameter)) + 1e-9).astype(int)
     for power in np.unique(powers):
         rows, step = np.flatnonzero(powers == power), 10.0**power
@@ -68,7 +68,7 @@ def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differe
 
 
 def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) -> np.ndarray:
-    """Return the step for each row."""
+    """Return the step of each row."""
     model, changes = family.engine.model, np.abs(run.changes[:, k])
     positions = slice(0, model.speeds.stop)
     size = np.maximum(np.abs(run.trajectory.state), family.engine.magnitudes)[:, positions]

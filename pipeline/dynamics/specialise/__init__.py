@@ -1,1 +1,1 @@
-"""The right-hand side again, for one wiring: kernels run on symbols, what they compute made straight code."""
+"""Specialised right-hand side of one topology: kernels run on symbols, and the operations become straight code."""

@@ -1,4 +1,4 @@
-"""The right-hand side of one wiring for several states at once, or for one with its tangent, as parts of kernels."""
+"""Right-hand side of one topology for several states together, or for one with its tangent, for use in kernels."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _INTEGER = ir.IntType(64)
 def differentiated(rates: Callable, wiring: wired.Wiring) -> Any:
     """Return run(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code: `straight`, with its tangent.
 
-    f0, w0: indices where changes of the numbers, and of laws, impact rates and contacts, begin in f and w.
-    change, rates_change: places in w of changes of the state and of its rates.
+    f0, w0: offsets in f and w of the changes of the numbers, and of those of laws, impact rates and contacts.
+    change, rates_change: indices in w of the changes of the state and of its rates.
     """
 
     @intrinsic
@@ -44,11 +44,11 @@ def differentiated(rates: Callable, wiring: wired.Wiring) -> Any:
 
 
 def batched(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any]:
-    """Functions of compiled code: note(h, f, numbers, lane) and run(addresses, numbers).
+    """Build compiled functions note(h, f, numbers, lane) and run(addresses, numbers).
 
-    The second does the same for several states, each of a mechanism with numbers of its own, which the first has put
-    where they are adjacent: numbers has room for all of f in all lanes.
-    addresses: of all h, then of all f, w and n, then all addresses of y and dy, shape (6 lanes,).
+    `run` evaluates several states, each of a mechanism with its own numbers, which `note` has copied to
+    adjacent positions: `numbers` has room for all of f in all lanes.
+    addresses: of all h, then of all f, w and n, then all indices of y and dy, shape (6 lanes,).
     """
     made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
 
@@ -89,12 +89,12 @@ def batched(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
 
 
 def _numbers(tape: Program) -> list[int]:
-    """Places in f of all that a program loads from there."""
+    """Return the indices in f of all numbers that a program loads."""
     return sorted({index for array, index in loads(tape) if array == "f" and isinstance(index, int)})
 
 
 def exactly(kernel: Any) -> Any:
-    """A kernel, and those in its closure, with every operation rounded as it is: equal bits wherever it is used."""
+    """Return a kernel, with those in its closure, that rounds every operation: equal bits wherever it is used."""
     function = kernel.py_func
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     exact = tuple(CellType(exactly(cell) if isinstance(cell, Kernel) else cell) for cell in cells)
@@ -103,7 +103,7 @@ def exactly(kernel: Any) -> Any:
 
 
 def _arguments(builder: ir.IRBuilder, addresses: Any, lane: int, lanes: int) -> list[Any]:
-    """h, f, w, n, y and dy of a lane."""
+    """Return h, f, w, n, y and dy of a lane."""
     words = [builder.load(builder.gep(addresses, [_INTEGER(k * lanes + lane)])) for k in range(6)]
     kinds = [_INTEGER, ir.DoubleType(), ir.DoubleType(), _INTEGER]
     return [builder.inttoptr(word, kind.as_pointer()) for word, kind in zip(words, kinds, strict=False)] + words[4:]

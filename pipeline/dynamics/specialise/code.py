@@ -1,9 +1,9 @@
-"""A tape as machine code: straight lines of arithmetic, with a jump where a branch depends on the state.
+"""Machine code of a tape: straight lines of arithmetic, with jumps where branches depend on the state.
 
-For one state at a time, or for several in the lanes of the processor's vectors. Several states go both ways at a
-branch where some of them do, and each keeps what its own way gives. What they come to must not depend on how many there
-are, nor which: so every operation is then rounded as it is, and of products and sums those are fused that the tape
-says, not those that the compiler likes.
+The code evaluates one state, or several in the lanes of the processor's vectors. Several states take both ways at a
+branch where they disagree, and each keeps the values of its own way. Their results must not depend on how many states
+are evaluated together, nor on which. So every operation is then rounded separately, and products and sums are fused
+where the tape requires it, not where the compiler chooses.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from llvmlite import ir
 
 from flexclear.pipeline.dynamics.specialise.tape import BIT, COMPARISONS, FLOAT, INTEGER, Branch, Loop, Symbol
 
-#: as of all kernels (`dynamics.kernels`)
+#: as for all kernels (`dynamics.kernels`)
 FLAGS = ("contract", "reassoc", "nsz")
 TYPES = {FLOAT: ir.DoubleType(), INTEGER: ir.IntType(64), BIT: ir.IntType(1)}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "iadd": "add", "imul": "mul", "and": "and_"}
-#: functions of the processor, and of the mathematics library
+#: functions of the processor, and functions of the mathematics library
 INTRINSICS = {
     "sqrt": "llvm.sqrt",
     "fabs": "llvm.fabs",
@@ -29,7 +29,7 @@ INTRINSICS = {
     "pow": "llvm.pow",
     "copysign": "llvm.copysign",
 }
-#: operations of a way that several states compute even where none of them goes it; for how many a call counts
+#: largest way that several states compute even where none takes it, in operations; operations that a call counts as
 SHORT_WAY, CALL = 12, 40
 _NUMBER = ir.IntType(32)
 LIBRARY = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh"}
@@ -38,14 +38,14 @@ LIBRARY |= {"arctan2": "atan2", "pow": "pow"}
 
 @dataclass(frozen=True)
 class Program:
-    """block: what is computed.  stores: what is written at the end, (array, index, value)."""
+    """A program. block: its operations.  stores: the values written at the end, (array, index, value)."""
 
     block: list[Any]
     stores: list[tuple[str, Any, Any]]
 
 
 def loads(program: Program) -> list[tuple[str, Any]]:
-    """Array and index of all that is loaded."""
+    """Return array and index of all loads."""
     entries, blocks = list[tuple[str, Any]](), [program.block]
     while blocks:
         for item in blocks.pop():
@@ -57,7 +57,7 @@ def loads(program: Program) -> list[tuple[str, Any]]:
 
 
 def uses(program: Program) -> Counter[Symbol]:
-    """How often each symbol is used by what the stores need."""
+    """Return the number of uses of each symbol that the stores need."""
     counts: Counter[Symbol] = Counter()
     for _, index, value in program.stores:
         counts.update(s for s in (index, value) if isinstance(s, Symbol))
@@ -83,7 +83,7 @@ def _use(block: list[Any], counts: Counter[Symbol]) -> None:
 
 
 def size(block: list[Any], counts: Counter[Symbol]) -> int:
-    """How many operations a block has, each call for as many as it takes as long as."""
+    """Return the number of operations of a block; each call counts as the number of operations of equal duration."""
     total = 0
     for item in block:
         if not isinstance(item, Symbol):
@@ -94,7 +94,7 @@ def size(block: list[Any], counts: Counter[Symbol]) -> int:
 
 
 def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
-    """By sum: the product in it that nothing else uses, of the same block, and what is added to it."""
+    """Return, by sum, the product in it that has no other use, of the same block, and the other operand."""
     pairs, products = dict[Symbol, tuple[Symbol, Any]](), set[Symbol]()
     for item in block:
         if not isinstance(item, Symbol):
@@ -112,7 +112,7 @@ def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbo
 
 
 def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
-    """The factor of a product that is the reciprocal of something by which nothing else is divided."""
+    """Return the factor of a product that is a reciprocal without other uses, or None."""
     for factor in product.arguments:
         if isinstance(factor, Symbol) and factor.operation == "reciprocal" and counts[factor] == 1:
             return factor
@@ -122,9 +122,9 @@ def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
 class Emitter:
     """Writes a program into a function under construction.
 
-    where: address of an array's element: where(array, index as a number or a value of the code, lane) -> pointer.
-    lanes: states at once.  exact: every operation is rounded as it is.
-    number: of several states, what is at an index of f, of all of them.
+    where: where(array, index as a number or a value of the code, lane) -> pointer to an array's element.
+    lanes: number of states evaluated together.  exact: True to round every operation separately.
+    number: for several states, the vector of their numbers at an index of f.
     """
 
     def __init__(
@@ -146,7 +146,7 @@ class Emitter:
         self.values: dict[Symbol, Any] = {}
 
     def emit(self) -> None:
-        """Write everything."""
+        """Write the whole program."""
         self._block(self.program.block)
         for array, index, value in self.program.stores:
             operand = self._value(value, INTEGER if array in "hn" else FLOAT)
@@ -164,11 +164,11 @@ class Emitter:
     # Lanes -------------------------------------------------------------------------------------------------------
 
     def _of(self, value: Any, lane: int) -> Any:
-        """What a value is in a lane."""
+        """Return the component of a value in a lane."""
         return value if self.lanes == 1 else self.builder.extract_element(value, _NUMBER(lane))
 
     def _together(self, values: list[Any]) -> Any:
-        """One value of those of all lanes."""
+        """Combine the values of all lanes into one."""
         if self.lanes == 1:
             return values[0]
         vector = ir.Constant(ir.VectorType(values[0].type, self.lanes), ir.Undefined)
@@ -222,7 +222,7 @@ class Emitter:
             self.values[joined] = phi
 
     def _both_ways(self, branch: Branch, joins: list[Any]) -> None:
-        """Each lane has what its own way gives; a way that no lane goes is skipped if it is long."""
+        """Compute both ways, and select per lane; a long way that no lane takes is skipped."""
         ways = []
         for way, block in enumerate(branch.blocks, start=1):
             if size(block, self.uses) <= SHORT_WAY:
@@ -233,7 +233,7 @@ class Emitter:
         self._joined(branch, joins, *ways)
 
     def _if_any(self, branch: Branch, way: int, joins: list[Any]) -> list[Any]:
-        """What a way leaves in lanes that go it, where there are any."""
+        """Compute a way if any lane takes it, and return its values."""
         builder, word = self.builder, ir.IntType(self.lanes)
         start, after, before = builder.append_basic_block(), builder.append_basic_block(), builder.block
         none = word(0 if way == 1 else -1)
@@ -254,7 +254,7 @@ class Emitter:
         return merged
 
     def _loop(self, loop: Loop) -> None:
-        """Turns as long as a lane goes on; those that do not keep what they have."""
+        """Repeat as long as a lane continues; the other lanes keep their values."""
         builder, before, word = self.builder, self.builder.block, ir.IntType(self.lanes)
         firsts = [self._value(one.first, one.inside.kind) for one in loop.carried]
         start, after = builder.append_basic_block(), builder.append_basic_block()
@@ -313,7 +313,7 @@ class Emitter:
         return self._together([builder.load(pointer) for pointer in places])
 
     def _product(self, s: Symbol, values: list[Any]) -> Any:
-        """A quotient where nothing else is divided by the same."""
+        """Return a product, as a quotient where its reciprocal has no other use."""
         inverse = divisor(s, self.uses)
         if inverse is None:
             return self.builder.fmul(*values, flags=self.flags)
@@ -322,7 +322,7 @@ class Emitter:
         return self.builder.fdiv(self._value(other, FLOAT), below, flags=self.flags)
 
     def _sum_with_product(self, s: Symbol, product: Symbol, other: Any) -> Any:
-        """A sum or difference of a product and something else, rounded once where the processor can."""
+        """Return a sum or difference with a product, rounded once where the processor can."""
         a, b = (self._value(factor, FLOAT) for factor in product.arguments)
         rest = self._value(other, FLOAT)
         if s.operation == "sub" and s.arguments[1] is product:
@@ -332,16 +332,16 @@ class Emitter:
         return self._instruction("llvm.fmuladd", [a, b, rest])
 
     def _instruction(self, name: str, values: list[Any]) -> Any:
-        """An operation of the processor, on all lanes."""
+        """Call an instruction of the processor on all lanes."""
         kind, module = self.types[FLOAT], self.builder.module
         full = f"{name}.f64" if self.lanes == 1 else f"{name}.v{self.lanes}f64"
         function = module.globals.get(full) or ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), full)
         return self.builder.call(function, values)
 
     def _call(self, name: str, values: list[Any]) -> Any:
-        """A function of the mathematics library, in one lane.
+        """Call a function of the mathematics library in one lane.
 
-        Exact code has no alternative, such as one for vectors: the compiler is not to know what it is.
+        Exact code must not use alternatives, such as vector functions, so it hides the function from the compiler.
         """
         module, kind = self.builder.module, TYPES[FLOAT]
         full = LIBRARY[name] if self.exact or name not in INTRINSICS else f"{INTRINSICS[name]}.f64"

@@ -1,11 +1,11 @@
-r"""The exact derivative of a tape along a direction: every operation is followed by what it does to small changes.
+r"""Exact derivative of a tape along a direction: each operation is followed by its effect on small changes.
 
 For an operation :math:`z = \varphi(x, y)` the tangent is :math:`\dot z = \varphi_x\dot x + \varphi_y\dot y`. Branches
 differentiate the way that is taken; the root of zero, which has no derivative, gives zero. Loops repeat with their
-changes: the last turn of Newton's method, from what has converged already, leaves
-:math:`-F_x^{-1} F_p\dot p`, which is the implicit function's. A change of the state is in
-w as the state is; changes of the numbers f, of the laws of time and of impact rates are in `df` and `dw`, arranged as f
-and w are. So are, in `dw`, the changes of what is stored next to the rates.
+changes: the last iteration of Newton's method, from a converged value, leaves
+:math:`-F_x^{-1} F_p\dot p`, the derivative of the implicit function. A change of the state is in
+w like the state; changes of the numbers f, of the laws of time and of impact rates are in `df` and `dw`, arranged as f
+and w are. `dw` also receives the changes of values stored next to the rates.
 
 Source: Griewank & Walther, *Evaluating Derivatives*, 2nd ed. (2008), sec. 3.1.
 """
@@ -20,18 +20,18 @@ from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.rules import RULES
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape, Undecided
 
-#: a tangent has at most this many operations per operation of its tape
+#: largest number of operations of a tangent per operation of its tape
 LONGEST_TANGENT = 8
-#: stretches of w, but for the state, whose changes are given
+#: work arrays in w, besides the state, with given changes
 GIVEN = {m.LAW.place, m.LATCHED}
-#: stretches of w, but for the rates, whose changes are stored
+#: work arrays in w, besides the rates, with stored changes
 STORED = {m.TOUCH.place}
 
 
 def tangent(program: Program, longest: int) -> Program:
-    """Return the program that does what `program` does, and to changes what it does to numbers.
+    """Return the program that computes `program` and its tangent.
 
-    longest: operations of a program without tangent.  Raises UnsuitedError where the result is too long.
+    longest: most operations of a program without tangent.  Raises UnsuitedError where the result is too long.
     """
     forward = _Forward(longest * LONGEST_TANGENT)
     forward.block(program.block)
@@ -47,7 +47,7 @@ def tangent(program: Program, longest: int) -> Program:
 
 
 def _seed(tape: Tape, array: str, index: Any) -> Any:
-    """Return the change of what is loaded from an array."""
+    """Return the change of a value loaded from an array."""
     if array == "f":
         return tape.write(FLOAT, "load", "df", index)
     if array == "w" and not isinstance(index, Symbol):
@@ -60,18 +60,18 @@ def _seed(tape: Tape, array: str, index: Any) -> Any:
 
 
 class _Forward:
-    """Writes a tape again, with tangents; `values` and `changes` by the symbols of the first one."""
+    """Copies a tape with its tangents; `values` and `changes` are by symbols of the original tape."""
 
     def __init__(self, longest: int) -> None:
         self.tape = Tape(_undecided, longest)
         self.values, self.changes = dict[Symbol, Any](), dict[Symbol, Any]()
 
     def value(self, a: Any) -> Any:
-        """Return what an argument is on the new tape."""
+        """Return an argument's symbol on the new tape."""
         return self.values[a] if isinstance(a, Symbol) else a
 
     def change(self, a: Any) -> Any:
-        """Return the change of an argument, 0.0 of numbers."""
+        """Return the change of an argument, 0.0 for numbers."""
         return self.changes.get(a, 0.0) if isinstance(a, Symbol) else 0.0
 
     def block(self, items: list[Any]) -> None:
@@ -122,4 +122,4 @@ class _Forward:
 
 
 def _undecided(condition: Symbol) -> bool:
-    raise Undecided(condition)  # no rule asks
+    raise Undecided(condition)  # no rule requests a decision

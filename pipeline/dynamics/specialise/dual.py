@@ -1,7 +1,7 @@
-"""Kernels run on numbers with their changes along several directions: exact derivatives without a compiler.
+"""Dual numbers with changes along several directions: kernels run on them give exact derivatives without a compiler.
 
-Every number that depends on what is changed carries its derivatives. Kernels run in Python (`plain`), so iterations are
-differentiated, too, and no mechanism is too long. A run takes some microseconds per operation for all directions
+Every number that depends on a changed one carries its derivatives. Kernels run in Python (`plain`), so iterations are
+differentiated too, and no mechanism is too large. A run takes some microseconds per operation for all directions
 together; where one mechanism is differentiated thousands of times, compiled tangents (`derivative`) are faster.
 
 Source: Griewank & Walther, *Evaluating Derivatives*, 2nd ed. (2008), sec. 3.1 (vector mode) and 6.1 (by overloading).
@@ -28,7 +28,7 @@ class Dual:
 
     __slots__ = ("change", "value")
     __hash__ = None  # type: ignore[assignment]
-    __array_ufunc__ = None  # numbers of NumPy leave what they do with one to it
+    __array_ufunc__ = None  # NumPy's numbers leave operations with a Dual to the Dual
 
     def __init__(self, value: Any, change: Any) -> None:
         self.value, self.change = value, change
@@ -88,7 +88,7 @@ def value(number: Any) -> Any:
 
 
 class _Numbers:
-    """Calculates what a tape writes down, for `RULES`."""
+    """Evaluates operations on numbers, for `RULES`; a tape records them."""
 
     add, subtract, multiply = operator.add, operator.sub, operator.mul
     divide, negate = operator.truediv, operator.neg
@@ -103,7 +103,7 @@ class _Numbers:
 
 
 def _apply(name: str, function: Callable, *arguments: Any) -> Any:
-    """Return a function of numbers, with changes where one of them has some."""
+    """Return a function of numbers, with changes where an argument has some."""
     if not any(isinstance(a, Dual) for a in arguments):
         return function(*arguments)
     values = tuple(map(value, arguments))
@@ -118,14 +118,14 @@ def _function(name: str) -> Callable:
 
 
 def plain(kernel: Any) -> Callable:
-    """Return the kernel as a function of Python that takes such numbers."""
+    """Return the kernel as a function of Python on dual numbers."""
     assert set(FUNCTIONS) <= RULES.keys()
     made: Callable = Plain(_function, lambda a, b: b if b > a else a, lambda a, b: b if b < a else a)(kernel)
     return made
 
 
 def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
-    """Return numbers of an array with their changes, shape (directions, len(values)); none where all are zero."""
+    """Return an array's numbers with their changes, shape (directions, len(values)); plain where all are zero."""
     moving = np.any(changes != 0.0, axis=0).tolist()
     return [Dual(v, changes[:, k].copy()) if moving[k] else v for k, v in enumerate(values)]
 

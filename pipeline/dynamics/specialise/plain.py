@@ -1,6 +1,6 @@
-"""Kernels as functions of Python, which run on whatever can be added and multiplied: symbols, or numbers with changes.
+"""Kernels as functions of Python, which run on any values that support arithmetic: symbols, or dual numbers.
 
-What a kernel refers to (other kernels, NumPy's functions, max and min) is replaced by what takes such values. So one
+Names in a kernel (other kernels, NumPy's functions, max and min) are replaced by versions for these values. So one
 source is compiled, traced and differentiated.
 """
 
@@ -15,15 +15,15 @@ import numpy as np
 
 from flexclear.pipeline.dynamics.kernels import INTERPRETED, Kernel
 
-#: of NumPy, that kernels apply
+#: functions of NumPy that kernels use
 FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "arctan2", "round", "copysign")
 
 
 class Plain:
-    """plain(value): what a kernel refers to, with kernels that Python runs instead of compiled ones.
+    """Converter plain(value): objects that a kernel refers to, with kernels that Python runs instead of compiled ones.
 
-    function(name): what does what NumPy's function does.  largest, smallest: of two values.  call(function, arguments):
-    result of a kernel; by default that of calling it.
+    function(name): replacement of NumPy's function.  largest, smallest: of two values.  call(function, arguments):
+    result of a kernel; by default the kernel is called.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Plain:
         self._alive: list[Any] = []
 
     def __call__(self, value: Any) -> Any:
-        """Return the value as Python takes it; of one value always the same."""
+        """Return the value in its Python version, the same object for each value."""
         if id(value) not in self._made:
             self._alive.append(value)
             self._made[id(value)] = self._plain(value)
@@ -60,7 +60,7 @@ class Plain:
         call = self._call
 
         def traced(*arguments: Any) -> Any:
-            if len(scope) == 3:  # at its first call, for kernels and what they are named like refer to each other
+            if len(scope) == 3:  # at the first call, because kernels refer to each other
                 known = function.__globals__
                 scope.update({name: self(known[name]) for name in function.__code__.co_names if name in known})
                 scope["_"] = None
@@ -70,7 +70,7 @@ class Plain:
 
 
 class _Names:
-    """A module's names, each made plain when it is asked for."""
+    """Names of a module, each converted at its first use."""
 
     def __init__(self, plain: Plain, module: ModuleType) -> None:
         self._plain, self._module = plain, module

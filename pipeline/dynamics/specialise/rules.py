@@ -1,6 +1,6 @@
-"""What each operation does to small changes: rules (tape, its value, its arguments, their changes) -> its change.
+"""Derivative of each operation: rules (tape, value, arguments, changes of the arguments) -> change of the value.
 
-Of symbols a rule writes on a tape (`derivative`), of numbers it calculates (`dual`).
+For symbols a rule writes on a tape (`derivative`), for numbers it calculates (`dual`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ def _product(tape: Any, z: Any, x: Any, dx: Any) -> Any:
 
 
 def _times(tape: Any, change: Any, factor: Any) -> Any:
-    """Return a product in which a change that is zero is zero whatever the factor is."""
+    """Return a product; a zero change gives zero for any factor."""
     return 0.0 if _nothing(change) else tape.multiply(change, factor)
 
 
@@ -35,7 +35,7 @@ def _power(tape: Any, z: Any, x: Any, dx: Any) -> Any:
     change = _times(tape, da, tape.multiply(b, lower))
     if not _nothing(db):
         change = tape.add(change, tape.multiply(db, tape.multiply(z, tape.write(FLOAT, "log", a))))
-    # whole exponents have a slope on both sides of zero, others have no value below
+    # whole exponents have a slope on both sides of zero, others have no value below zero
     return tape.select(a > 0.0, change, tape.select(a < 0.0, change, 0.0) if _nothing(db) else 0.0)
 
 

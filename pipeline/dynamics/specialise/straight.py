@@ -1,9 +1,9 @@
-"""The right-hand side of one wiring as straight code: no tables, no loops, no work space but registers and the stack.
+"""Right-hand side of one topology as straight code: no tables or loops, and no work space but registers and the stack.
 
-There are two of one wiring. The steps call what leaves in w only what they read (`KEPT`): the state's rates, what
-contacts do, how far loops are open and how independent their rows are; n[ABRIDGED] says so to who needs more. That one
-is optimised. The other leaves all that an evaluation does: it is called some hundreds of times in a run, and LLVM
-assembles it as it is, in a tenth of the time.
+Each topology has two versions. The steps call the one that stores in w only the values that they read (`KEPT`): the
+state's rates, the contacts' results, residuals of the loops and the independence of their rows; n[ABRIDGED] reports
+that. LLVM optimises this version. The other one stores all results of an evaluation. It is called some hundreds of
+times in a run, and LLVM assembles it without optimisation, in a tenth of the time.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, same
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which straight code takes longer to make than kernels do, and is hardly faster: it no longer fits
-#: the processor's first caches; and those that are differentiated, which kernels cannot be
+#: operations beyond which straight code takes longer to build than kernels and is hardly faster: it no longer fits the
+#: processor's first caches; and the limit for tangents, for which kernels are no alternative
 LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
-#: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
+#: arrays of w that the steps read after an evaluation; for ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
 KEPT |= {m.NAMED[watched].place for watched in ("bends", "bearing")}
-#: integers of n that are left
+#: integers of n that are stored
 REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
-#: of the function
+#: name of the function
 NAME = "straight"
 
 
 def program(
     kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False, longest: int = 0
 ) -> Program:
-    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too long for that.
+    """Return the program of kernel rates(h, f, w, n, y, dy) for a topology; raise UnsuitedError when it is too long.
 
-    whole: whether it leaves all in w, or only what steps read.  describes: the kernel is describe(h, f, w, n), of what
-    has been evaluated; all is left.  longest: most operations; `LONGEST` when 0.
+    whole: True to store all of w, else only values that steps read.  describes: the kernel is describe(h, f, w, n), for
+    an evaluated state; all is stored.  longest: most operations; `LONGEST` when 0.
     """
     h, trace = wired.header(wiring), Trace(longest or LONGEST)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
@@ -58,7 +58,7 @@ def _stores(array: str, values: dict[int, Any], kept: Callable[[int], bool] = la
 
 
 def _kept(h: list[int]) -> Callable[[int, int], bool]:
-    """Whether an index is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last."""
+    """Return the test whether an index is read after an evaluation: of the factor of J M^-1 J^T only its diagonal."""
     o = h[m.CLOSURE_ENVELOPE.place]
     diagonal = {h[o + m.CLOSURE_ENVELOPE.size * r + m.CLOSURE_ENVELOPE.origin] + r for r in range(h[m.N_KEPT_ROWS])}
 
@@ -72,10 +72,10 @@ def _kept(h: list[int]) -> Callable[[int, int], bool]:
 def straight(
     kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, exact: bool = False, describes: bool = False
 ) -> str:
-    """LLVM's text of a C function that does what a kernel does for a wiring.
+    """Return the LLVM text of a C function that does a kernel's work for a topology.
 
-    It is evaluate(h, f, w, n, t, y, dy), which finds the laws at time t first, or where it describes describe(h, f, w,
-    n).  whole, describes: see `program`.  exact: it gives what each lane of `batched` gives, to the last bit; sums in
+    It is evaluate(h, f, w, n, t, y, dy), which first evaluates the laws at time t, or, to describe, describe(h, f, w,
+    n).  whole, describes: see `program`.  exact: True for the results of each lane of `batched`, bit by bit; sums in
     any order are faster by a sixth.
     """
     tape, module = program(kernel, wiring, whole=whole, describes=describes), ir.Module("straight")
@@ -96,10 +96,10 @@ def straight(
 
 
 def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
-    """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
+    """Return the function `where` that gives the address of an array's element in a lane, from offsets looked up once.
 
-    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are (`batched.differentiated`); of
-    what only describes no more than the arrays.
+    given: h, f, w, n, y and dy of each lane; for a tangent also offsets of its changes (`batched.differentiated`); for
+    `describes` the arrays only.
     """
     begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
     places = [(array, index) for array, index, _ in tape.stores] + loads(tape)

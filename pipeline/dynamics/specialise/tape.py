@@ -1,8 +1,8 @@
-"""A computation as it happens: arithmetic on symbols writes what it does on a tape.
+"""Tape of a computation: arithmetic on symbols records its operations.
 
-The tape is a tree of blocks: operations in their order, branches, each with two blocks and what they leave behind, and
-loops, each with the block that is repeated.
-Equal operations are written once, and what numbers of the wiring make trivial (times zero, plus zero) not at all.
+The tape is a tree of blocks: operations in their order, branches, each with two blocks and their joined results, and
+loops, each with its repeated block.
+Equal operations are recorded once, and those that the topology makes trivial (times zero, plus zero) not at all.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
 
 class UnsuitedError(Exception):
-    """There is no straight code for a wiring, or none that would be faster."""
+    """Straight code for a topology is impossible or would not be faster."""
 
 
 class Undecided(Exception):  # noqa: N818  (not an error: how a branch leaves the function that met it)
@@ -30,7 +30,7 @@ class Undecided(Exception):  # noqa: N818  (not an error: how a branch leaves th
 
 
 def _operator(name: str, *, reflected: bool = False) -> Callable[[Any, Any], Any]:
-    """An operator of symbols, which a function of their tape writes; reflected: the symbol is the second operand."""
+    """Return an operator of symbols, which their tape records; reflected: the symbol is the second operand."""
 
     def apply(self: Symbol, other: Any) -> Any:
         return getattr(self.tape, name)(other, self) if reflected else getattr(self.tape, name)(self, other)
@@ -47,9 +47,9 @@ def _comparison(name: str) -> Callable[[Any, Any], Any]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Symbol:
-    """A value that is known only when the code runs: an operation, and what it is applied to.
+    """A value that is known only when the code runs: an operation with its arguments.
 
-    number: in the order of their making, by which operands are ordered: equal wirings give equal code.
+    number: in order of creation; it orders operands, so that equal topologies give equal code.
     """
 
     tape: Tape
@@ -87,7 +87,7 @@ class Symbol:
 
 @dataclass
 class Branch:
-    """Two blocks of which one runs; joins: what they leave, (symbol after it, value of the first, of the second)."""
+    """Two blocks of which one runs; joins: their results, (symbol afterwards, value of the first, of the second)."""
 
     condition: Symbol
     blocks: tuple[list[Any], list[Any]]
@@ -96,7 +96,7 @@ class Branch:
 
 @dataclass
 class Carried:
-    """What a loop keeps at a place: in a turn and after the loop, before the loop, and what each turn leaves there."""
+    """A value that a loop updates: symbols in the block and after the loop, first value, and value of each turn."""
 
     inside: Symbol
     after: Symbol
@@ -106,7 +106,7 @@ class Carried:
 
 @dataclass
 class Loop:
-    """A block that runs once, and again as long as the condition holds that it computes."""
+    """A block that runs once, and again as long as the condition that it computes holds."""
 
     blocks: tuple[list[Any]]
     carried: list[Carried]
@@ -114,17 +114,17 @@ class Loop:
 
 
 class Tape:
-    """What has been computed; `block` is where the next operation goes."""
+    """Recorded operations; `block` receives the next operation."""
 
     def __init__(self, decide: Callable[[Symbol], bool], longest: int) -> None:
         self.decide, self.longest, self.count = decide, longest, 0
         self.block: list[Any] = []
-        #: known: operations that have been done on the way to here; scopes: which of them began in each open block
+        #: known: recorded operations by their key; scopes: keys that were added in each open block
         self._known: dict[Any, Symbol] = {}
         self._scopes: list[list[Any]] = [[]]
 
     def write(self, kind: str, operation: str, *arguments: Any) -> Symbol:
-        """The symbol of an operation, which joins the tape if it is new."""
+        """Return the symbol of an operation; record the operation if it is new."""
         key = (operation, *(id(a) if isinstance(a, Symbol) else (type(a), a) for a in arguments))
         symbol = self._known.get(key)
         if symbol is None:
@@ -140,7 +140,7 @@ class Tape:
         return Symbol(self, self.count, kind, operation, arguments)
 
     def add(self, a: Any, b: Any) -> Any:
-        """The sum."""
+        """Return the sum."""
         if not isinstance(a, Symbol):
             a, b = b, a
         if not isinstance(b, Symbol) and b == 0:
@@ -154,7 +154,7 @@ class Tape:
         return self.write(FLOAT, "add", *_ordered(a, b))
 
     def subtract(self, a: Any, b: Any) -> Any:
-        """The difference."""
+        """Return the difference."""
         if not isinstance(a, Symbol) and a == 0:
             return self.negate(b)
         if not isinstance(b, Symbol) and b == 0:
@@ -168,7 +168,7 @@ class Tape:
         return self.write(FLOAT, "sub", a, b)
 
     def negate(self, a: Any) -> Any:
-        """Minus a."""
+        """Return minus a."""
         if not isinstance(a, Symbol):
             return -a
         if _negative(a):
@@ -178,7 +178,7 @@ class Tape:
         return self.write(FLOAT, "neg", a)
 
     def multiply(self, a: Any, b: Any) -> Any:
-        """The product."""
+        """Return the product."""
         if not isinstance(a, Symbol):
             a, b = b, a
         if not isinstance(b, Symbol):
@@ -197,7 +197,7 @@ class Tape:
         return self.write(FLOAT, "mul", *_ordered(a, b))
 
     def divide(self, a: Any, b: Any) -> Any:
-        """The quotient, by a reciprocal that others may reuse."""
+        """Return the quotient, by a reciprocal that other quotients may reuse."""
         if not isinstance(b, Symbol):
             return self.multiply(a, 1.0 / b)
         if _negative(b):
@@ -205,7 +205,7 @@ class Tape:
         return self.multiply(self.write(FLOAT, "reciprocal", b), a)
 
     def both(self, a: Any, b: Any) -> Any:
-        """Whether both hold."""
+        """Return True, or a symbol, when both conditions hold."""
         if not isinstance(a, Symbol):
             return b if a else False
         if not isinstance(b, Symbol):
@@ -213,7 +213,7 @@ class Tape:
         return self.write(BIT, "and", a, b)
 
     def select(self, condition: Any, a: Any, b: Any) -> Any:
-        """The first where the condition holds, else the second; both have been computed."""
+        """Return the first value where the condition holds, else the second; both have been computed."""
         if not isinstance(condition, Symbol):
             return a if condition else b
         return a if same(a, b) else self.write(kind_of(a), "select", condition, a, b)
@@ -222,7 +222,7 @@ class Tape:
 
     @contextmanager
     def inside(self, block: list[Any]) -> Iterator[None]:
-        """Write into a block; what is computed there is not known outside."""
+        """Record into a block; operations recorded there are unknown outside."""
         before, self.block = self.block, block
         self._scopes.append([])
         try:
@@ -233,12 +233,12 @@ class Tape:
                 del self._known[key]
 
     def carry(self, first: Any) -> Carried:
-        """What a loop keeps of a value that is `first` before it."""
+        """Return the symbols for a loop's value that is `first` before the loop."""
         inside, after = (self._symbol(kind_of(first), "carried", ()) for _ in range(2))
         return Carried(inside, after, first)
 
     def join(self, branch: Branch, a: Any, b: Any) -> Any:
-        """Value at an index after a branch."""
+        """Return the value after a branch that is a after its first block and b after its second."""
         if same(a, b):
             return a
         joined = self._symbol(kind_of(a), "join", ())
@@ -255,14 +255,14 @@ def _ordered(a: Any, b: Any) -> tuple[Any, Any]:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two values are one."""
+    """Return True for the same symbol or equal numbers."""
     if isinstance(a, Symbol) or isinstance(b, Symbol):
         return a is b
     return bool(a == b)
 
 
 def kind_of(a: Any) -> str:
-    """Kind of a symbol or number."""
+    """Return the kind of a symbol or number."""
     if isinstance(a, Symbol):
         return a.kind
     return BIT if isinstance(a, bool) else INTEGER if isinstance(a, int) else FLOAT

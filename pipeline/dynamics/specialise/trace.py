@@ -1,10 +1,10 @@
-"""Kernels run in Python on symbols, so that what they compute for one wiring is on a tape.
+"""Tracing: kernels run in Python on symbols, so that a tape holds their operations for one topology.
 
-Sizes, offsets and tables of h are numbers, so loops are counted and indices known while the tape is written; w and f
-hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it is, and
-what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
-repeated. A kernel that is called until it has converged (`choice.repeat`) is run on symbols for all that it leaves to
-itself.
+Sizes, offsets and tables of h are numbers, so loop counts and indices are known while the tape is written; w and f
+hold symbols. A branch that depends on a symbol is run both ways, up to the end of its kernel, and
+the results of both ways are joined. Kernels called before the branch are not run again; their stores are
+repeated. A kernel that is called until it has converged (`choice.repeat`) is run on symbols for all values that it
+passes to its next call.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from flexclear.pipeline.dynamics.choice import repeat
 from flexclear.pipeline.dynamics.specialise.plain import Plain
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Carried, Loop, Symbol, Tape, Undecided
 
-#: by which the kernel is known that is a loop on the tape
+#: identifies the kernel that becomes a loop on the tape
 REPEAT = getattr(repeat, "py_func", repeat).__code__
 
 
 class Number(float):
-    """A number of the wiring by which kernels divide as they do when they are compiled."""
+    """A number of the topology that divides like compiled kernels."""
 
     def __rtruediv__(self, other: float) -> float:
         with np.errstate(all="ignore"):
@@ -31,7 +31,7 @@ class Number(float):
 
 
 class Memory:
-    """An array that is read and written by index; what was not written is loaded when the code runs."""
+    """An array that is read and written by index; entries not yet written are loaded when the code runs."""
 
     def __init__(self, trace: Trace, name: str, kind: str) -> None:
         self.trace, self.name, self.kind = trace, name, kind
@@ -55,14 +55,14 @@ class Memory:
 
 
 class Run:
-    """A run of a kernel: how its branches go, and what the kernels that it calls have done."""
+    """A run of a kernel: its decisions at branches, and the results of the kernels that it calls."""
 
     def __init__(self, decisions: list[bool], done: list[Any]) -> None:
         self.decisions, self.done, self.position, self.decided = decisions, done, 0, 0
 
 
 class Trace:
-    """Writes a tape; `journal` lists stores in their order."""
+    """Records a tape; `journal` lists stores in their order."""
 
     def __init__(self, longest: int) -> None:
         self.tape = Tape(self.decide, longest)
@@ -71,7 +71,7 @@ class Trace:
         self.plain = Plain(self._function, self._largest, self._smallest, self.call)
 
     def decide(self, condition: Symbol) -> bool:
-        """How a branch goes in the run that is under way; Undecided when it goes both ways."""
+        """Return the decision at a branch in the current run; raise Undecided when both ways are needed."""
         run = self.runs[-1]
         if run.decided == len(run.decisions):
             raise Undecided(condition)
@@ -79,7 +79,7 @@ class Trace:
         return run.decisions[run.decided - 1]
 
     def call(self, function: Callable, arguments: tuple[Any, ...]) -> Any:
-        """Result of a kernel."""
+        """Return the result of a kernel."""
         function = self._repeated if function.__code__ is REPEAT else function
         caller = self.runs[-1]
         if caller.position == len(caller.done):
@@ -94,7 +94,7 @@ class Trace:
         return result
 
     def _explored(self, function: Callable, arguments: tuple[Any, ...], decisions: list[bool], done: list[Any]) -> Any:
-        """Result of a kernel whose first branches go as said; further ones go both ways."""
+        """Return the result of a kernel with given decisions at its first branches; further branches go both ways."""
         start, run = len(self.journal), Run(decisions, done)
         self.runs.append(run)
         try:
@@ -118,7 +118,7 @@ class Trace:
             memory.put_back(index, before)
 
     def _joined(self, branch: Branch, first: Any, second: Any) -> Any:
-        """What a branch leaves: of stores in memory, and its result."""
+        """Join the results of a branch: stores in memory, and return values."""
         self.tape.block.append(branch)
         for memory, index in dict.fromkeys([*first[1], *second[1]]):
             values = []
@@ -134,7 +134,7 @@ class Trace:
         return None if a is None else self.tape.join(branch, a, b)
 
     def _repeated(self, turn: Callable, *arguments: Any) -> None:
-        """Turns of a kernel, as a loop; where numbers alone decide, one after the other."""
+        """Record calls of a kernel as a loop, or one after the other where numbers alone decide."""
         start, carried = len(self.journal), dict[tuple[Memory, int], Carried]()
         while True:
             loop = Loop(([],), list(carried.values()))

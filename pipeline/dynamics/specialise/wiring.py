@@ -1,7 +1,7 @@
-"""The wiring of a mechanism as its specialised code depends on it, and what the code does not depend on.
+"""Topology of a mechanism as its specialised code depends on it, without all that the code does not depend on.
 
-Sizes and tables of h, without those that only laws of time, error norms and the record read. Where w and f keep what
-is none of it: stretches of arrays are known by their index in the header, so that one code serves every integrator and
+It has sizes and tables of h, without those that only laws of time, error norms and the record read. Offsets in w and
+f are excluded: code identifies work arrays by their index in the header, so that one code serves every integrator and
 any number of pieces of laws.
 """
 
@@ -16,17 +16,17 @@ from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: sizes of the header, then the rows of each table of h
 Wiring = tuple[tuple[int, ...], ...]
-#: read by laws of time, error norms and the record alone
+#: tables that only laws of time, error norms and the record read
 LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
 SIZES = m.ADDRESSES[0]
-#: an index is a stretch of an array and where in the stretch; the first stretch is the array itself
+#: bits of an index for the position in a work array; higher bits number the array, 0 for the array h, f, w or n itself
 STRETCH = 40
-#: stretches of w that are reported by an argument: the state and its rates, and small changes of both
+#: arrays of w that arguments give: the state and its rates, and small changes of both
 STATE, RATES, STATE_CHANGE, RATES_CHANGE = range(m.HEADER + 1, m.HEADER + 5)
 
 
 def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
-    """The wiring in h, with the closure rows that its selection keeps."""
+    """Return the topology in h, with the closure rows that its selection keeps."""
     sizes = h[:SIZES].copy()
     sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
     sizes[m.NY] = sizes[m.NQ] + sizes[m.NV] + sizes[m.N_LEDGER]  # without changes
@@ -40,7 +40,7 @@ def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
 
 
 def header(wired: Wiring) -> list[int]:
-    """The array h of a wiring, with a stretch instead of every offset in f and w."""
+    """Return the array h of a topology, with work array numbers in place of all offsets in f and w."""
     h = [*wired[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
     for table, rows in zip(m.TABLES["h"], wired[1:], strict=True):
         h[table.place] = len(h)
@@ -49,17 +49,17 @@ def header(wired: Wiring) -> list[int]:
 
 
 def split(index: int) -> tuple[int, int]:
-    """The header's index of a stretch, -1 of an array itself, and where in it."""
+    """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array."""
     return (index >> STRETCH) - 1, index & ((1 << STRETCH) - 1)
 
 
 def start(stretch: int) -> int:
-    """The index where a stretch begins."""
+    """Return the index of the first entry of a work array."""
     return (stretch + 1) << STRETCH
 
 
 def ground(h: list[int]) -> dict[int, Any]:
-    """What w holds of the ground, which no kernel moves: its frame, at rest, and no inertia of its own."""
+    """Return the entries of w for the ground, which no kernel changes: its frame, at rest, and zero inertia."""
     frame, own = h[m.LINK_FRAMES.place], h[m.OWN.place]
     axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
     return {

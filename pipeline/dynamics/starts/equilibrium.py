@@ -1,4 +1,4 @@
-"""A run that begins at the static equilibrium of its scene, drives and given joint coordinates held."""
+"""Start at the static equilibrium of a scene, with drives and given joint coordinates held."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from flexclear.pipeline.dynamics.starts.snapshot import joint_starts, posed, res
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
-    """The scene at its equilibrium, and how it was assembled; velocities stay as the scene gives them.
+    """Return the scene at its equilibrium, and how it was assembled; velocities stay as the scene gives them.
 
-    Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium close to its poses.
+    Raises InputError for a scene that cannot be built, SolverError without an equilibrium close to its poses.
     """
     bench, rest, _ = balanced(placed(scene), bundles, progress)
     progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
@@ -30,9 +30,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene with the joint coordinates whose position it gives held by drives, and nothing else of its start but
-    hints.
-    """
+    """Return the scene with given joint positions held by drives; of its start only position hints remain."""
     assert scene.start is not None
     driven, holds = joint_drives(scene), dict[str, Any](scene.drive)
     for start in given_coordinates(scene):

@@ -1,9 +1,9 @@
-"""A run with clearance that begins as its ideal mechanism does: its pose and velocities, pins at rest in their sockets.
+"""Start of a run with clearance like its ideal mechanism: same pose and velocities, pins at rest in their sockets.
 
-The ideal scene has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
-start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Flexible
-bodies begin as the loads of that moment deform them, so that they do not spring into their shape. Slots and planes
-have no ideal counterpart: they stay as they are, and what touches them where the poses put it.
+The ideal scene has ideal joints instead of pins and balls with clearance. The force of such a joint at the
+start presses the pin onto one side of its socket, to the penetration at which the contact carries that force. Flexible
+bodies start deformed by the loads at the start, so that they do not spring into their shape. Slots and planes
+have no ideal counterpart: they, and the bodies that touch them, stay where the poses put them.
 """
 
 from __future__ import annotations
@@ -30,24 +30,23 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.run import maker
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
-#: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
-#: most
+#: a pin has reached its position within this fraction of the clearance; largest number of passes for that
 THERE, PIN_PASSES = 1e-9, 20
 #: forces below this fraction of the weight press nothing: the pin stays in the middle
 NO_FORCE = 1e-9
-#: modal coordinates are those of the loads when a pass changes them by less than this fraction; passes, at most
+#: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
 SETTLED, LOADINGS = 1e-9, 10
-#: difference of a modal coordinate, as a fraction of the mechanism's size [m sqrt(kg)] of its own mass
+#: step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
 MODAL_STEP = 1e-7
 #: singular values below this fraction of the largest are rounding
 SINGULAR_ROUNDING = 1e-9
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
-    """The scene as its ideal mechanism starts, and how that was assembled; one without clearance is its own.
+    """Return the scene with the start of its ideal mechanism (without clearance: its own), and how that was assembled.
 
-    Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be put
-    where they are pressed.
+    Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be moved to
+    their pressed positions.
     """
     ideal_scene, t = placed(scene), scene.time.start
     engine, y = _started(ideal_scene, bundles, progress)
@@ -62,9 +61,9 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene with ideal joints instead of those that have such a counterpart.
+    """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart.
 
-    Raises InputError where it has contacts, and none of them has one.
+    Raises InputError when the scene has contacts but none of them has a counterpart.
     """
     if scene.contacts() and not loose(scene):
         raise InputError(
@@ -86,10 +85,10 @@ def _started(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 
 def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
-    """Return the state with flexible bodies deformed as the loads of the start, inertia included, hold them.
+    """Return the state with flexible bodies deformed statically by the loads of the start, inertia included.
 
-    There modal coordinates do not accelerate, as far as loops leave them free.  Where rods buckle or the pose is
-    singular there is no such state, and y is returned.
+    Modal coordinates then do not accelerate, as far as loops leave them free.  Where rods buckle or the pose is
+    singular no such state exists, and y is returned.
     """
     speeds = _modal_speeds(engine)
     if not speeds or engine.mobility.singular_start:
@@ -113,7 +112,7 @@ def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 
 def _bent(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Return the state with other modal coordinates, the loops closed."""
+    """Return the state with changed modal coordinates and closed loops."""
     bent = y.copy()
     bent[_modes(engine)] += change
     engine.select_pieces_after(engine.start)
@@ -126,19 +125,19 @@ def _pulled(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
 
 
 def _modal_speeds(engine: Engine) -> list[int]:
-    """Return where in the state the speeds of modal coordinates are."""
+    """Return the indices of the speeds of modal coordinates in the state."""
     model = engine.model
     return [model.nq + k for mine in model.numbering.modal_coordinates.values() for k in mine]
 
 
 def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
-    """Force of every joint on its second body at the start [N], world axes, by name."""
+    """Return the force of every joint on its second body at the start [N], world axes, by name."""
     seen = observe(engine, rows_of(engine, y[None], engine.start), after=True)
     return {name: wrench[1][0] for name, wrench in joint_wrenches(Motions(engine.model, seen)).items()}
 
 
 def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The state nearby in which every pin is where the force on it presses it."""
+    """Return the nearest state in which every pin is where the force on it presses it."""
     model, contacts = engine.model, engine.model.arrays.table(m.CONTACTS)
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
     pins = [contact.name in loose(model.scene) for contact in model.contacts]
@@ -148,7 +147,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
         sites, missing = engine.table(m.SITE_FRAMES), []
         for row, contact, law, pin in zip(contacts, model.contacts, model.laws, pins, strict=True):
             if not pin:
-                continue  # the end of a stop may move, too: asked to stay, it would hold the pins back
+                continue  # the end of a stop may move, too: held fixed, it would hold the pins back
             outer, inner = sites[row["outer"]], sites[row["inner"]]
             force, offset = forces[contact.name], inner["origin"] - outer["origin"]
             if contact.joint.type == "clearance-revolute":
@@ -169,10 +168,10 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
 
 
 def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, bent: np.ndarray) -> np.ndarray:
-    """The state with the pins moved by `offsets` (3 each) [m], and modal coordinates as close to `bent` as that allows.
+    """Return the state with pins moved by `offsets` (3 each) [m] and modal coordinates as close to `bent` as possible.
 
-    The least motion alone would bend rods by some of the clearance, and the run begin with the blow of their springing
-    back: a stiff one is under kilonewtons then.
+    The least motion alone would bend rods by part of the clearance, and the run would begin with the impact of their
+    springing back: a stiff rod would carry kilonewtons.
     """
     engine.select_pieces_after(engine.start)
     nq, modes = engine.model.nq, _modes(engine)
@@ -180,7 +179,7 @@ def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray,
     jacobian = offset_jacobian(engine, y)[np.repeat(pins, 3)]
     speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=SINGULAR_ROUNDING)
     if modes:
-        free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that leave the pins where they are
+        free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that do not move the pins
         bending = bent - y[modes] - ways[modes] @ speeds
         speeds += free @ np.linalg.lstsq(ways[modes] @ free, bending, rcond=SINGULAR_ROUNDING)[0]
     moved = y.copy()
@@ -189,5 +188,5 @@ def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray,
 
 
 def _modes(engine: Engine) -> list[int]:
-    """Where in the state the modal coordinates of flexible bodies are."""
+    """Return the indices of the flexible bodies' modal coordinates in the state."""
     return [k for mine in engine.model.numbering.modal_positions.values() for k in mine]

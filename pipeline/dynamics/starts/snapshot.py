@@ -1,4 +1,4 @@
-"""A scene whose bodies are as they are in a state of an engine, whatever joints or drives that engine has."""
+"""Scenes whose bodies have the poses of an engine's state, whatever joints or drives that engine has."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Vector = tuple[float, float, float]
 
 
 def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
-    """The scene with every body where it is in state y at time t, and deformed as there.
+    """Return the scene with every body's pose and deformation of state y at time t.
 
-    Velocities are those of the scene.  What the scene says of joints' positions and where to begin is left out.
+    Velocities are those of the scene.  Its joint positions and its place to begin are left out.
     """
     closure_rows.evaluate(engine, y, t)
     frames, model, bodies = engine.table(m.LINK_FRAMES), engine.model, dict[str, Any]()
@@ -48,7 +48,7 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
 
 
 def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
-    """The same with the velocities of that state as well."""
+    """Return the scene as `posed` does, with the velocities of the state as well."""
     still, model = posed(scene, engine, y, t), engine.model
     frames, q, u, bodies = engine.table(m.LINK_FRAMES), y[: model.nq], y[model.speeds], dict(still.body)
     for name, body in still.body.items():
@@ -64,7 +64,7 @@ def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
 
 
 def resting(scene: Scene, contacts: Mapping[str, Clearance]) -> Scene:
-    """The scene with these contacts at rest, where they are closed at the start."""
+    """Return the scene with those of these contacts at rest that are closed at the start."""
     at_rest = {
         name: joint.model_copy(update={"initial_approach_speed": 0.0})
         for name, joint in contacts.items()
@@ -74,24 +74,24 @@ def resting(scene: Scene, contacts: Mapping[str, Clearance]) -> Scene:
 
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
-    """Values of the modes of flexible bodies, by name."""
+    """Return the values of the modes of flexible bodies, by name."""
     return {str(engine.model.links[i].flexible): _given(values[mine]) for i, mine in numbers.items()}
 
 
 def _given(values: np.ndarray) -> Any:
-    """Computed values as a scene may give them: what rounding leaves below all numbers of scenes is zero."""
+    """Return computed values as a scene may give them; rounding below the smallest number of scenes becomes zero."""
     return np.where(np.abs(values) < 1.0 / LARGEST_NUMBER, 0.0, values).tolist()
 
 
 def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
-    """The start without what the poses say now."""
+    """Return the start without entries that the poses now replace."""
     old = scene.start if scene.start is not None else Start()
     rates = joint_starts(old, lambda one: None if one.velocity is None else JointStart(velocity=one.velocity))
     return old.model_copy(update={"at": None, "joint": rates, "modal": modal})
 
 
 def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:
-    """What is left of what a start says of each joint coordinate, by joint."""
+    """Return the non-empty results of `left`, applied to a start's entry of each joint coordinate, by joint."""
     made = {
         joint: {name: new for name, one in coordinates.items() if (new := left(one)) is not None}
         for joint, coordinates in start.joint.items()

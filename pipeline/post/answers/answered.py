@@ -10,7 +10,7 @@ from flexclear.pipeline.post.pages import media
 
 
 class Answered(xr.Dataset):
-    """A dataset with an answer as HTML; what is computed from it is a plain dataset's content without the answer."""
+    """A dataset with an answer as HTML; datasets computed from it are plain, without the answer."""
 
     __slots__ = ("_answer",)
 
@@ -19,7 +19,7 @@ class Answered(xr.Dataset):
 
 
 def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: str = "") -> Answered:
-    """The dataset with an answer: text in words, a picture as PNG, a table as HTML."""
+    """Return the dataset with an answer: text, a picture as PNG, a table as HTML."""
     result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
     image = "" if picture is None else media("answer.png", picture, "")
     result._answer = f"<p>{html.escape(text)}</p>{image}{table}"

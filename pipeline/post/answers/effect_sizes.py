@@ -1,4 +1,4 @@
-"""What each effect of a scene does to each quantity, taken away and put in, alone and in pairs: dataset, table, chart.
+"""Effect sizes of each effect on each quantity, by removal and addition, alone and in pairs: dataset, table, chart.
 
 Variants are named by the effects that they lack. The full scene lacks none, the bare one lacks all.
 """
@@ -19,15 +19,15 @@ from flexclear.pipeline.post.overview.curves import in_unit, measured
 from flexclear.pipeline.post.plotting.table import Table
 
 Names = frozenset[str]
-#: represents a variant that nobody asked for
+#: substitute for a variant that did not run
 UNKNOWN = Point({}, {}, {}, 0, "not run")
-#: ranges below this have ticks between the powers of ten
+#: ratio of an axis's limits below which it has ticks between the powers of ten
 FEW = 30.0
-#: how the chart calls its bars
+#: labels of the chart's bars
 LEGEND = {"dropped": "taken away", "added": "put in alone"}
-#: the line of what may be chance goes back over at most this fraction of a bar, since its axis is logarithmic
+#: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
 WHISKER = 0.9
-#: variables of the dataset, and what they say
+#: variables of the dataset, and their meaning
 MEANINGS = {
     "dropped": "what the quantity loses when the effect, or both, are taken from the full scene",
     "added": "what it gains when the effect, or both, are put into the bare scene, what it lies within being there",
@@ -36,7 +36,7 @@ MEANINGS = {
 
 
 def variants(effects: Sequence[Effect]) -> list[Names]:
-    """The variants that are needed, each once: full, bare, and each effect and each pair taken away and put in."""
+    """Return the necessary variants, each once: full, bare, and each effect and pair removed and added."""
     every = frozenset(effect.name for effect in effects)
     chosen = [frozenset(pair) for n in (0, 1, 2) for pair in combinations(every, n)]
     sets = [closed(effects, gone) for few in chosen for gone in (few, every - closed_up(effects, few))]
@@ -44,13 +44,13 @@ def variants(effects: Sequence[Effect]) -> list[Names]:
 
 
 def closed(effects: Sequence[Effect], gone: Names) -> Names:
-    """With the effects that are nothing without one that is gone."""
+    """Return the removed effects with those that exist only within them."""
     return gone | {effect.name for effect in effects if effect.within in gone}
 
 
-def closed_up(effects: Sequence[Effect], there: Names) -> Names:
-    """With the effects without which those that are there would be nothing."""
-    return there | {effect.within for effect in effects if effect.name in there and effect.within}
+def closed_up(effects: Sequence[Effect], present: Names) -> Names:
+    """Return the effects with those within which they exist."""
+    return present | {effect.within for effect in effects if effect.name in present and effect.within}
 
 
 def assemble(
@@ -60,10 +60,10 @@ def assemble(
     members: int,
     units: Sequence[str],
 ) -> xr.Dataset:
-    """Influences over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
+    """Return effect sizes over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
 
-    On the diagonal of (effect, other) is what one effect does alone.  points: by the effects that a variant lacks.
-    units: of the chosen quantities.  nan where a variant was refused; infinite where the quantity goes with the effect.
+    The diagonal of (effect, other) holds single effects.  points: by the effects that a variant lacks. units: of the
+    chosen quantities.  nan where a variant was refused; infinite where the quantity goes with the effect.
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
     shape = (n, n, len(chosen))
@@ -72,17 +72,17 @@ def assemble(
     for i, one in enumerate(effects):
         for j, other in enumerate(effects):
             pair = frozenset({one.name, other.name})
-            # what lies within another effect is put in on top of that one
+            # an effect within another one is added on top of that one
             ground = every - (closed_up(effects, pair) - pair)
             bare, lost = points.get(ground, UNKNOWN), points[closed(effects, pair)]
             gained = points[every - closed_up(effects, pair)]
-            alone = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
+            single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
             independent = i != j and one.within != other.name and other.within != one.name
             for k, quantity in enumerate(chosen):
                 variables = {"dropped": _between(lost, full, quantity, members)}
                 variables["added"] = _between(gained, bare, quantity, members)
                 if independent:
-                    variables["interaction"] = _interaction(gained, alone, bare, quantity, members)
+                    variables["interaction"] = _interaction(gained, single, bare, quantity, members)
                 for name, value in variables.items():
                     data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty
     dims = ("effect", "other", "quantity")
@@ -108,9 +108,9 @@ def _between(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
     return Influence(np.nan, np.nan) if a.refused or b.refused else influence(a, b, quantity, members)
 
 
-def _interaction(both: Point, alone: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:
-    """Of values that can be added: both - one - other + bare, as a distance from nothing."""
-    points = (both, *alone, bare)
+def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:
+    """Return the size of both - one - other + bare, for quantities whose values can be added."""
+    points = (both, *single, bare)
     names = [name for name in both.values if name.rpartition(".")[0] == quantity.name]
     if any(p.refused for p in points) or quantity.kind in ("orientation", "impact_times"):
         return Influence(np.nan, np.nan)
@@ -130,7 +130,7 @@ def _interaction(both: Point, alone: Sequence[Point], bare: Point, quantity: Qua
 
 
 def table(dataset: xr.Dataset) -> Table:
-    """Each effect alone: what its loss and its gain do to each quantity; and the strongest interactions."""
+    """Tabulate the change of each quantity by removal and addition of each effect; and the strongest interactions."""
     rows = []
     for k, quantity in enumerate(dataset["quantity"].values):
         unit = str(dataset["unit"].values[k])
@@ -149,7 +149,7 @@ def table(dataset: xr.Dataset) -> Table:
 
 
 def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
-    """The strongest interaction of an effect, and with which."""
+    """Return the strongest interaction of an effect, and the name of its partner."""
     sizes = dataset["interaction"].values[i, :, k]
     finite = np.where(np.isfinite(sizes), sizes, -1.0)
     if not len(finite) or finite.max() < 0.0:
@@ -159,12 +159,12 @@ def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
 
 
 def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...], unit: str) -> str:
-    """A value of a dataset with its uncertainty, in words."""
+    """Format a value of a dataset with its uncertainty."""
     return written(float(dataset[name].values[at]), float(dataset[f"{name}_uncertainty"].values[at]), unit)
 
 
 def written(value: float, uncertainty: float, unit: str) -> str:
-    """A difference with what of it may be chance, in a fitting unit."""
+    """Format a difference with its uncertainty by chance, in a fitting unit."""
     if np.isnan(value):
         return "–"
     if np.isinf(value):
@@ -173,22 +173,22 @@ def written(value: float, uncertainty: float, unit: str) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names with commas and an `and`."""
+    """Return names with commas and a final `and`."""
     return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
 def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
-    """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is requested.
+    """Draw bars of the sizes of single effects, a panel for each quantity; a line where an accuracy is requested.
 
-    Uses `dropped` and, where there is one, `added`, of single effects.
+    Uses `dropped` and, where it exists, `added`, of single effects.
     """
     from matplotlib.ticker import NullFormatter
 
     from flexclear.pipeline.post.plotting import style
 
     if "other" in dataset.dims:
-        alone = xr.DataArray(np.arange(dataset.sizes["effect"]), dims="effect")
-        dataset = dataset.isel(effect=alone, other=alone)
+        diagonal = xr.DataArray(np.arange(dataset.sizes["effect"]), dims="effect")
+        dataset = dataset.isel(effect=diagonal, other=diagonal)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
     kinds = [kind for kind in ("dropped", "added") if kind in dataset]
@@ -197,25 +197,25 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
                 values = dataset[kind].values[:, k]
-                place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
+                rows = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-                panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
+                panel.barh(rows, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 if f"{kind}_uncertainty" in dataset:
-                    doubt = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
-                    below = np.minimum(doubt, WHISKER * shown)
-                    drawn = np.isfinite(shown) & (doubt > 0.0)
-                    ends = [below[drawn], doubt[drawn]]
+                    uncertainty = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
+                    below = np.minimum(uncertainty, WHISKER * shown)
+                    drawn = np.isfinite(shown) & (uncertainty > 0.0)
+                    ends = [below[drawn], uncertainty[drawn]]
                     panel.errorbar(
-                        shown[drawn], place[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
+                        shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                     )
-                for y, value in zip(place, values, strict=True):
+                for y, value in zip(rows, values, strict=True):
                     text = "none" if value == 0.0 else "not examined" if np.isnan(value) else "not comparable"
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
             sizes = np.array([dataset[kind].values[:, k] for kind in kinds])
             drawn = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-            if len(drawn):  # bars that begin near their ends would make small differences look large
+            if len(drawn):  # bars that begin near their ends would exaggerate small differences
                 panel.set_xlim(left=0.1 * float(drawn.min()))
             if requested and np.isfinite(requested.get(chosen[k], np.nan)):
                 panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
@@ -226,7 +226,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 panel.xaxis.set_minor_formatter(NullFormatter())
             panel.set_yticks(np.arange(len(names)), names, fontsize=7.6)
             panel.set_title(f"{chosen[k]} [{dataset['unit'].values[k]}]")
-        axes[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and room for the last without a bar
+        axes[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and space for a last row without a bar
         style.heading(figure, title)
         style.shared_legend(figure, axes[0], 3)
         return style.files(name, figure)

@@ -1,8 +1,8 @@
-"""Which effects of a scene matter: what taking each away changes in each quantity, and how well that is known.
+"""Effects of a scene that matter: the change of each quantity without the effect, and its uncertainty.
 
-Scenes with contacts are compared by the means of members that start a hair apart, the same starts in each variant. A
-change is decided where it is twice what may be chance, or where both together are below a hundredth of the quantity's
-size (`pipeline.core.artifacts.effect_size`).
+Scenes with contacts are compared by the means of members with slightly different starts, the same in each variant. A
+change is decided where it is twice its uncertainty by chance, or where both together are below a hundredth of the
+quantity's size (`pipeline.core.artifacts.effect_size`).
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from flexclear.pipeline.post.answers.effect_sizes import cell, listed
 from flexclear.pipeline.post.overview.curves import measured, rounded, size_of
 from flexclear.pipeline.post.plotting.table import Table
 
-#: what clearance and flexibility do together: the scene against the ideal mechanism
+#: effect of clearance and flexibility together: the scene against the ideal mechanism
 IDEAL = "clearance and flexibility"
-#: a change below this fraction of a quantity's size is none that a first look has to resolve
+#: fraction of a quantity's size below which a change need not be resolved
 SLIGHT = 0.01
-#: accuracies of which the answer says which effects they call for, where the scene asks for none
+#: accuracies for which the answer names the effects, where the scene requests none
 LEVELS = (0.1, 0.01, 0.001)
-OF_WHAT = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
-#: members of which Student's t is that of any larger number
+PERCENTAGES = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
+#: number of members from which on Student's t does not change
 MANY = 1000
-#: a change of so many times the quantity's size is not given in per cent of that
+#: changes above this multiple of the quantity's size are not given in per cent
 LARGE = 100.0
-#: a change that both runs' rounding could make, as a fraction of the quantity's size
+#: change that rounding of both runs could cause, as a fraction of the quantity's size
 NOTHING = 1e-6
 
 
@@ -46,21 +46,21 @@ class Pair:
 
 
 def compared(pair: Pair, quantity: Quantity) -> Influence:
-    """What the effect changes; nan where a run was refused."""
+    """Return the change by the effect; nan where a run was refused."""
     if pair.full.refused or pair.without.refused:
         return Influence(np.nan, np.nan)
     return influence(pair.without, pair.full, quantity, pair.members)
 
 
 def decided(change: Influence, scale: float) -> bool:
-    """Whether a change is known well enough, or cannot be known better by more members."""
+    """Return True when further ensemble members cannot change the verdict on a change."""
     if not np.isfinite(change.difference) or change.uncertainty == 0.0:
         return True
     return change.real or change.most <= SLIGHT * scale
 
 
 def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
-    """The quantities of which more members may decide more."""
+    """Return the quantities whose verdict further members may change."""
     if pair.full.refused or pair.without.refused:
         return []
     return [q for q in chosen if not decided(compared(pair, q), size(pair.full, q))]
@@ -69,11 +69,10 @@ def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
 def assemble(
     pairs: Mapping[str, Pair], words: Mapping[str, str], chosen: Sequence[Quantity], units: Sequence[str], undone: str
 ) -> xr.Dataset:
-    """Changes over (effect, quantity) in the quantities' SI units.
+    """Return changes over (effect, quantity) in the quantities' SI units.
 
-    pairs: by effect, `IDEAL` among them where the scene has an ideal counterpart.  words: of the effects; none of
-    one that is not listed.
-    undone: effects that the budget did not reach, in words.
+    pairs: by effect, with `IDEAL` where the scene has an ideal counterpart.  words: of the effects; empty for one that
+    is not listed.  undone: effects that the budget did not reach, in words.
     """
     names = list(pairs)
     changes = [[compared(pairs[name], q) for q in chosen] for name in names]
@@ -106,26 +105,26 @@ def assemble(
 
 
 def ideal_sentences(result: xr.Dataset) -> list[str]:
-    """A sentence for each quantity, as HTML: what clearance and flexibility change in it."""
+    """Return a sentence for each quantity, as HTML, on its change by clearance and flexibility."""
     if IDEAL not in result["effect"].values:
         return []
-    one, said = result.sel(effect=IDEAL), []
+    one, sentences = result.sel(effect=IDEAL), []
     for k, name in enumerate(str(q) for q in result["quantity"].values):
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
             unit, members = str(result["unit"].values[k]), int(one["members"])
             text = in_words(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
-            said.append(f"<b>{html.escape(name)}</b>: {text}.")
-    return said
+            sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return sentences
 
 
 def in_words(
     change: Influence, scale: float, unit: str, members: int = 0, spread: float = 0.0, of: str = "the scene"
 ) -> str:
-    """What is different from the ideal mechanism, whose runs do not scatter, as HTML.
+    """Return a phrase on the change from the ideal mechanism, whose runs do not scatter, as HTML.
 
-    members: of which these are the means, 0 where one run each is compared.  spread: standard deviation of a run.
-    of: whose size the scale is.
+    members: number of runs in the means, 0 for one run each.  spread: standard deviation of a run.  of: owner of the
+    scale.
     """
 
     def percent(value: float) -> str:
@@ -150,15 +149,15 @@ def in_words(
 
 
 def needed(change: Influence, scale: float, members: int) -> int:
-    """Members that would decide a change: chance falls with the root of their number, and Student's t with it."""
+    """Estimate the members that decide a change: chance falls with the root of their number, and by Student's t."""
     enough, fewer = max(SLIGHT * scale, change.difference / REAL), chance(MANY) / chance(members)
     return int(np.ceil(members * (fewer * change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
 
 
 def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
-    """Which effects matter, in one paragraph.
+    """Return one paragraph on the effects that matter.
 
-    requested: the accuracy that the scene asks for, by quantity in SI; without it three levels answer.
+    requested: accuracies of the scene by quantity, in SI units; without them three levels are answered.
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
     undone = [f"The budget did not reach {result.attrs['undone']}."] if result.attrs["undone"] else []
@@ -168,38 +167,38 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     if requested:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
         levels = [("The requested accuracy", asked)]
-    said, before, calm = list[str](), list[str](), list[str]()
+    sentences, named, unchanged = list[str](), list[str](), list[str]()
     for name, limits in levels:
-        now, perhaps = _called_for(single, limits)
-        new = [effect for effect in now if effect not in before]
-        unsure = [effect for effect in perhaps if effect not in now]
-        open_ = f" (not decided: {listed(unsure)})" if unsure else ""
-        if new or unsure:
-            none = "no more for certain" if before else "none for certain"
-            said.append(f"{name} calls {'also ' if before and new else ''}for {listed(new or [none])}{open_}.")
+        certain, possible = _called_for(single, limits)
+        added = [effect for effect in certain if effect not in named]
+        uncertain = [effect for effect in possible if effect not in certain]
+        open_ = f" (not decided: {listed(uncertain)})" if uncertain else ""
+        if added or uncertain:
+            none = "no more for certain" if named else "none for certain"
+            sentences.append(f"{name} calls {'also ' if named and added else ''}for {listed(added or [none])}{open_}.")
         else:
-            calm.append(name)
-        before += new
-    more = "no more" if before else "none"
-    said += [f"{name} calls for {more}." for name in calm[:1]]
-    said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
-    said += [] if requested else [OF_WHAT]
-    return " ".join(said + undone)
+            unchanged.append(name)
+        named += added
+    more = "no more" if named else "none"
+    sentences += [f"{name} calls for {more}." for name in unchanged[:1]]
+    sentences += [f"So does {name[0].lower()}{name[1:]}." for name in unchanged[1:]]
+    sentences += [] if requested else [PERCENTAGES]
+    return " ".join(sentences + undone)
 
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
-    """Effects whose real change of a quantity is more than its limit, and those that chance alone may make do so."""
+    """Return effects whose change certainly exceeds its limit, and effects whose change may exceed it by chance."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
-    now = np.any((change > limits) & (change >= REAL * chance), axis=1)
-    perhaps = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
+    certain = np.any((change > limits) & (change >= REAL * chance), axis=1)
+    possible = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
     words = [str(w) for w in single["words"].values]
-    return [w for w, hit in zip(words, now, strict=True) if hit], [
-        w for w, hit in zip(words, perhaps & ~now, strict=True) if hit
+    return [w for w, hit in zip(words, certain, strict=True) if hit], [
+        w for w, hit in zip(words, possible & ~certain, strict=True) if hit
     ]
 
 
 def table(result: xr.Dataset) -> Table:
-    """Effects as rows, quantities as columns: what is different without the effect."""
+    """Tabulate the changes without each effect: effects as rows, quantities as columns."""
     rows = []
     for i, words in enumerate(str(w) for w in result["words"].values):
         if not words:

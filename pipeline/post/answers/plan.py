@@ -1,4 +1,4 @@
-"""A plan as a dataset, a table, words and a page: what was decided, why, and what it rests on."""
+"""A plan as a dataset, a table, words and a page: decisions, reasons and evidence."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ mesh_error | body quantity | | estimated error of the quantity due to the body's
 
 
 def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
-    """Influences over (effect, quantity), decisions and evidence over effects, what is requested over quantities; SI.
+    """Return effect sizes over (effect, quantity), decisions and evidence by effect, requests by quantity; in SI units.
 
     units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
     differ.
     """
     names, decisions, meshes = list(plan.requested), plan.decisions, list(plan.meshes.values())
-    doubts = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
+    uncertainties = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
     planned = {
         "gone": [effect.name for effect in plan.gone],
         "modes": dict(plan.modes),
@@ -50,7 +50,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     }
     values = {
         "influence": np.reshape([[d.estimate.get(n, np.nan) for n in names] for d in decisions], (-1, len(names))),
-        "uncertainty": np.reshape(doubts, (-1, len(names))),
+        "uncertainty": np.reshape(uncertainties, (-1, len(names))),
         "kept": np.array([d.kept for d in decisions], dtype=np.int8),
         "evidence": _texts(d.evidence for d in decisions),
         "reason": _texts(d.reason for d in decisions),
@@ -86,7 +86,7 @@ def _texts(words: Iterable[str]) -> np.ndarray:
 
 
 def drawn(planned: xr.Dataset) -> xr.Dataset:
-    """What the chart of influences takes of a plan."""
+    """Return the upper bounds of a plan's effect sizes, as the chart takes them."""
     return xr.Dataset(
         {"dropped": planned["influence"] + planned["uncertainty"].fillna(0.0)},
         coords={"effect": planned["effect"], "quantity": planned["quantity"], "unit": planned["unit"]},
@@ -94,7 +94,7 @@ def drawn(planned: xr.Dataset) -> xr.Dataset:
 
 
 def table(planned: xr.Dataset) -> Table:
-    """Decision, evidence and reason of each effect, and its estimated influence on each quantity."""
+    """Tabulate decision, evidence and reason of each effect, and its estimated size in each quantity."""
     names = [str(name) for name in planned["quantity"].values]
     units = [str(unit) for unit in planned["unit"].values]
     rows = []
@@ -133,14 +133,14 @@ def table(planned: xr.Dataset) -> Table:
 
 
 def _integrated(decided: Mapping[str, Any]) -> str:
-    """How the planned run is integrated, in a sentence."""
+    """Return a sentence on integrator and tolerance of the planned run."""
     if "integrator" not in decided:
         return "No other way to run the scene is cheaper and as accurate as requested: it stays as it is."
     return f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}."
 
 
 def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
-    """Whether a body's finite elements are enough, in a sentence or two."""
+    """Return one or two sentences on whether a body has enough finite elements."""
     given, called = int(part["elements"]), int(part["elements_called_for"])
     errors = [
         f"{name} by at most {written(float(value), 0.0, unit)}"
@@ -161,7 +161,7 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
 
 
 def words(planned: xr.Dataset) -> str:
-    """The plan in a sentence or two, for a designer."""
+    """Return the plan in a sentence or two, for a designer."""
     needed, unseen, gone = _sorted(planned)
     asked = " and ".join(str(name) for name in planned["quantity"].values)
     if not needed and not unseen:
@@ -176,7 +176,7 @@ MET, MET_TO_HORIZON, MISSED, UNDECIDED = "met", "met to the horizon", "missed", 
 
 
 def verdict(one: Agreement) -> str:
-    """Met where error and chance together are below what is allowed, missed where they are above, else not decided."""
+    """Return met where error plus chance is below the allowed error, missed where certainly above, else not decided."""
     if one.met:
         return MET if one.horizon == 1.0 else MET_TO_HORIZON
     return MISSED if one.missed else UNDECIDED
@@ -185,9 +185,10 @@ def verdict(one: Agreement) -> str:
 def until_decided(
     compared: Callable[[int], list[Agreement]], levels: Sequence[int], affordable: Callable[[int], bool]
 ) -> tuple[list[Agreement], int]:
-    """Agreements over as many members as decide all of them, and that number.
+    """Return agreements over the members that decide all of them, and that number of members.
 
-    compared: makes them over so many members.  levels: numbers of members, rising.  affordable: whether so many are.
+    compared: computes them for a number of members.  levels: rising numbers of members.  affordable: the budget's
+    limit.
     """
     members = levels[0]
     while True:
@@ -200,7 +201,7 @@ def until_decided(
 
 
 def verified(planned: xr.Dataset) -> Table:
-    """The true distance of the planned run from the full one, next to what is requested."""
+    """Tabulate the true distance of the planned run from the full one, next to the requested one."""
     rows = []
     for k, name in enumerate(planned["quantity"].values):
         unit, one = str(planned["unit"].values[k]), agreement_of(planned, k)
@@ -218,30 +219,30 @@ def verified(planned: xr.Dataset) -> Table:
 
 
 def agreement_of(planned: xr.Dataset, k: int) -> Agreement:
-    """The agreement in the k-th quantity of a verified plan."""
+    """Return the agreement in the k-th quantity of a verified plan."""
     return Agreement(*(float(planned[name][k]) for name in ("error", "chance", "allowed", "horizon")))
 
 
 def _verdict(planned: xr.Dataset, k: int) -> str:
-    """The verdict on one quantity; beyond the horizon how far single runs scatter; what would decide."""
+    """Return the verdict on one quantity; beyond the horizon the scatter of single runs; members that decide it."""
     one, unit = agreement_of(planned, k), str(planned["unit"].values[k])
-    said, reasons = verdict(one), list[str]()
-    if said == MISSED:
-        return f"missed, {one.error / one.allowed:.2g} times" if one.allowed else said
+    result, reasons = verdict(one), list[str]()
+    if result == MISSED:
+        return f"missed, {one.error / one.allowed:.2g} times" if one.allowed else result
     if one.horizon < 1.0:
         reasons.append(
             f"beyond {one.horizon:.0%} of the time single runs of the full scene scatter by "
             f"{written(float(planned['scatter'][k]), 0.0, unit)}"
-            + (", and the means differ by less" if said == MET_TO_HORIZON else "")
+            + (", and the means differ by less" if result == MET_TO_HORIZON else "")
         )
     enough = one.enough(planned.attrs["members"])
-    if said == UNDECIDED and np.isfinite(enough):
+    if result == UNDECIDED and np.isfinite(enough):
         reasons.append(f"{int(np.ceil(enough))} members would decide")
-    return f"{said}: {'; '.join(reasons)}" if reasons else said
+    return f"{result}: {'; '.join(reasons)}" if reasons else result
 
 
 def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
-    """What each accuracy calls for, by the accuracy in words; why there is no plan, where there is none."""
+    """Tabulate the plan for each accuracy, by the accuracy in words; a string says why a plan is missing."""
     rows = list[tuple[str, ...]]()
     for level, result in plans.items():
         if isinstance(result, str):
@@ -265,7 +266,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
 
 
 def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
-    """Effects in words: those that are needed, those that stay without evidence, and those that may be left out."""
+    """Return effects in words: those needed, those that stay without evidence, and those that may be left out."""
     rows = list(zip(result["words"].values, result["kept"].values, result["reason"].values, strict=True))
     return (
         [str(w) for w, recorded, reason in rows if recorded and reason != NOT_WORTH],

@@ -1,4 +1,4 @@
-"""Is a run stable: what was checked, with value, limit, verdict and remedy, and a figure of the errors over time."""
+"""Stability of a run: checks with value, limit, verdict and remedy, and a figure of the errors over time."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from flexclear.pipeline.post.overview.curves import size_of
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import sentence
 
-#: the energy that a run loses without a trace, as a fraction of the largest energy
+#: largest error of the energy balance, as a fraction of the largest change of any energy
 ENERGY = 1e-3
-#: by how far loops may be open, as a fraction of the mechanism's extent
+#: largest opening of loops, as a fraction of the mechanism's extent
 LOOPS = 1e-6
-#: below this there is nothing but rounding
+#: values below this are rounding
 ROUNDING = 1e-15
-#: agreement with runs at other tolerances and by other methods, as a fraction of each quantity's size
+#: largest disagreement with runs at other tolerances and by other methods, as a fraction of each quantity's size
 AGREEMENT = 0.01
-#: fraction of steps that may be made again, and that stability may shorten
+#: largest fractions of rejected steps, and of steps that stability shortens
 REJECTED, STIFF = 0.3, 0.3
 #: condition number of the closures above which a singular pose is near
 CONDITION = 1e6
@@ -30,7 +30,7 @@ ENERGIES = ("kinetic", "potential", "elastic", "drive_work", "load_work")
 
 @dataclass(frozen=True)
 class Check:
-    """One check in words.  good: whether the value keeps its limit."""
+    """One check in words.  good: True when the value is within its limit."""
 
     name: str
     value: str
@@ -40,7 +40,7 @@ class Check:
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """Verdict in words."""
         return "good" if self.good else "look here"
 
     @property
@@ -52,10 +52,9 @@ class Check:
 def checks(
     run: xr.Dataset, study: xr.Dataset | None, members: float | None = None, *, by_need: bool = False
 ) -> list[Check]:
-    """All that a run and its cost study say of its stability.  study: None where there is none.
+    """Return all checks of a run and of its cost study, or of the run alone for None.
 
-    members: horizon of the scene's ensemble [s], None where there is none.  by_need: whether the program chose the
-    integrator.
+    members: horizon of the scene's ensemble [s], or None.  by_need: True when the program chose the integrator.
     """
     agreement = [] if study is None else _agreement(study)
     result = [_energy(run), *_loops(run), *agreement, _rejected(run), _stiff(run, by_need)]
@@ -63,14 +62,14 @@ def checks(
 
 
 def lost_energy(run: xr.Dataset) -> np.ndarray:
-    """What the energy balance misses, as a fraction of the largest change of any energy, shape (time,)."""
+    """Return the error of the energy balance, as a fraction of the largest change of any energy, shape (time,)."""
     changes = [np.abs(run[n].values - run[n].values[0]).max() for n in ENERGIES if n in run]
     largest, missed = max(map(float, changes), default=0.0), np.abs(run["energy_error"].values)
     return np.asarray(missed / largest) if largest > 0.0 else np.zeros_like(missed)
 
 
 def _drift(run: xr.Dataset) -> np.ndarray | None:
-    """By how far loops are open, as a fraction of the mechanism's extent, shape (time,); None without loops."""
+    """Return the opening of loops, as a fraction of the mechanism's extent, shape (time,); None without loops."""
     if "constraint_error" not in run or "condition" not in run:
         return None
     extent = float(np.linalg.norm(np.ptp(run["position"].values.reshape(-1, 3), axis=0))) or 1.0
@@ -84,7 +83,7 @@ def _energy(run: xr.Dataset) -> Check:
 
 
 def _loops(run: xr.Dataset) -> list[Check]:
-    """Only where there are loops."""
+    """Check the drift of closed loops; empty without loops."""
     if (drift := _drift(run)) is None:
         return []
     fraction = float(drift.max())
@@ -93,29 +92,29 @@ def _loops(run: xr.Dataset) -> list[Check]:
 
 
 def _agreement(study: xr.Dataset) -> list[Check]:
-    """With runs at half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
+    """Check agreement with half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
     result = []
     for group, method, setting, one in methods(study):
         distance = one[f"distance_by_{group}"]
-        there = [float(s) for s in study[setting].values if np.isfinite(distance.sel({setting: s})).all()]
+        available = [float(s) for s in study[setting].values if np.isfinite(distance.sel({setting: s})).all()]
         if method == study.attrs["own_integrator"]:
             at = float(study.attrs[f"own_{setting}"])
-            shown = [s for s in there if 0.05 * at < s < 0.9 * at]
+            shown = [s for s in available if 0.05 * at < s < 0.9 * at]
         else:
-            shown = [min(there)] if there else []
+            shown = [min(available)] if available else []
         for s in shown:
             values = distance.sel({setting: s}).values
             worst = int(np.argmax(values))
             value, unit, which = (float(values[worst]), *(str(study[n].values[worst]) for n in ("unit", "quantity")))
             name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
-            said = f"{value:.1e} of the {size_of(unit)} of {which}"
-            result.append(Check(name, said, f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance"))
+            text = f"{value:.1e} of the {size_of(unit)} of {which}"
+            result.append(Check(name, text, f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance"))
     return result
 
 
 def _rejected(run: xr.Dataset) -> Check:
-    steps, again = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
-    fraction = again / max(steps + again, 1.0)
+    steps, rejected = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
+    fraction = rejected / max(steps + rejected, 1.0)
     remedy = "another integrator, or a tighter tolerance"
     return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
 
@@ -156,10 +155,10 @@ def _predictable(run: xr.Dataset, members: float | None) -> list[Check]:
 
 
 def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -> str:
-    """What the checks say together, in words.  members: as in `checks`."""
+    """Return the result of all checks in words.  members: as in `checks`."""
     bad = [check for check in result if not check.good and check.name != "predictability"]
     disagreeing = [check for check in bad if check.name.startswith("agreement")]
-    bad = [check for check in bad if check not in disagreeing[1:]]  # one says it, the table has the others
+    bad = [check for check in bad if check not in disagreeing[1:]]  # one is enough in words, the table has the others
     text = (
         f"Yes: all {len(result)} checks hold."
         if all(check.good for check in result)
@@ -173,7 +172,7 @@ def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -
 
 
 def figure(run: xr.Dataset) -> dict[str, bytes]:
-    """``stability.png`` and ``.svg``: errors of energy and loops over time, with their limits, and the separation."""
+    """Draw ``stability.png`` and ``.svg``: errors of energy and loops over time, with limits, and the separation."""
     panels = [("energy error", "fraction of the largest energy", run["time"].values, lost_energy(run), ENERGY)]
     drift = _drift(run)
     if drift is not None and drift.max(initial=0.0) > ROUNDING:

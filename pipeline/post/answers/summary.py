@@ -1,4 +1,4 @@
-"""What a report says first: what clearance and flexibility do, in sentences that the numbers make."""
+"""Sentences at the top of a report: effects of clearance and flexibility, in numbers."""
 
 from __future__ import annotations
 
@@ -23,33 +23,32 @@ NEITHER = "The scene has neither clearance nor flexible bodies"
 def answer(
     compared: xr.Dataset | None,
     run: xr.Dataset | None,
-    doubts: Sequence[str],
+    warnings: Sequence[str],
     changes: Sequence[str] = (),
     members: float | None = None,
 ) -> str:
-    """A list of sentences, as HTML.
+    """Return a list of sentences, as HTML.
 
-    compared: of `overview.comparison`, the ideal counterpart first and the scene last; None where there is none.
-    run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.answers.matters` on what
-    differs from the ideal mechanism, which replace those that two runs alone allow.  members: horizon of the scene's
-    ensemble [s], None where there is none.
+    compared: of `overview.comparison`, the ideal counterpart first and the scene last; or None. run: schema RUN of the
+    scene.  warnings: of the run.  changes: sentences of `post.answers.matters` on the differences from the ideal
+    mechanism; they replace those from two runs alone.  members: horizon of the scene's ensemble [s], or None.
     """
-    said = [] if compared is None else [*changes] or _effects(compared)
+    sentences = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
         lacks = "Slots, planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
-        said.append(f"{lacks}, so there is no idealised run to compare it with.")
+        sentences.append(f"{lacks}, so there is no idealised run to compare it with.")
     if run is not None:
-        said += [*_impacts(run), *_horizon(run, members), *_trust(run)]
-    if doubts:
-        many = "one warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
-        said.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
+        sentences += [*_impacts(run), *_horizon(run, members), *_trust(run)]
+    if warnings:
+        many = "one warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
+        sentences.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
     head = "" if compared is None else "<p>Compared with the same mechanism with ideal joints and rigid bodies:</p>"
-    return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"
+    return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
-    """A sentence for each quantity: the difference from the ideal mechanism, next to the errors of both runs."""
-    first, last, said = compared.isel(run=0), compared.isel(run=-1), []
+    """Return a sentence for each quantity: its difference from the ideal mechanism, and the errors of both runs."""
+    first, last, sentences = compared.isel(run=0), compared.isel(run=-1), []
     for j, name in enumerate(str(q) for q in compared["quantity"].values):
         difference, error = float(last["difference"][j]), float(first["error"][j]) + float(last["error"][j])
         if np.isfinite(difference):
@@ -58,12 +57,12 @@ def _effects(compared: xr.Dataset) -> list[str]:
             if np.isfinite(error):
                 size = float(first["largest"][j])
                 text = in_words(Influence(difference, error), size, unit, of="the ideal mechanism")
-            said.append(f"<b>{html.escape(name)}</b>: {text}.")
-    return said
+            sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return sentences
 
 
 def _impacts(run: xr.Dataset) -> list[str]:
-    """A sentence for each contact of the scene, ends of stops among them."""
+    """Return a sentence for each contact of the scene, ends of stops included."""
     sentences = []
     for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
         unit = quantities.unit(run, Quantity(name, "peak_force"))
@@ -97,12 +96,12 @@ def _trust(run: xr.Dataset) -> list[str]:
 
 
 def effects(scene: Mapping[str, Any]) -> dict[str, str]:
-    """Which effects a scene (its parameters) has, by name, in words; those that it has not say so."""
+    """Return a scene's effects by name, in words, from its parameters; absent ones are named as absent."""
     body, joint = scene.get("body", {}), scene.get("joint", {})
     load = scene.get("load", {})
     flexible = [n for n, b in body.items() if b["type"] == "flexible"]
     loose = [n for n, j in joint.items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"]
-    there = {
+    present = {
         "clearance": loose,
         "contact friction": [f"{n} ({joint[n]['friction']['law']})" for n in loose if joint[n].get("friction")],
         "wear": [n for n in loose if joint[n].get("wear")],
@@ -120,11 +119,11 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "stops": list(scene.get("stop", {})),
         "gears": list(scene.get("gear", {})),
     }
-    return {name: ", ".join(listed) if listed else "not in the scene" for name, listed in there.items()}
+    return {name: ", ".join(listed) if listed else "not in the scene" for name, listed in present.items()}
 
 
 def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:
-    """Assumptions in the order of what hangs on them: of joints with clearance and flexible bodies first."""
+    """Sort assumptions by influence: those on joints with clearance and flexible bodies come first."""
     scene = {} if run is None else parameters(run)
     loose = {n for n, j in scene.get("joint", {}).items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"}
     flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}

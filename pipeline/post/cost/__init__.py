@@ -1,1 +1,1 @@
-"""What accuracy costs: errors of many runs of one scene against the best one, next to what each took."""
+"""Cost of accuracy: errors of many runs of one scene against the best one, and their costs."""

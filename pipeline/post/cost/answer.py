@@ -1,4 +1,4 @@
-"""What accuracy costs, in words: a paragraph on one scene, and the page that says what to choose for several."""
+"""Cost of accuracy in words: a paragraph on one scene, and a page with advice on several scenes."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from flexclear.pipeline.post.overview.curves import size_of
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
 
-#: a setting that is as accurate as the scene's own is named where it costs less than this fraction
+#: a setting as accurate as the scene's own is named where it costs less than this fraction
 CHEAPER = 0.7
 
 
 def sentences(study: xr.Dataset) -> str:
-    """In words; study: of `stages.cost_study`."""
+    """Return the answer in words; study: of `stages.cost_study`."""
     return " ".join(filter(None, (_own(study), _digit(study), _looser(study), _cause(study), *undone(study))))
 
 
 def _worst(study: xr.Dataset) -> tuple[str, float]:
-    """What the largest error is a fraction of, in words, and that error."""
+    """Return quantity and size that the largest error refers to, in words, and that error."""
     errors = study["own_error"].values
     k = int(np.argmax(errors))
     return f"{size_of(str(study['unit'].values[k]))} of {study['quantity'].values[k]}", float(errors[k])
@@ -49,7 +49,7 @@ def _own(study: xr.Dataset) -> str:
 
 
 def _digit(study: xr.Dataset) -> str:
-    """What one more digit costs."""
+    """Return a sentence on the cost of one more digit."""
     _, error = _worst(study)
     better = cheapest(study, 0.1 * error) if np.isfinite(error) else None
     if better is None:
@@ -58,7 +58,7 @@ def _digit(study: xr.Dataset) -> str:
 
 
 def _looser(study: xr.Dataset) -> str:
-    """Whether another setting is as accurate for less."""
+    """Return a sentence on a setting that is as accurate for less, or nothing."""
     _, error = _worst(study)
     same = cheapest(study, error) if np.isfinite(error) else None
     if same is None or same.seconds > CHEAPER * study.attrs["own_seconds"]:
@@ -67,7 +67,7 @@ def _looser(study: xr.Dataset) -> str:
 
 
 def _cause(study: xr.Dataset) -> str:
-    """Which cause limits the error, of those that were looked at, for the quantity that has the largest one."""
+    """Return a sentence on the largest known cause of error, by the largest error of any quantity."""
     if "error_by_cause" not in study:
         return ""
     largest = study["error_by_cause"].max("quantity")
@@ -85,7 +85,7 @@ def _cause(study: xr.Dataset) -> str:
 
 
 def undone(study: xr.Dataset) -> list[str]:
-    """Which runs were left undone, and why, a sentence for each reason."""
+    """Return a sentence for each reason why runs were skipped."""
     reasons = {
         "undone": "Not run within the budget",
         "given_up": "Not run, since their method used up its evaluations at a tolerance no tighter",
@@ -94,7 +94,7 @@ def undone(study: xr.Dataset) -> list[str]:
 
 
 def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``: the largest error of any quantity against processor time, this scene as a star."""
+    """Draw ``<name>.png`` and ``.svg``: largest error of any quantity against processor time; a star: this scene."""
     by_method: dict[str, list[Choice]] = {}
     for choice in choices(study):
         by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
@@ -108,9 +108,9 @@ def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
         _, error = _worst(study)
         if np.isfinite(error):
             panel.plot(study.attrs["own_seconds"], error, "*", color="#222222", ms=13, label="this scene", zorder=5)
-        unsure = float(study["reference_uncertainty"].max())
-        if np.isfinite(unsure) and unsure > 0.0:
-            panel.axhline(unsure, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
+        uncertain = float(study["reference_uncertainty"].max())
+        if np.isfinite(uncertain) and uncertain > 0.0:
+            panel.axhline(uncertain, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
         panel.set(xscale="log", yscale=style.scale_of(panel), xlabel="processor time of the integration (s)")
         panel.set_ylabel("largest relative error")
         style.plain(panel.xaxis)
@@ -136,7 +136,7 @@ not.
 
 @dataclass(frozen=True, slots=True)
 class Studied:
-    """What the page says of a scene: `advice`, its tables (Markdown), its pictures by title, relative to the page."""
+    """Section of the page on a scene: `advice`, tables (Markdown), pictures by title, relative to the page."""
 
     scene: str
     advice: str
@@ -145,13 +145,13 @@ class Studied:
 
 
 def markdown(scenes: tuple[Studied, ...], page: str) -> str:
-    """The whole page."""
+    """Return the whole page."""
     names = " ".join(s.scene for s in scenes)
     return "\n".join([INTRODUCTION.format(scenes=names, page=page), sections(scenes)])
 
 
 def sections(scenes: tuple[Studied, ...]) -> str:
-    """What to choose for each scene, and then each with its pictures and tables."""
+    """Return the advice on each scene, and then each scene's pictures and tables."""
     parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
     for s in scenes:
         parts.append(f"\n## {s.scene}\n")
@@ -161,38 +161,38 @@ def sections(scenes: tuple[Studied, ...]) -> str:
 
 
 def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """One paragraph: the cheapest way to each accuracy, what a digit costs, how far it holds, what limits the scene."""
+    """Return one paragraph: cheapest way to each accuracy, cost of a digit, horizon, and limits of the scene."""
     choices = {target: cheapest(study, target) for target in TARGETS}
-    had = {target: choice for target, choice in choices.items() if choice is not None}
-    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in had.items())
-    said = [
-        f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."
+    met = {target: choice for target, choice in choices.items() if choice is not None}
+    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in met.items())
+    parts = [
+        f"{text}." if met else "None of the accuracies asked for can be had for all quantities; see the tables below."
     ]
-    if had:
-        said += [_digits(had)]
-    said += [_some(study, target) for target in TARGETS if target not in had]
-    said += [_horizon(study, tables), _limits(study)]
-    return " ".join(filter(None, said))
+    if met:
+        parts += [_digits(met)]
+    parts += [_some(study, target) for target in TARGETS if target not in met]
+    parts += [_horizon(study, tables), _limits(study)]
+    return " ".join(filter(None, parts))
 
 
 def _some(study: xr.Dataset, target: float) -> str:
-    """For which quantities an accuracy can be had that cannot be had for all."""
+    """Return a sentence on the quantities that reach an accuracy which not all reach."""
     names = [str(name) for name in study["quantity"].values]
     able = [name for name in names if cheapest(study.sel(quantity=[name]), target) is not None]
     unable = ", ".join(name for name in names if name not in able)
     return f"{target:g} can be had for {', '.join(able)}, not for {unable}." if able else f"{target:g} cannot be had."
 
 
-def _digits(had: Mapping[float, Choice]) -> str:
-    loose, tight = had[max(had)], had[min(had)]
-    digits = np.log10(max(had) / min(had))
+def _digits(met: Mapping[float, Choice]) -> str:
+    loose, tight = met[max(met)], met[min(met)]
+    digits = np.log10(max(met) / min(met))
     if not digits > 0.0 or tight.seconds <= loose.seconds:
         return ""
     return f"Each further digit multiplies the time by {(tight.seconds / loose.seconds) ** (1.0 / digits):.2f}."
 
 
 def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """What is to be done where a run cannot be predicted to its end."""
+    """Return advice for a run that cannot be predicted to its end."""
     horizon, end = study.attrs["horizon"], study.attrs["end"]
     if horizon == "none" or horizon >= end:
         return ""
@@ -203,7 +203,7 @@ def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
 
 
 def _limits(study: xr.Dataset) -> str:
-    """What to refine in the scene as it is: the causes that dominate, each with its quantities."""
+    """Return advice on refinement of the scene: the dominant causes, each with its quantities."""
     if "error_by_cause" not in study:
         return ""
     by_cause: dict[str, list[str]] = {}
@@ -217,15 +217,15 @@ def _limits(study: xr.Dataset) -> str:
 
 
 TARGETS = (1e-3, 1e-6, 1e-9)
-#: a best error of so many times the reference's uncertainty, which it contains, is rounding
+#: a best error within this multiple of the reference's uncertainty, which it contains, is rounding
 ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
 
 
 def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Table:
-    """'for 1e-3 / 1e-6 / 1e-9 you need ... and it takes ...', the worst of all quantities counting.
+    """Tabulate settings, cost and error for 1e-3, 1e-6 and 1e-9, by the worst of all quantities.
 
-    notes: what else is to be said.
+    notes: further notes of the table.
     """
     rows = []
     for target in TARGETS:
@@ -242,7 +242,7 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
 
 
 def by_quantity(study: xr.Dataset, title: str) -> Table:
-    """The same for each quantity by itself, where the worst of all does not decide."""
+    """Tabulate settings and costs for the same accuracies for each quantity by itself."""
     rows = []
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
@@ -255,7 +255,7 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
 
 
 def _absent(study: xr.Dataset) -> str:
-    """What is said of an accuracy that no run of a study has."""
+    """Return the words for an accuracy that no run of a study has."""
     return "cannot be had" if study.attrs.get("complete", 1) else "not reached yet"
 
 
@@ -263,7 +263,7 @@ def _absent(study: xr.Dataset) -> str:
 class Choice:
     """One way to integrate: its name, cost, largest relative error and the quantity that has it.
 
-    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be determined.
+    error: distance from the reference plus the reference's uncertainty: never below what can be determined.
     """
 
     name: str
@@ -273,16 +273,16 @@ class Choice:
     worst: str
 
 
-#: times within this factor are alike: of a second run they differ by some per cent
+#: times within this factor are alike: times of repeated runs differ by some per cent
 AS_FAST = 1.1
-#: where no run of a study can be compared
+#: substitute where no run of a study can be compared
 NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
 
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
-    """The choice with the least processor time whose largest error is at most `target`; None if there is none.
+    """Return the choice with the least processor time whose largest error is at most `target`; None without one.
 
-    Of those whose times differ by no more than times of one run do (AS_FAST) the one with the fewest evaluations.
+    Among choices with nearly the same time (AS_FAST) the one with the fewest evaluations is returned.
     """
     good = [choice for choice in choices(study) if choice.error <= target]
     least = min((choice.seconds for choice in good), default=np.nan)
@@ -291,13 +291,13 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 
 def choices(study: xr.Dataset) -> list[Choice]:
-    """All ways to integrate whose error is known."""
+    """Return all ways to integrate whose error is known."""
     choices = []
-    unsure = study["reference_uncertainty"].fillna(0.0)
+    uncertain = study["reference_uncertainty"].fillna(0.0)
     for group, method, setting, mine in methods(study):
         for s in study[setting].values:
             one = mine.sel({setting: s})
-            error = one[f"error_by_{group}"] + unsure
+            error = one[f"error_by_{group}"] + uncertain
             if not np.isfinite(error).all():
                 continue
             worst = str(study["quantity"].values[int(np.argmax(error.values))])
@@ -337,27 +337,27 @@ def _notes(study: xr.Dataset) -> list[str]:
 
 
 def _confirmed(study: xr.Dataset) -> str:
-    unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
-    said = f"Reference: {study.attrs['reference']}. "
+    uncertain, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
+    reference = f"Reference: {study.attrs['reference']}. "
     if not by:
-        return f"{said}Not confirmed: no other run was made."
-    if np.isnan(unsure).any():
-        return f"{said}Not confirmed: {by} was refused."
-    if np.isinf(unsure).any():
-        return f"{said}Not confirmed: {by} finds another number of impacts."
-    worst = str(study["quantity"].values[int(np.argmax(unsure))])
-    return f"{said}Confirmed by {by}, which differs by at most {unsure.max():.1e} ({worst})."
+        return f"{reference}Not confirmed: no other run was made."
+    if np.isnan(uncertain).any():
+        return f"{reference}Not confirmed: {by} was refused."
+    if np.isinf(uncertain).any():
+        return f"{reference}Not confirmed: {by} finds another number of impacts."
+    worst = str(study["quantity"].values[int(np.argmax(uncertain))])
+    return f"{reference}Confirmed by {by}, which differs by at most {uncertain.max():.1e} ({worst})."
 
 
 def _why_not(study: xr.Dataset) -> str:
-    """Whether the settings that were tried end too early, or rounding decides."""
-    unsure = study["reference_uncertainty"].fillna(0.0)
+    """Return why an accuracy cannot be had: the tried settings end too early, or rounding decides."""
+    uncertain = study["reference_uncertainty"].fillna(0.0)
     best = min(choices(study), key=lambda c: c.error, default=NOTHING)
-    if np.isinf(unsure).any():
+    if np.isinf(uncertain).any():
         return "the reference and its confirmation do not agree on the number of impacts"
     if best is NOTHING:
         return "every run is refused, or has another number of impacts than the reference"
-    if best.error <= ROUNDED * float(unsure.sel(quantity=best.worst)):
+    if best.error <= ROUNDED * float(uncertain.sel(quantity=best.worst)):
         agree = f"the reference and its confirmation, the tightest runs that were made, differ as much ({best.worst})"
         if not study.attrs.get("complete", 1):
             return f"{agree}; a larger budget allows tighter ones"

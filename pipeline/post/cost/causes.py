@@ -1,4 +1,4 @@
-"""The error of a scene as it is, by cause: each from two runs that differ in that alone; and their table and figure."""
+"""Error of a scene as it is, by cause, each from two runs that differ in that cause alone; table and figure."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from matplotlib.axes import Axes
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
-from flexclear.pipeline.post.cost.study import Point, believed, relative
+from flexclear.pipeline.post.cost.study import Point, comparable_until, relative
 from flexclear.pipeline.post.plotting.style import INK, files, grid, heading, style
 from flexclear.pipeline.post.plotting.table import Table
 
-#: the causes in the order of the stages that make them, each with what a user would refine
+#: causes in the order of their stages, each with its refinement
 CAUSES = {
     "mesh": "more elements",
     "beam theory": "another theory, or a solid",
@@ -26,7 +26,7 @@ CAUSES = {
     "sampling of the output": "a shorter output interval",
     "ensemble spread": "more members",
 }
-#: the message about an error that is infinite
+#: words for an infinite error
 OTHER = "other impacts"
 #: letters that fit next to a bar
 LETTERS = 52
@@ -34,7 +34,7 @@ COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#88
 
 
 def with_causes(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
-    """A study's dataset with ``error_by_cause(quantity, cause)``, NaN where a scene has no such cause."""
+    """Return a study's dataset with ``error_by_cause(quantity, cause)``, NaN where a scene lacks the cause."""
     names = [str(name) for name in study["quantity"].values]
     values = np.array([[split[name].get(cause, np.nan) for cause in CAUSES] for name in names])
     attributes = {"units": "1", "long_name": "error of the scene as it is, as a fraction of the quantity's size"}
@@ -42,7 +42,7 @@ def with_causes(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> 
 
 
 def table(split: Mapping[str, Mapping[str, float]], title: str) -> Table:
-    """Causes as rows, quantities as columns; '–' where a cause does not exist in the scene."""
+    """Tabulate errors, causes as rows, quantities as columns; '–' where the scene lacks a cause."""
     quantities = list(split)
     rows = []
     for cause, remedy in CAUSES.items():
@@ -60,15 +60,15 @@ def _cell(error: float) -> str:
 
 
 def dominant(causes: Mapping[str, float]) -> str:
-    """The cause with the largest error; one that changes the number of impacts is larger than any other."""
+    """Return the cause with the largest error; one that changes the number of impacts is larger than any other."""
     known = {cause: error for cause, error in causes.items() if not np.isnan(error)}
     return max(known, key=lambda cause: known[cause]) if known else "–"
 
 
 def make(name: str, split: Mapping[str, Mapping[str, float]], title: str) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``: per quantity the causes stacked, as fractions of their sum.
+    """Draw ``<name>.png`` and ``.svg``: per quantity the causes stacked, as fractions of their sum.
 
-    Shares show what to refine; the magnitudes are next to the bars, since causes span many decades.
+    Fractions show what to refine; the magnitudes are next to the bars, since causes span many decades.
     """
     with style():
         figure, axes = grid(1, 1, (9.5, 1.6 + 0.55 * len(split)))
@@ -115,16 +115,16 @@ def causes_of(
     located: float,
     ensemble: xr.Dataset | None = None,
 ) -> dict[str, float]:
-    """Relative error by cause (names of `causes.CAUSES`); NaN where the scene has no such cause.
+    """Return the relative error by cause (names of `causes.CAUSES`); NaN where the scene lacks the cause.
 
     located: fraction of the clearance to which contact events are located.  ensemble: at the tightest tolerance, of a
     scene that has one; its spread is that of the whole run, all other errors are those up to the horizon.
     """
-    there = [p for p in points if "refused" not in runs[p.key].attrs]
-    asis = next((runs[p.key] for p in there if p.group == "sampling" and p.key == "as it is"), None)
-    reference = next(runs[p.key] for p in there if p.group == "reference")
+    accepted = [p for p in points if "refused" not in runs[p.key].attrs]
+    asis = next((runs[p.key] for p in accepted if p.group == "sampling" and p.key == "as it is"), None)
+    reference = next(runs[p.key] for p in accepted if p.group == "reference")
     growth = 0.0 if asis is None else float(asis.attrs.get("growth", 0.0))
-    until = believed(there, runs)
+    until = comparable_until(accepted, runs)
     size = quantities.scale(reference, quantity)
 
     def between(a: xr.Dataset | None, b: xr.Dataset | None) -> float:
@@ -132,22 +132,22 @@ def causes_of(
             return np.nan
         return relative(quantities.error(a, b, quantity, until), size)
 
-    models = _models([p for p in there if p.group == "model"])
+    models = _models([p for p in accepted if p.group == "model"])
     model = {cause: runs[point.key] for cause, point in models.items() if point is not None}
     return {
         **{of: between(model.get("own"), model.get(of)) for of in ("mesh", "beam theory", "modal truncation")},
         "time integration": between(asis, reference),
         "event location": _location(quantity, reference, located, size, growth),
-        "sampling of the output": _sampling(quantity, asis, there, runs, size),
+        "sampling of the output": _sampling(quantity, asis, accepted, runs, size),
         "ensemble spread": _spread(quantity, ensemble, size),
     }
 
 
 def _models(points: Sequence[Point]) -> dict[str, Point | None]:
-    """Runs of one model each: the scene's own, and by cause the one that differs from it in that; None without one.
+    """Return the scene's own run, and by cause the run that differs from it in that cause alone, or None.
 
-    Of modes the most of a statically complete set, of meshes the finest, of theories shear-flexible beams, which assume
-    the least.
+    For modes it is the largest statically complete set, for meshes the finest one, for theories shear-flexible beams,
+    which assume the least.
     """
     own = next((p for p in points if p.factors.get("own")), None)
     if own is None:
@@ -165,7 +165,7 @@ def _models(points: Sequence[Point]) -> dict[str, Point | None]:
 
 
 def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: float, growth: float) -> float:
-    """Bound from the root finder's tolerance: a displacement of that size, grown as the perturbed run's does."""
+    """Return a bound from the root finder's tolerance: a displacement of that size, grown as the perturbed run's is."""
     if "clearance" not in reference.attrs:
         return np.nan
     displacement = located * float(reference.attrs["clearance"])
@@ -181,7 +181,7 @@ def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: f
 def _sampling(
     quantity: Quantity, asis: xr.Dataset | None, points: Sequence[Point], runs: Mapping[str, xr.Dataset], size: float
 ) -> float:
-    """What the largest value changes when the output is denser; events are located, not sampled."""
+    """Return the change of the largest value with denser output; events are located, not sampled."""
     denser = next((runs[p.key] for p in points if p.key == "denser output"), None)
     if asis is None or denser is None or not quantity.over_time:
         return np.nan
@@ -189,7 +189,7 @@ def _sampling(
 
 
 def _spread(quantity: Quantity, ensemble: xr.Dataset | None, size: float) -> float:
-    """Half the 95 % interval of the members' mean: by bootstrap of peaks, 1.96 standard errors of series."""
+    """Return half the 95 % interval of the members' mean: by bootstrap of peaks, 1.96 standard errors of series."""
     if ensemble is None:
         return np.nan
     if quantity.kind == "peak_force":

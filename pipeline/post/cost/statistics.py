@@ -1,4 +1,4 @@
-"""Beyond the horizon: how well an ensemble of a given size knows its own mean, by bootstrap."""
+"""Statistics beyond the horizon: uncertainty of ensemble means by the number of members, by bootstrap."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from flexclear.pipeline.post.plotting.table import Table
 
 RESAMPLES = 2000
 SEED = 7
-#: what is asked of a chaotic run, by contact, and its unit
+#: statistics of a chaotic run, by contact, and their units
 STATISTICS = {"peak_force": "N", "impact_count": "1", "contact_time_share": "1"}
-#: the smallest part of an ensemble of which a spread is reported: resamples of fewer say little
+#: smallest part of an ensemble with a reported spread: resamples of fewer members mean little
 FEWEST = 8
 LOOKS = (("#0072B2", "o"), ("#E69F00", "s"), ("#009E73", "^"), ("#D55E00", "v"))
 
@@ -31,20 +31,20 @@ class Estimate:
 
 
 def estimate(values: np.ndarray) -> Estimate:
-    """Of one value per member, shape (member,); the bootstrap's seed is fixed."""
+    """Estimate the mean from one value per member, shape (member,); the bootstrap's seed is fixed."""
     draws = np.random.default_rng(SEED).integers(0, len(values), size=(RESAMPLES, len(values)))
     low, high = np.quantile(values[draws].mean(axis=1), [0.025, 0.975])
     return Estimate(float(values.mean()), float(values.std(ddof=1)), float(low), float(high))
 
 
 def relative_error(values: np.ndarray) -> float:
-    """Half the interval of the mean as a fraction of the mean; NaN where that is zero."""
+    """Return half the interval of the mean as a fraction of the mean; NaN for a mean of zero."""
     mean = estimate(values)
     return 0.5 * (mean.high - mean.low) / abs(mean.mean) if mean.mean else np.nan
 
 
 def growing(members: int) -> list[int]:
-    """Sizes of the parts of an ensemble: doubled until all members are in."""
+    """Return the sizes of the parts of an ensemble: doubled up to all members."""
     sizes = [FEWEST]
     while 2 * sizes[-1] < members:
         sizes.append(2 * sizes[-1])
@@ -52,7 +52,7 @@ def growing(members: int) -> list[int]:
 
 
 def make(name: str, ensembles: dict[str, xr.Dataset], title: str) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``: statistical error of each mean against the cost of so many members.
+    """Draw ``<name>.png`` and ``.svg``: statistical error of each mean against the cost of its members.
 
     ensembles: as of `table`, with ``cpu_seconds`` per member as an attribute.
     """
@@ -85,9 +85,9 @@ def _panel(ax: Axes, contact: str, statistic: str, ensembles: dict[str, xr.Datas
 
 
 def table(ensembles: dict[str, xr.Dataset], title: str) -> Table:
-    """Statistics of every contact at each tolerance: means agree within their intervals when it suffices.
+    """Tabulate statistics of every contact at each tolerance: a tolerance suffices where intervals of means overlap.
 
-    ensembles: artifacts of schema ENSEMBLE by the name of what was varied.
+    ensembles: artifacts of schema ENSEMBLE by the name of their variation.
     """
     rows = []
     for name, ensemble in ensembles.items():

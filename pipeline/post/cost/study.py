@@ -1,4 +1,4 @@
-"""From the runs of a study to one dataset: error and cost over the factors, and how good the reference is.
+"""Dataset of a cost study: error and cost over the factors, and uncertainty of the reference.
 
 Errors are pointwise up to the horizon of the scene's run; beyond it only statistics mean anything
 (`pipeline.post.cost.statistics`). They are relative to the size of each quantity (`quantities.scale`).
@@ -27,11 +27,11 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "model": ("theory", "mode_set", "modes", "elements"),
     "sampling": ("interval",),
 }
-#: of these, the groups that say how a run is integrated, each by a method and a setting of it
+#: groups of methods and tolerances or steps
 INTEGRATION = ("tolerance", "step")
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
-#: what a run costs
+#: costs of a run
 COSTS: Schema = table("""
 cpu_seconds | | s | processor time of the integration of a warm run, median of the repeats
 cpu_spread | | s | largest minus smallest processor time of the repeats
@@ -40,7 +40,7 @@ evaluations | | 1 | right-hand sides evaluated
 peak_memory | | B | largest resident memory of the process that made the run
 compile_seconds | | s | time to build and fetch or compile the kernels, not part of the run
 """)
-#: and what else a study says of it
+#: other variables of a run in a study
 KINDS: Schema = COSTS | table("""
 error | | 1 | largest error up to the horizon, as a fraction of the quantity's size
 distance | | 1 | largest distance from the scene's own run up to the horizon, as a fraction of the quantity's size
@@ -58,36 +58,35 @@ class Point:
 
 
 def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[Point]:
-    """The points, and among them again the reference and its confirmation, as points of groups of these names.
+    """Return the points, and the reference and its confirmation as further points of groups of these names.
 
-    The reference is the run at the tightest tolerance. Of the runs by other methods the one that agrees best with it
-    confirms it: its own error, which is not smaller than the reference's, is part of their distance. Where no other
-    method was run, it is the same one's next run.
-    Raises SolverError where every run was refused.
+    The reference is the run at the tightest tolerance. The confirmation is the run that agrees best with it among those
+    by other methods: its own error, which is not below the reference's, is part of their distance. Without another
+    method, it is the best agreeing run by the same one. Raises SolverError where every run was refused.
     """
-    there = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
-    if not there:
+    accepted = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
+    if not accepted:
         reasons = "; ".join(dict.fromkeys(_reason(runs[p.key]) for p in points if "refused" in runs[p.key].attrs))
         raise SolverError(
             f"no run with chosen steps could be made, so that there is nothing to compare with: {reasons}"
         )
-    best = min(there, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
-    others = [p for p in there if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
-    others = others or [p for p in there if p is not best]
-    until, reference = believed(points, runs), runs[best.key]
+    best = min(accepted, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
+    others = [p for p in accepted if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
+    others = others or [p for p in accepted if p is not best]
+    until, reference = comparable_until(points, runs), runs[best.key]
 
-    def apart(point: Point) -> float:
+    def distance(point: Point) -> float:
         return max(relative_errors(runs[point.key], reference, chosen, until).values(), default=0.0)
 
     result = [*points, Point(best.key, "reference", {})]
-    return result + [Point(p.key, "confirmation", {}) for p in sorted(others, key=apart)[:1]]
+    return result + [Point(p.key, "confirmation", {}) for p in sorted(others, key=distance)[:1]]
 
 
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
-    """The study's dataset; `runs` holds what each point left, by key.
+    """Return the study's dataset; `runs` holds the result of each point, by key.
 
-    A run that was refused has no values: its entry is NaN and its reason is in `refused`.
-    Raises SolverError when that is the reference.
+    A run that was refused has no values: its entry is NaN and its reason is in `refused`. Raises SolverError when the
+    reference was refused.
     """
     reference = runs[next(p.key for p in points if p.group == "reference")]
     if "refused" in reference.attrs:
@@ -95,7 +94,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
             f"nothing to compare with: the reference ({_described(points, 'reference')}) is refused: "
             f"{reference.attrs['refused']}"
         )
-    until = believed(points, runs)
+    until = comparable_until(points, runs)
     scales = {q: quantities.scale(reference, q) for q in chosen}
     data: dict[str, Any] = {"scale": (("quantity",), np.array([scales[q] for q in chosen]))}
     coordinates: dict[str, Any] = {
@@ -142,7 +141,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
 
 
 def methods(study: xr.Dataset) -> Iterator[tuple[str, str, str, xr.Dataset]]:
-    """Group, integrator, name of its setting, and the study of it alone, of each integrator that a study compares."""
+    """Yield group, integrator, name of its setting, and the study of that integrator alone, for each integrator."""
     for group in INTEGRATION:
         method, setting = GROUPS[group]
         for name in study[method].values if f"error_by_{group}" in study else ():
@@ -150,12 +149,12 @@ def methods(study: xr.Dataset) -> Iterator[tuple[str, str, str, xr.Dataset]]:
 
 
 def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
-    """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
+    """Return True where the reference can measure an error; same shape as ``error_by_<group>``."""
     return study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
 
 
 def _reason(refused: xr.Dataset) -> str:
-    """Why a run was refused; what else is to be doubted of it, and what helps, is for those who want that run."""
+    """Return why a run was refused, without the other warnings and remedies."""
     return str(refused.attrs["refused"]).partition(";")[0]
 
 
@@ -166,7 +165,7 @@ def _over_factors(
     of: Callable[[xr.Dataset], Any],
     inner: tuple[int, ...] = (),
 ) -> np.ndarray:
-    """`of` each run (shape inner) over the values of the factors; NaN where there is no run, or it was refused."""
+    """Return `of` each run (shape inner) over the values of the factors; NaN for a missing or refused run."""
     result = np.full((*map(len, values.values()), *inner), np.nan)
     for point in points:
         if "refused" not in runs[point.key].attrs:
@@ -176,7 +175,7 @@ def _over_factors(
 
 
 def cost(run: xr.Dataset, name: str) -> float:
-    """One of COSTS of a point's run."""
+    """Return one of COSTS of a point's run."""
     seconds = run["cpu_repeat"].values
     if name == "cpu_seconds":
         return float(np.median(seconds))
@@ -186,7 +185,7 @@ def cost(run: xr.Dataset, name: str) -> float:
 
 
 def recording(study: xr.Dataset) -> float:
-    """Processor time of the record of one run [s]: of as many rows whatever the integration took, so one median."""
+    """Return processor time of the record of one run [s]: the same for each integration's rows, so one median."""
     times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in INTEGRATION
              if f"recording_seconds_by_{group}" in study]  # fmt: skip
     values = np.concatenate([*times, [np.nan]])
@@ -196,22 +195,22 @@ def recording(study: xr.Dataset) -> float:
 def relative_errors(
     run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float
 ) -> dict[str, float]:
-    """Largest error up to a time [s] as a fraction of the quantity's size, by name."""
+    """Return the largest errors up to a time [s] as fractions of the quantities' sizes, by name."""
     return {
         q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
     }
 
 
-def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
-    """Time up to which pointwise errors mean something [s]: the least horizon of the runs that have one.
+def comparable_until(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
+    """Return the time up to which pointwise errors mean something [s]: the least horizon of the runs.
 
-    Infinite where none has.
+    Infinite where no run has a horizon.
     """
     return min((float(runs[p.key]["horizon"]) for p in points if "horizon" in runs[p.key]), default=np.inf)
 
 
 def relative(error: float, scale: float) -> float:
-    """An error as a fraction of a size; the error itself where there is no size."""
+    """Return an error as a fraction of a size; the error itself for a size of zero."""
     return error / scale if scale > 0.0 else error
 
 

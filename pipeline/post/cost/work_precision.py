@@ -27,7 +27,7 @@ COLUMNS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be determined."""
+    """One integrator over its settings: cost [s], relative errors (setting, quantity), True for measurable ones."""
 
     name: str
     seconds: np.ndarray
@@ -48,7 +48,7 @@ class Mark:
 def make(
     name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = (), others: Sequence[Curve] = ()
 ) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
+    """Draw ``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     drawn = curves(study)
     recorded = recording(study)
@@ -56,7 +56,7 @@ def make(
         figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
         for k, ax in enumerate(axes):
             _panel(ax, chosen[k], k, (drawn, others), marks, MARGIN * float(study["reference_uncertainty"].values[k]))
-            if np.isfinite(recorded):  # a line where the record of a run would stand, whatever the integration took
+            if np.isfinite(recorded):  # the cost of a run's record, which does not depend on the method
                 ax.axvline(recorded, color=SOFT, linewidth=0.9, linestyle=":", zorder=0)
         _legend(figure, drawn, others, marks)
         heading(figure, title, _subtitle(study))
@@ -64,7 +64,7 @@ def make(
 
 
 def curves(study: xr.Dataset) -> list[Curve]:
-    """All integrators of a study, those with a tolerance and those with a step."""
+    """Return the curves of all integrators of a study, those with a tolerance and those with a step."""
     return [
         Curve(name, one[f"cpu_seconds_by_{group}"].values, one[f"error_by_{group}"].values, resolved(one, group).values)
         for group, name, _, one in methods(study)
@@ -72,7 +72,7 @@ def curves(study: xr.Dataset) -> list[Curve]:
 
 
 def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Indices of the points that no other beats in both cost and error, by rising cost; NaN never wins."""
+    """Return indices of the points that no other beats in both cost and error, by rising cost; NaN never wins."""
     best, front = np.inf, []
     for k in np.lexsort((error, seconds)):
         if np.isfinite(seconds[k]) and np.isfinite(error[k]) and error[k] < best:
@@ -82,7 +82,7 @@ def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 def peers(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[Curve]:
-    """Curves of another program's runs. tracks: name, note, seconds [s] and errors [SI] by quantity."""
+    """Return curves of another program's runs. tracks: name, note, seconds [s] and errors [SI] by quantity."""
     lines = []
     for track in tracks:
         seconds = np.array(track["seconds"], dtype=float)
@@ -102,7 +102,7 @@ def _panel(
     marks: tuple[Mark, ...],
     bound: float,
 ) -> None:
-    """One quantity. curves_of: ours, and others'. bound: error below which the reference says nothing."""
+    """Draw one quantity. curves_of: ours, and others'. bound: error below which the reference cannot measure."""
     own, others = curves_of
     for curve in (*own, *others):
         color, mark = look(curve, others)
@@ -115,7 +115,7 @@ def _panel(
     for m in marks:
         if np.isfinite(m.error.get(name, np.nan)):
             ax.plot(m.seconds, m.error[name], "*", color=INK, markersize=9, zorder=5)
-            # to the side where the panel continues
+            # on the side with more space
             side, shift = ("right", -4) if m.seconds > 0.5 * np.nanmax(seconds) else ("left", 4)
             ax.annotate(
                 m.name, (m.seconds, m.error[name]), xytext=(shift, 4), textcoords="offset points", fontsize=6.8, ha=side
@@ -124,7 +124,7 @@ def _panel(
     plain(ax.xaxis)
     if np.isinf(bound):
         text = "cannot be determined: reference and\nconfirmation have other impacts"
-        ax.set(yscale="linear", yticks=[])  # there is nothing to scale
+        ax.set(yscale="linear", yticks=[])  # no errors to scale
         ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
     elif bound > 0.0:
         ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
@@ -133,7 +133,7 @@ def _panel(
 
 
 def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
-    """Colour and mark of a curve; grey ones for other programs."""
+    """Return colour and mark of a curve; grey ones for other programs."""
     if curve.name in LOOKS:
         return LOOKS[curve.name]
     return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"

@@ -1,1 +1,1 @@
-"""What one sees of any mechanism: figures of a run, runs next to each other, and the page with both."""
+"""General figures of any mechanism: of a run, of runs next to each other, and of a sweep."""

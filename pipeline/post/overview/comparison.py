@@ -1,8 +1,8 @@
-"""Runs next to each other: what they differ by, how much each may be wrong itself, and the figure of both.
+"""Comparison of runs: their differences, the error of each run, and the figure of both.
 
-Differences are taken at the output times that all runs have, never interpolated. The first run is the reference.
-Peaks of an impact lie between those times. Where a force or velocity is larger in one run than it ever is in the other,
-the two are at least as far apart at that moment: the distance of largest values is a difference, too.
+Differences are taken at the output times that all runs have, never interpolated. The first run is the reference. Peaks
+of an impact lie between those times. Where a force or velocity is larger in one run than its maximum in the other, the
+two differ at least as much at that moment: the distance of largest values is a difference, too.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
 from flexclear.pipeline.post.single_run.series import derive, parameters, sentence
 
-#: what a run reports of its cost, by its attribute
+#: costs that a run reports, by attribute
 COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}
 
 
 def assemble(
     runs: Mapping[str, xr.Dataset], tighter: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]
 ) -> xr.Dataset:
-    """All runs on their common times as one dataset.
+    """Return all runs on their common times as one dataset.
 
-    runs: schema RUN by label, the reference first.  tighter: the same runs at a tighter tolerance.
-    Variables over (run, quantity): `largest`, `error` (largest distance from the tighter run), `difference` (largest
-    distance from the reference); over (run, quantity, time): `value`, as it is drawn, and `distance`; all in the SI
-    units of the coordinate `unit`; NaN where a run does not have a quantity, infinite where the number of impacts
-    differs.  Raises InputError when the runs have no time in common, or one was stopped before its end.
+    runs: schema RUN by label, the reference first.  tighter: the same runs at a tighter tolerance. Variables over (run,
+    quantity): `largest`, `error` (largest distance from the tighter run), `difference` (largest distance from the
+    reference); over (run, quantity, time): `value`, as drawn, and `distance`; all in the SI units of the coordinate
+    `unit`; NaN where a run lacks a quantity, infinite where the number of impacts differs.  Raises InputError when the
+    runs have no time in common, or one was stopped before its end.
     """
     for label, run in runs.items():
         require_complete(run, label)
@@ -76,7 +76,7 @@ def assemble(
         coords={
             "run": labels,
             "quantity": [quantity.name for quantity in chosen],
-            # of the last run: the scene itself, of which the others may lack a joint with clearance or a drive
+            # from the last run, the scene itself: the others may lack a joint with clearance or a drive
             "unit": ("quantity", [quantities.unit(list(runs.values())[-1], quantity) for quantity in chosen]),
             "time": ("time", time, {"units": "s"}),
         },
@@ -86,7 +86,7 @@ def assemble(
 
 
 def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -> float:
-    """Largest distance at common times; of vectors at least that of the largest values, wherever in time those are.
+    """Return the largest distance at common times; for vectors at least that of the largest values at any time.
 
     For vectors a, b over time, max |a - b| >= | max |a| - max |b| |, taken at the time of the larger one.
     """
@@ -111,7 +111,7 @@ def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
 
 
 def _at(own: np.ndarray, requested: np.ndarray) -> np.ndarray:
-    """Indices into a run's times of the common ones."""
+    """Return indices of the common times among a run's own."""
     return quantities.common_times(own, requested)[0]
 
 
@@ -121,7 +121,7 @@ def _contacts(runs: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-    """Impacts and largest force (torque, of stops that turn) of each contact and run; NaN without clearance there."""
+    """Return impacts and largest force (torque for rotational stops) of each contact and run; NaN without clearance."""
     names = _contacts(runs)
     count, peak = (np.full((len(runs), len(names)), np.nan) for _ in range(2))
     for i, run in enumerate(runs.values()):
@@ -143,7 +143,7 @@ def _has(run: xr.Dataset, contact: str) -> bool:
 
 
 def table(compared: xr.Dataset) -> Table:
-    """Largest value, own error and largest difference from the reference, of each quantity and run."""
+    """Tabulate largest value, own error and largest difference from the reference, of each quantity and run."""
     labels = [str(label) for label in compared["run"].values]
     rows = []
     for j, name in enumerate(compared["quantity"].values):
@@ -173,7 +173,7 @@ def table(compared: xr.Dataset) -> Table:
 
 
 def costs(compared: xr.Dataset) -> Table:
-    """What each run took, and the impacts that it had."""
+    """Tabulate the costs and impacts of each run."""
     names = [str(name) for name in compared["contact"].values]
     columns = ("run", *COSTS.values(), *(f"{name}: impacts" for name in names), *(f"{n}: peak force" for n in names))
     rows = []
@@ -196,7 +196,7 @@ def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str
     if np.isinf(value):
         return "other number of impacts"
     error = float(compared["error"][run, quantity]) + float(compared["error"][0, quantity])
-    if np.isnan(error):  # of one of the two runs it is not known
+    if np.isnan(error):  # one of the two runs has no known error
         return in_unit(value, unit).replace(" ", " ± ? ", 1)
     return measured(value, error, unit)
 
@@ -211,9 +211,9 @@ def _whole(value: float) -> str:
     return "–" if np.isnan(value) else f"{value:,.0f}"
 
 
-#: of the runs, the reference first: distinguished by colour-blind readers, too
+#: colours of the runs, the reference first: distinguished by colour-blind readers, too
 COLORS = ("#111111", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-#: of models of one mechanism, by what they have next to the ideal one; the same as in the figures about the paper
+#: colours of the models of one mechanism by their effects; the same as in the figures about the paper
 IDEAL, CLEARANCE = "#111111", "#E69F00"
 MODES = {"free-free": "#0072B2", "fixed-fixed": "#D55E00", "craig-bampton": "#009E73"}
 #: opacity of a curve beyond the horizon of its run
@@ -221,7 +221,7 @@ PALE = 0.35
 
 
 def colors(runs: Mapping[str, xr.Dataset]) -> list[str]:
-    """A colour for each run: that of its model, where it is the first with that; else one that none has."""
+    """Return a colour for each run: that of its model if still free; else another free one."""
     chosen: list[str] = []
     for run in runs.values():
         parts = parameters(run)
@@ -233,13 +233,13 @@ def colors(runs: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> dict[str, bytes]:
-    """``name.png`` and ``name.svg``; runs: schema RUN by label, the reference first."""
+    """Draw ``name.png`` and ``name.svg``; runs: schema RUN by label, the reference first."""
     drawn = _panels(runs, chosen)
     with style.style():
         figure, axes = style.grid(len(drawn), 2, (11.0, 1.0 + 2.3 * len(drawn)), width_ratios=[1.5, 1.0])
         for row, (quantity, lines) in zip(axes, drawn, strict=True):
             _overlay(row[0], runs, lines)
-            _apart(row[1], runs, quantity, lines)
+            _distance(row[1], runs, quantity, lines)
         pale = "beyond the predictability horizon of a run"
         if any(float(run["horizon"]) < float(run["time"][-1]) for run in runs.values() if "horizon" in run):
             axes[0, 0].plot([], [], color=style.SOFT, alpha=PALE, label=pale)
@@ -252,7 +252,7 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
 
 
 def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[tuple[Quantity, list[Curve | None]]]:
-    """Each quantity with its curves; what a contact has several of is drawn once."""
+    """Return each quantity with its curves; quantities of a contact that share a curve are drawn once."""
     panels: dict[str, tuple[Quantity, list[Curve | None]]] = {}
     for quantity in chosen:
         mine = curves(list(runs.values()), quantity)
@@ -263,29 +263,29 @@ def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[
 
 
 def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[Curve | None]) -> None:
-    there = [curve for curve in lines if curve is not None]
-    factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in there), there[0].unit)
+    drawn = [curve for curve in lines if curve is not None]
+    factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in drawn), drawn[0].unit)
     own = colors(runs)
     for k, ((label, run), curve) in enumerate(zip(runs.items(), lines, strict=True)):
         if curve is None:
             continue
         color, last = own[k], _horizon(run)
         firm = curve.time <= last
-        # dashes over the others, so that none hides what lies below it
+        # dashes over the others, so that none hides another
         look: dict[str, Any] = {"color": color} | (
             {"lw": 1.2, "ls": (0, (5, 3)), "zorder": 2.5} if k == 0 else {"lw": 1.1}
         )
         axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
         axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
         axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
-    time = there[0].time
-    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)", title=f"{there[0].title} ({unit})")
+    time = drawn[0].time
+    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)", title=f"{drawn[0].title} ({unit})")
 
 
-def _apart(
+def _distance(
     axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity, curves_drawn: Sequence[Curve | None]
 ) -> None:
-    """Distance of the whole quantity, all its components, from the reference; of a force its difference."""
+    """Draw the distance of the whole quantity, all components, from the reference; for a force its difference."""
     (_, reference), *others = runs.items()
     lines: list[tuple[int, np.ndarray, np.ndarray]] = []
     for k, (_, run) in enumerate(others, start=1):

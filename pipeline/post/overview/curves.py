@@ -1,4 +1,4 @@
-"""Watched quantities as curves over time: one component, magnitude or angle of each, in a unit that reads well."""
+"""Watched quantities as curves over time: one component, magnitude or angle of each, in a readable unit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.numerics.rotations import Turning, first_largest, turning
 from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
 
-#: factor and unit of smaller and larger values, largest first
+#: factors and units for smaller and larger values, largest first
 PREFIXES = {
     "m": ((1.0, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm")),
     "m/s": ((1.0, "m/s"), (1e3, "mm/s"), (1e6, "µm/s")),
@@ -26,7 +26,7 @@ PREFIXES = {
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """What is drawn of a quantity in one run: `values` over `time` [s], in SI; `peaks` are (time, value) of impacts."""
+    """A drawn quantity of one run: `values` over `time` [s], in SI units; `peaks` are (time, value) of impacts."""
 
     title: str
     unit: str
@@ -36,19 +36,19 @@ class Curve:
 
 
 def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]:
-    """The curve of a quantity in each run; None where a run does not have it.
+    """Return the curve of a quantity in each run; None where a run lacks it.
 
-    A contact's quantities are drawn as its force; where the joint has no clearance, as the joint's.
+    Quantities of a contact are drawn as its force; where the joint has no clearance, as the joint's force.
     """
     if not quantity.over_time:
         return [_force(run, quantity.owner) for run in runs]
     if quantity.kind == "orientation":
         return [_turned(run, quantity) if quantities.has(run, quantity) else None for run in runs]
     lines = [quantities.series(run, quantity) if quantities.has(run, quantity) else None for run in runs]
-    there = [values for values in lines if values is not None]
+    present = [values for values in lines if values is not None]
     k, title = 0, _title(runs, quantity)
-    if _by_component(quantity) and there:
-        k = int(first_largest(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
+    if _by_component(quantity) and present:
+        k = int(first_largest(np.max([np.ptp(values, axis=0) for values in present], axis=0)))
         title += f" {'about' if quantity.kind.startswith('angular') else 'along'} {'xyz'[k]}"
     return [
         None
@@ -65,7 +65,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
 
 
 NONE = np.empty((0, 2))
-#: contacts are short that last less than so many outputs
+#: a contact is short below so many output intervals
 SHORT = 4.0
 
 
@@ -75,18 +75,18 @@ def _turned(run: xr.Dataset, quantity: Quantity) -> Curve:
 
 
 def turned_by(run: xr.Dataset, body: str) -> Turning:
-    """How far a body of a run has turned since the start."""
+    """Return the rotation of a body of a run since the start."""
     mine = run.sel(body=body)
     return turning(run["time"].values, mine["quaternion"].values, mine["angular_velocity"].values)
 
 
 def _by_component(quantity: Quantity) -> bool:
-    """Whether one component is drawn, that with the largest range; of other vectors the magnitude."""
+    """Return True when one component is drawn, that with the largest range; other vectors show the magnitude."""
     return quantity.dim == "axis" and KINDS[quantity.kind].owner in ("body", "frame")
 
 
 def _title(runs: Sequence[xr.Dataset], quantity: Quantity) -> str:
-    """What the quantity is called: what a drive supplies about an axis is a torque."""
+    """Return the title of a quantity; the force of a drive about an axis is called torque."""
     if quantity.steps or not quantity.owner:
         return quantity.name.replace("_", " ") if not quantity.steps else quantity.name
     turns = any(quantities.has(run, quantity) and quantities.unit(run, quantity) == "N m" for run in runs)
@@ -102,7 +102,7 @@ def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray
 
 
 def _noise(run: xr.Dataset, quantity: Quantity) -> float:
-    """What is rounding of such a quantity, by the ranges of all bodies along all axes; 0 of other kinds."""
+    """Return the range that rounding causes in a quantity, by the ranges of all bodies and axes; 0 for other kinds."""
     kind = KINDS[quantity.kind]
     return noise(run, run[kind.variable].values, quantity.unit) if kind.owner in ("body", "frame") else 0.0
 
@@ -120,7 +120,7 @@ def _force(run: xr.Dataset, joint: str) -> Curve | None:
 
 
 def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
-    """Time and largest force of each contact so short that outputs may miss it."""
+    """Return time and largest force of each contact so short that outputs may miss it."""
     mine = run["event_contact"].values == contact
     mine &= np.isfinite(run["event_peak_force"].values) & np.isfinite(run["event_duration"].values)
     mine &= run["event_duration"].values < SHORT * float(np.median(np.diff(run["time"].values)))
@@ -129,34 +129,33 @@ def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Factor and unit in which values up to `largest` [SI] have digits before the point."""
+    """Return factor and unit in which values up to `largest` [SI] have digits before the point."""
     choices = PREFIXES.get(unit, ((1.0, unit),))
-    good = [pair for pair in choices if pair[0] * largest >= 1.0 - 1e-9]  # a bar of 1 mm may be less by rounding
+    good = [pair for pair in choices if pair[0] * largest >= 1.0 - 1e-9]  # rounding may put a bar of 1 mm below 1
     return good[0] if good else choices[-1] if largest > 0.0 else choices[0]
 
 
 def size_of(unit: str) -> str:
-    """What fractions of the size of a quantity with this SI unit refer to (`quantities.scale`)."""
+    """Return the words for the size of a quantity with this SI unit, which fractions refer to (`quantities.scale`)."""
     return {"m": "largest change", "rad": "largest change", "s": "last impact's time"}.get(unit, "largest value")
 
 
 def rounded(value: float, digits: int) -> str:
-    """A number to so many significant digits; no exponent where up to seven digits before the point do without it."""
+    """Format a number to so many significant digits; without exponent up to seven digits before the point."""
     written = float(f"{value:.{digits}g}")
     return f"{written:.0f}" if 10.0**digits <= abs(written) < 1e7 else f"{value:.{digits}g}"
 
 
 def in_unit(value: float, unit: str, digits: int = 4) -> str:
-    """A value [SI] in a unit that reads well, to so many significant digits."""
+    """Format a value [SI] in a readable unit, to so many significant digits."""
     factor, written = scaled(value, unit)
     return f"{rounded(factor * value, digits)} {written}"
 
 
 def measured(value: float, error: float, unit: str) -> str:
-    """A value [SI] with its error, in a unit that reads well, to the second digit of the error.
+    """Format a value [SI] with its error, in a readable unit, to the second digit of the error.
 
-    The error is left out where it is nan; where it is far below the value's fourth digit, it does not set the
-    digits.
+    A nan error is left out; an error far below the value's fourth digit does not set the number of digits.
     """
     if np.isnan(error):
         return in_unit(value, unit)
@@ -171,34 +170,34 @@ def measured(value: float, error: float, unit: str) -> str:
     return f"{round(value, decimals):.{shown}f} ± {round(error, decimals):.{shown}f} {written}"
 
 
-#: a contact that is closed for so much of the time hardly opens: its force peaks without impacts
+#: a contact closed for this fraction of the time hardly opens: its force peaks without impacts
 CLOSED = 0.9
 #: rounding grows over a run, but stays below this fraction of the largest curve of its kind; integration errors do not
 NOISE = 1e-9
-#: and below these fractions of what the whole motion makes of it (`quantities.natural_size`); a stage may move by 1e-11
-#: of the crane that holds it, and stiff rods magnify the rounding of places into forces
+#: and below these fractions of the motion's natural size (`quantities.natural_size`); a stage may move by 1e-11 of the
+#: crane that holds it, and stiff rods magnify the rounding of positions into forces
 ROUNDING = {"m": 1e-13, "m/s": 1e-13, "N": 1e-11, "N m": 1e-11}
 
 
 def impacts(count: int, closed: float = 0.0) -> str:
-    """How many impacts, in words; closed: fraction of the time in contact."""
-    said = "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
-    return f"{said}; the contact hardly opens ({closed:.0%} of the time closed)" if closed >= CLOSED else said
+    """Return the number of impacts in words; closed: fraction of the time in contact."""
+    text = "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
+    return f"{text}; the contact hardly opens ({closed:.0%} of the time closed)" if closed >= CLOSED else text
 
 
 def noise(run: xr.Dataset, values: np.ndarray, unit: str) -> float:
-    """Largest range that is rounding, of a run's values of one kind over time, shape (time, ...) [SI unit]."""
+    """Return the largest range due to rounding in a run's values of one kind, shape (time, ...) [SI unit]."""
     largest = float(np.ptp(values, axis=0).max(initial=0.0))
     return max(NOISE * largest, ROUNDING[unit] * quantities.natural_size(run, unit) if unit in ROUNDING else 0.0)
 
 
 def without_noise(values: np.ndarray, noise: float) -> np.ndarray:
-    """The values, or their first one where they have no larger range than rounding gives them."""
+    """Return the values, or constant ones where their range is within rounding."""
     if values.size and float(np.ptp(values)) > noise:
         return values
     return np.full_like(values, 0.0 if not values.size or abs(values[0]) <= noise else values[0])
 
 
 def by_unit(values: Mapping[str, np.ndarray], unit: str) -> tuple[float, str]:
-    """`scaled` for several series that share an axis."""
+    """Return `scaled` for several series that share an axis."""
     return scaled(max((float(np.abs(v).max(initial=0.0)) for v in values.values()), default=0.0), unit)

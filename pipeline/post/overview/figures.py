@@ -27,11 +27,11 @@ from flexclear.pipeline.post.single_run.series import derive, parameters
 
 #: kinds of quantities that other figures show
 ELSEWHERE = ("position", "orientation", "velocity", "force", "drive_force", *OF_CONTACTS)
-#: most bodies, joints and contacts that are drawn; those that are watched come first, then those with most of it
+#: most bodies, joints and contacts that are drawn: watched ones first, then those with the largest values
 BODIES, JOINTS, CONTACTS = 6, 8, 4
 AXES_COLORS = {"x": "#D55E00", "y": "#009E73", "z": "#0072B2"}
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#111111", "#7d6b91")
-#: what is called energy in a run, and its label
+#: energies of a run, and their labels
 ENERGIES = {
     "kinetic": "kinetic",
     "potential": "potential",
@@ -40,16 +40,16 @@ ENERGIES = {
     "drive_work": "work of drives",
     "load_work": "work of loads",
 }
-#: what holds a pin, by type of joint; a ball is in a socket
+#: part that holds a pin, by type of joint; a ball is in a socket
 HOLDERS = {"clearance-revolute": "in its journal", "clearance-slot": "in its slot", "ball-on-plane": "over plane"}
-#: of an energy that is not drawn: its fraction of the largest one
+#: an energy below this fraction of the largest one is not drawn
 UNSEEN = 1e-6
 
 
 def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | None = None) -> dict[str, bytes]:
-    """PNG and SVG of the figures that this run has, by file name: motion, reactions, contacts, energy.
+    """Return PNG and SVG of the figures that this run has, by file name: motion, reactions, contacts, energy.
 
-    run: schema RUN.  watched: quantities whose owners are drawn first.  post: schema POST, made here when None.
+    run: schema RUN.  watched: quantities whose owners are drawn first.  post: schema POST, derived here when None.
     """
     require_complete(run)
     post = derive(run) if post is None else post
@@ -68,7 +68,7 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
 
 
 def _chosen(names: Sequence[str], first: Sequence[str], size: np.ndarray, most: int) -> list[int]:
-    """Indices of what is drawn: the watched ones, then those with the largest `size`."""
+    """Return indices of the drawn items: the watched ones, then those with the largest `size`."""
     order = sorted(range(len(names)), key=lambda k: (names[k] not in first, -size[k]))
     return order[:most]
 
@@ -77,7 +77,7 @@ def _rest(count: int, most: int) -> str:
     return f"; {most} of {count} are shown" if count > most else ""
 
 
-#: a panel over time: title, and by label its lines, of which each has values over time and how it is drawn
+#: a panel over time: title, and by label its lines, each with values over time and line properties
 Panel = tuple[str, Mapping[str, tuple[np.ndarray, dict[str, Any]]]]
 
 
@@ -92,9 +92,9 @@ def _sheet(
     legend: int = 0,
     **options: Any,
 ) -> dict[str, bytes]:
-    """``name.png`` and ``.svg`` of panels over time [s], row by row.
+    """Draw ``name.png`` and ``.svg`` of panels over time [s], row by row.
 
-    heading: title, and what is below it.  height: of a row (inches).  legend: columns of the one legend.
+    heading: title and subtitle.  height: of a row (inches).  legend: columns of the one legend.
     """
     figure, axes = style.panels(len(panels), columns, width, 0.9, height, sharex=True, **options)
     for panel, (title, lines) in zip(axes, panels, strict=True):
@@ -133,7 +133,7 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
 
 
 def _watched(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
-    """Watched quantities that none of the other figures has."""
+    """Draw watched quantities that no other figure shows."""
     others = [quantity for quantity in watched if quantity.component or quantity.kind not in ELSEWHERE]
     panels: list[Panel] = []
     for line in (line for quantity in others for line in curves([run], quantity) if line is not None):
@@ -144,7 +144,7 @@ def _watched(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
 
 
 def _without_noise(run: xr.Dataset, values: np.ndarray, unit: str) -> np.ndarray:
-    """Values (time, ...) without the columns that are rounding."""
+    """Return values (time, ...) with those columns constant that are rounding."""
     most = noise(run, values, unit)
     series = [without_noise(column, most) for column in values.reshape(len(values), -1).T]
     return np.array(series).T.reshape(values.shape)
@@ -168,7 +168,7 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
 
 
 def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
-    """Orbit, gap and force of each joint with clearance, the first named ones first; call it below `style.style`."""
+    """Draw orbit, gap and force of each joint with clearance, those in `first` first; call it within `style.style`."""
     names, joints = [str(name) for name in run["contact"].values], parameters(run).get("joint", {})
     chosen = _chosen(names, first, post["peak_force"].values, CONTACTS)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
@@ -188,7 +188,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         pushes = "normal force" if unit == "N" else "torque"
         _over_time(row[2], run, run["contact_normal_force"].values[:, k])
         row[2].set_title(f"{names[k]}: {pushes} ({unit})", pad=16)
-        # a line of its own: next to the title it would be cut off
+        # a separate line: next to the title it would be cut off
         closed = "" if "hardly" in count else f", {fraction:.0%} of the time in contact"
         text = f"{count}, peak {measured(peak, np.nan, unit)}{closed}"
         row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
@@ -205,18 +205,18 @@ def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str = "")
 def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[np.ndarray, np.ndarray]:
     """Draw the ball's (or pin's) centre in its socket, and return its two coordinates [mm].
 
-    The plane is the joint's own: of a pin x and y of its journal, of a slot the same, of a plane x and z; of a
-    ball the two axes of the socket along which the centre moves most.
+    The plane is the joint's own: for a pin or a slot x and y of the journal, for a plane x and z; for a ball the two
+    axes of the socket along which the centre moves most.
     """
     offset = 1e3 * _without_noise(run, run["contact_offset"].values[:, contact], "m")
     moving = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
     i, j = PLANES.get(_type(run, contact), moving)
     radius = 1e3 * clearance
-    if _type(run, contact) == "ball-on-plane":  # which has a floor and no socket
+    if _type(run, contact) == "ball-on-plane":  # it has a floor and no socket
         joint = parameters(run)["joint"][str(run["contact"].values[contact])]
         axes.axhline(1e3 * float(joint["ball_radius"]), color="#a8a8a8", lw=1.0)
         axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
-        axes.plot(offset[-1:, i], offset[-1:, j], "o", color="#009E73", ms=4)  # of a ball that stays where it is
+        axes.plot(offset[-1:, i], offset[-1:, j], "o", color="#009E73", ms=4)  # a ball that does not move
         axes.margins(y=0.15)
         axes.set(xlabel="xyz"[i], ylabel="xyz"[j], title=centre(run, contact))
         return offset[:, i], offset[:, j]
@@ -229,12 +229,12 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     return offset[:, i], offset[:, j]
 
 
-#: axes of the joint's frame in which the centre is drawn, by type of joint; of others those of the largest motion
+#: drawn axes of the joint's frame by type of joint; other joints show those of the largest motion
 PLANES = {"clearance-revolute": (0, 1), "clearance-slot": (0, 1), "ball-on-plane": (0, 2)}
 
 
 def centre(run: xr.Dataset, contact: int) -> str:
-    """Title of the picture of a ball or pin in what holds it."""
+    """Return the title of the picture of a ball or pin in the part that holds it."""
     return f"centre {HOLDERS.get(_type(run, contact), 'in its socket')} (mm)"
 
 
@@ -258,7 +258,7 @@ def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
 
 
 def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
-    """Load path over time, and depths over the angle about the axis; of spheres the deepest band."""
+    """Draw load path over time, and depths over the angle about the axis; for spheres those of the deepest band."""
     names = [str(name) for name in post["worn"].values][:CONTACTS]
     figure, axes = style.grid(len(names), 3, (11.0, 0.9 + 2.4 * len(names)))
     time = 1e3 * run["time"].values
@@ -279,16 +279,16 @@ def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
 
 
 def _energy(run: xr.Dataset) -> dict[str, bytes]:
-    there: dict[str, Any] = {label: run[name].values for name, label in ENERGIES.items() if name in run}
-    largest = max(float(np.abs(values - values[0]).max()) for values in there.values()) or 1.0
-    there = {label: v for label, v in there.items() if float(np.abs(v).max(initial=0.0)) > UNSEEN * largest}
-    factor, unit = by_unit(there, "J")
+    energies: dict[str, Any] = {label: run[name].values for name, label in ENERGIES.items() if name in run}
+    largest = max(float(np.abs(values - values[0]).max()) for values in energies.values()) or 1.0
+    energies = {label: v for label, v in energies.items() if float(np.abs(v).max(initial=0.0)) > UNSEEN * largest}
+    factor, unit = by_unit(energies, "J")
     error = run["energy_error"].values
     small, small_unit = by_unit({"": error}, "J")
-    colors = zip(COLORS, there.items(), strict=False)
+    colors = zip(COLORS, energies.items(), strict=False)
     panels: list[Panel] = [
         (f"energies ({unit})", {label: (factor * values, {"color": color}) for color, (label, values) in colors}),
         (f"error of the energy balance ({small_unit})", {"": (small * error, {"color": style.INK, "lw": 0.9})}),
     ]
-    legend = 6 if there else 0
+    legend = 6 if energies else 0
     return _sheet("energy", run["time"].values, panels, 2, ("Energy", ""), 2.4, legend=legend, width_ratios=[1.8, 1.0])

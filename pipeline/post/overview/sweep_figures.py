@@ -17,9 +17,9 @@ from flexclear.pipeline.post.plotting.style import INK, SOFT, files, heading, pa
 
 COLUMNS = 2
 LINE, REFUSED = "#0072B2", "#D55E00"
-#: a parameter whose largest value is so many times its least one is drawn on a logarithmic axis
+#: ratio of a parameter's largest to its least value above which its axis is logarithmic
 DECADE = 8.0
-#: factors that make the numbers of an axis handy
+#: factors for handy numbers on an axis
 HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
 NAME = "sweep"
 #: fraction of the largest component of a vector below which another one is zero but for rounding
@@ -27,9 +27,9 @@ ZERO = 1e-9
 
 
 def figures(sweep: xr.Dataset) -> dict[str, bytes]:
-    """``sweep.png`` and ``.svg``; nothing for sweeps with more dimensions than paper has, text along them, no point."""
+    """Draw ``sweep.png`` and ``.svg``; none for too many dimensions, for text parameters alone, or without points."""
     parameters = [str(name) for name in sweep["status"].dims]
-    # values may stand in any order in a sweep; along an axis they go up
+    # values may have any order in a sweep; along an axis they go up
     sweep = sweep.sortby([name for name in parameters if name in sweep.coords and sweep[name].dtype.kind in "fiu"])
     draw = _drawn(sweep, parameters)
     shown = _panels(sweep, sections=draw is _curve)
@@ -53,13 +53,13 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
         return files(NAME, figure)
 
 
-#: what the band about a curve is, by the variable that it is drawn from
+#: meaning of the band about a curve, by its variable
 BANDS = {".deviation": "bands: ± the members' standard deviation", ".error": "bands: ± the error of time integration"}
 Draw = Callable[[Figure, Axes, xr.Dataset, str], None]
 
 
 def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
-    """By the name of each panel, the sweep with what it shows as a variable of that name.
+    """Return the sweep by panel, with the panel's values as a variable of that name.
 
     One number for each point or section; vectors component by component.  Series are left to the user's own figures.
     """
@@ -78,19 +78,19 @@ def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
 
 
 def _moving(vector: xr.DataArray) -> list[str]:
-    """Components that are not zero at all points, but for rounding; all of them where nothing moves."""
+    """Return components that are not zero at all points, but for rounding; all of them where nothing moves."""
     sizes = abs(vector).max([dim for dim in vector.dims if dim != "axis"])
     axes = [str(axis) for axis in vector["axis"].values[(sizes > ZERO * sizes.max()).values]]
     return axes or list(map(str, vector["axis"].values))
 
 
 def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
-    """What is said of components without a panel."""
+    """Return sentences on components without a panel."""
     constant = []
     for name in map(str, sweep.data_vars):
-        there = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
-        if there:
-            away = [str(axis) for axis in sweep["axis"].values if axis not in there]
+        drawn = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
+        if drawn:
+            away = [str(axis) for axis in sweep["axis"].values if axis not in drawn]
             constant += [f"{' and '.join(away)} of {name} {'are' if len(away) > 1 else 'is'} 0"] if away else []
     return constant
 
@@ -109,13 +109,13 @@ def _drawn(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
 
 
 def _coordinates(sweep: xr.Dataset) -> list[str]:
-    """Numeric parameters of points, in the order of the sweep."""
+    """Return the numeric parameters of points, in the order of the sweep."""
     own = [str(name) for name in sweep.coords if sweep[name].dims == ("point",)]
     return [name for name in own if sweep[name].dtype.kind in "fiu"]
 
 
 def _walks(sweep: xr.Dataset, names: list[str]) -> bool:
-    """Whether all parameters go up, or down, together from point to point: then one of them determines the others."""
+    """Return True when all parameters rise, or fall, from point to point: then one determines the others."""
     steps = [np.diff(sweep[name].values) for name in names]
     return all(bool((step > 0).all() or (step < 0).all()) for step in steps)
 
@@ -141,7 +141,7 @@ def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 
 def _family(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
-    """A curve for each value that is text."""
+    """Draw a curve for each value that is text."""
     text, numeric = sorted((str(dim) for dim in sweep["status"].dims), key=lambda dim: sweep[dim].dtype.kind in "fiu")
     x = sweep[numeric].values * _scale(sweep, numeric)[0]
     for value in sweep[text].values:
@@ -167,7 +167,7 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 
 def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
-    """Values by the first parameter, coloured by the second; mean and 5 % and 95 % quantiles as lines."""
+    """Draw values by the first parameter, coloured by the second; mean and 5 % and 95 % quantiles as lines."""
     first, second = _coordinates(sweep)[:2]
     y, scale = sweep[name].values, _scale(sweep, second)[0]
     points = ax.scatter(
@@ -198,7 +198,7 @@ def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:
 
 
 def _written(units: str) -> str:
-    """Units of a dataset as one writes them: ``m/s`` of ``m s-1``, nothing of ``1``."""
+    """Return the units of a dataset in common notation: ``m/s`` for ``m s-1``, nothing for ``1``."""
     parts = [] if units == "1" else units.split()
     over, under = ([p for p in parts if ("-" in p) == below] for below in (False, True))
     powers = re.compile(r"(?<=[A-Za-z])-?(\d+)")

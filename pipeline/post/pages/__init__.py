@@ -1,4 +1,4 @@
-"""Self-contained pages: style, scripts, pictures, films and the viewer are inside, so that one file can be sent."""
+"""Self-contained pages: style, scripts, pictures, films and viewer are inside, so that one file can be sent."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from typing import Any
 
 
 def asset(name: str) -> str:
-    """Text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``."""
+    """Return the text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``."""
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
 def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:
-    """A view that can be turned, as a figure; the page needs its script.
+    """Return an interactive view as a figure; the page needs the viewer's script.
 
-    content: what `pipeline.post.render.player` makes.  play: whether it moves at once, unless the system asks for rest.
+    content: from `pipeline.post.render.player`.  play: start the motion, unless the system asks for rest.
     """
     moving = "shapes" not in content
     still = moving and len(content["times"]) < 2
@@ -42,7 +42,7 @@ def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:
         tools.append("<span class='viewer-scale'>0 <i></i> <span></span></span>")
     tools.append("<button type='button' data-part='home'>Reset view</button>")
     label = f"{caption}: drag or arrow keys turn, plus and minus zoom, space plays"
-    # a closing tag inside of the data would end the script
+    # a closing tag in the data would end the script
     data = json.dumps(content, separators=(",", ":")).replace("</", "<\\/")
     return (
         f"<figure><figcaption>{html.escape(caption)}</figcaption>"
@@ -55,7 +55,7 @@ def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:
 
 
 def figures_of(page: str) -> str:
-    """The views of a page of this program, to be put into another one."""
+    """Return the views of a page of this program, as parts of another page."""
     return "".join(
         re.findall(r"<figure><figcaption>[^<]*</figcaption><div class='viewer'.*?</figure>\n", page, re.DOTALL)
     )
@@ -82,9 +82,9 @@ class Part:
 
 
 def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> bytes:
-    """The page with those parts that are not empty, all inside: it asks nobody for anything.
+    """Return the page with all parts that are not empty; it loads nothing from elsewhere.
 
-    answer: HTML of what is said first.
+    answer: HTML at the top.
     """
     shown = [part for part in parts if part.body]
     body = "".join(
@@ -94,7 +94,7 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
     )
     links = "".join(f"<li><a href='#{part.key}'>{html.escape(part.heading)}</a></li>" for part in shown)
     contents = f"<nav aria-label='Contents'><ul>{links}</ul></nav>\n" if len(shown) > 1 else ""
-    said = f"<div class='answer'>{answer}</div>\n" if answer else ""
+    top = f"<div class='answer'>{answer}</div>\n" if answer else ""
     below = f"<p class='lead'>{html.escape(lead)}</p>\n" if lead else ""
     scripts = [asset("page.js")] + ([asset("viewer.js")] if "class='viewer'" in body else [])
     text = (
@@ -102,23 +102,23 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
         "<meta name='viewport' content='width=device-width, initial-scale=1'><link rel='icon' href='data:,'>"
         f"<title>{html.escape(title)}</title><style>{asset('page.css')}</style></head>\n<body>"
         f"<a class='skip' href='#main'>To the content</a><main id='main'><h1>{html.escape(title)}</h1>\n"
-        f"{below}{said}{contents}{body}</main>{''.join(f'<script>{text}</script>' for text in scripts)}</body></html>\n"
+        f"{below}{top}{contents}{body}</main>{''.join(f'<script>{text}</script>' for text in scripts)}</body></html>\n"
     )
     return text.encode()
 
 
 def viewer_page(title: str, views: Sequence[str], below: str = "") -> bytes:
-    """A page with views that can be turned (`pipeline.post.pages.viewer`), and what is below them as HTML."""
+    """Return a page with interactive views (`pipeline.post.pages.viewer`), and HTML below them."""
     return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", in_columns(views) + below)])
 
 
 def in_columns(figures: Sequence[str]) -> str:
-    """Figures next to each other where there is room for that."""
+    """Return figures in columns where the screen is wide enough."""
     return "".join(figures) if len(figures) < 2 else f"<div class='side-by-side'>{''.join(figures)}</div>\n"
 
 
 def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
-    """A picture or film, inside of the page; alt: what it shows, where the caption does not say it all."""
+    """Return a picture or film as part of the page; alt: its description, where the caption is not enough."""
     kind = TYPES[name.rpartition(".")[2]]
     data = f"data:{kind};base64,{base64.b64encode(content).decode()}"
     alt_text = html.escape(alt or caption, quote=True)
@@ -132,7 +132,7 @@ def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
 
 
 def prose(heads: Sequence[str], rows: Collection[Sequence[str]]) -> str:
-    """A table of sentences, with `backticks` as code; empty without rows."""
+    """Return a table of sentences, with `backticks` as code; empty without rows."""
     if not rows:
         return ""
     head = "".join(f"<th scope='col'>{html.escape(text)}</th>" for text in heads)
@@ -142,7 +142,7 @@ def prose(heads: Sequence[str], rows: Collection[Sequence[str]]) -> str:
 
 
 def downloads(files: Mapping[str, bytes]) -> str:
-    """Small files that a reader can take out of the page, by name."""
+    """Return links that save small files from the page, by name."""
     if not files:
         return ""
     kinds = {"csv": "text/csv", "toml": "text/plain", "bib": "text/plain", "md": "text/markdown"}
@@ -155,7 +155,7 @@ def downloads(files: Mapping[str, bytes]) -> str:
 
 
 def in_folder(page: bytes) -> dict[str, bytes]:
-    """The same page as ``index.html`` with its pictures and films as files next to it, by name."""
+    """Return a page as ``index.html`` with its pictures and films as files next to it, by name."""
     files: dict[str, bytes] = {}
     suffix = {kind: name for name, kind in TYPES.items()}
 
@@ -170,5 +170,5 @@ def in_folder(page: bytes) -> dict[str, bytes]:
 
 
 def _code(text: str) -> str:
-    """Escaped, with `backticks` as code."""
+    """Escape a text for HTML, with `backticks` as code."""
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))

@@ -1,5 +1,5 @@
 "use strict";
-// Tables sort by a click on their heads; numbers as numbers, whatever unit or error stands behind them.
+// Tables sort by a click on their heads; numbers as numbers, with any unit or error after them.
 (() => {
   const value = (cell) => {
     const text = cell.textContent.trim().replace(/,(?=\d{3})/g, "").replace(/\u2212/g, "-");

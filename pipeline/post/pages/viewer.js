@@ -4,12 +4,12 @@
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const floats = (text) => new Float32Array(bytes(text).buffer);
   const wholes = (text) => new Uint32Array(bytes(text).buffer);
-  // numbers kept as 16 bits between -1 and 1, times their largest
+  // numbers stored as 16 bits between -1 and 1, times the largest number
   const scaled = ({ data, largest }) => Float32Array.from(new Int16Array(bytes(data).buffer), (v) => (v / 32767) * largest);
 
   const VERTEX = `
-    attribute vec3 place, normal, tint; uniform mat4 model, view; uniform mat4 lens; varying vec3 n, c, p;
-    void main() { vec4 at = view * model * vec4(place, 1.0); p = at.xyz; n = mat3(view) * mat3(model) * normal; c = tint;
+    attribute vec3 position, normal, tint; uniform mat4 model, view; uniform mat4 lens; varying vec3 n, c, p;
+    void main() { vec4 at = view * model * vec4(position, 1.0); p = at.xyz; n = mat3(view) * mat3(model) * normal; c = tint;
       gl_Position = lens * at; }`;
   const FRAGMENT = `
     precision mediump float; varying vec3 n, c, p; uniform float opacity;
@@ -17,11 +17,11 @@
       float light = 0.42 + 0.5 * max(dot(m, normalize(vec3(-0.35, 0.65, 0.68))), 0.0)
         + 0.18 * max(dot(m, normalize(vec3(0.8, -0.1, 0.4))), 0.0);
       gl_FragColor = vec4(c * min(light, 1.08), opacity); }`;
-  // viridis at nine places, from dark to bright
+  // viridis at nine values, from dark to bright
   const SCALE = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99],
     [170, 220, 50], [253, 231, 37]].map((c) => c.map((v) => v / 255));
-  const colour = (share) => {
-    const at = Math.min(Math.max(share, 0), 1) * (SCALE.length - 1), k = Math.min(Math.floor(at), SCALE.length - 2);
+  const colour = (fraction) => {
+    const at = Math.min(Math.max(fraction, 0), 1) * (SCALE.length - 1), k = Math.min(Math.floor(at), SCALE.length - 2);
     return [0, 1, 2].map((i) => SCALE[k][i] + (at - k) * (SCALE[k + 1][i] - SCALE[k][i]));
   };
   const hex = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16) / 255);
@@ -45,7 +45,7 @@
   class Viewer {
     constructor(root) {
       this.root = root;
-      this.told = JSON.parse(root.querySelector("script").textContent);
+      this.data = JSON.parse(root.querySelector("script").textContent);
       this.canvas = root.querySelector("canvas");
       this.gl = this.canvas.getContext("webgl", { antialias: true, alpha: true, preserveDrawingBuffer: true });
       if (!this.gl) {
@@ -55,11 +55,11 @@
       this.part = (name) => root.querySelector(`[data-part=${name}]`);
       this.frame = 0; this.phase = 0; this.playing = false; this.shape = 0; this.factor = 1;
       this.ruler = root.querySelector(".viewer-ruler"); this.names = root.querySelector(".viewer-names");
-      this.labels = (this.told.labels || []).map((told) => {
+      this.labels = (this.data.labels || []).map((label) => {
         const text = document.createElement("span"), detail = document.createElement("small");
-        text.textContent = told.text; detail.textContent = ` ${told.detail}`; text.style.color = told.color;
+        text.textContent = label.text; detail.textContent = ` ${label.detail}`; text.style.color = label.color;
         text.append(detail); this.names.append(text);
-        return { ...told, text };
+        return { ...label, text };
       });
       this.home();
       this.build();
@@ -70,7 +70,7 @@
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       if (!still && root.dataset.play === "yes") this.play(true);
     }
-    home() { this.eye = this.told.eye.slice(); this.focus = this.told.focus.slice(); this.up = unit(this.told.up); }
+    home() { this.eye = this.data.eye.slice(); this.focus = this.data.focus.slice(); this.up = unit(this.data.up); }
     build() {
       const gl = this.gl, program = gl.createProgram();
       for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
@@ -79,31 +79,31 @@
       }
       gl.linkProgram(program); gl.useProgram(program); gl.getExtension("OES_element_index_uint");
       gl.enable(gl.DEPTH_TEST); gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      this.at = Object.fromEntries(["place", "normal", "tint"].map((n) => [n, gl.getAttribLocation(program, n)]));
+      this.at = Object.fromEntries(["position", "normal", "tint"].map((n) => [n, gl.getAttribLocation(program, n)]));
       this.in = Object.fromEntries(["model", "view", "lens", "opacity"].map((n) => [n, gl.getUniformLocation(program, n)]));
       Object.values(this.at).forEach((k) => gl.enableVertexAttribArray(k));
-      this.tracks = (this.told.tracks || []).map(floats);
-      this.meshes = this.told.meshes.map((told) => this.mesh(told));
-      this.meshes.sort((a, b) => b.opacity - a.opacity); // what is seen through comes last
+      this.tracks = (this.data.tracks || []).map(floats);
+      this.meshes = this.data.meshes.map((data) => this.mesh(data));
+      this.meshes.sort((a, b) => b.opacity - a.opacity); // translucent meshes are drawn last
     }
-    mesh(told) {
-      const gl = this.gl, place = floats(told.points), index = wholes(told.triangles), tint = new Float32Array(place.length);
-      const base = hex(told.color);
+    mesh(data) {
+      const gl = this.gl, points = floats(data.points), index = wholes(data.triangles), tint = new Float32Array(points.length);
+      const base = hex(data.color);
       for (let k = 0; k < tint.length; k++) tint[k] = base[k % 3];
-      const mesh = { ...told, base, place, index, tint, now: place.slice(), normal: told.normals ? floats(told.normals) : new Float32Array(place.length) };
-      mesh.fields = (told.fields || []).map(scaled);
-      mesh.weights = told.weights ? floats(told.weights) : null;
-      mesh.levels = told.levels ? bytes(told.levels) : null;
-      mesh.buffers = Object.fromEntries(["place", "normal", "tint"].map((n) => [n, gl.createBuffer()]));
+      const mesh = { ...data, base, points, index, tint, now: points.slice(), normal: data.normals ? floats(data.normals) : new Float32Array(points.length) };
+      mesh.fields = (data.fields || []).map(scaled);
+      mesh.weights = data.weights ? floats(data.weights) : null;
+      mesh.levels = data.levels ? bytes(data.levels) : null;
+      mesh.buffers = Object.fromEntries(["position", "normal", "tint"].map((n) => [n, gl.createBuffer()]));
       mesh.order = gl.createBuffer();
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.order); gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
-      if (!told.normals) this.normals(mesh);
+      if (!data.normals) this.normals(mesh);
       this.fill(mesh);
       return mesh;
     }
     fill(mesh) {
       const gl = this.gl;
-      for (const [name, data] of [["place", mesh.now], ["normal", mesh.normal], ["tint", mesh.tint]]) {
+      for (const [name, data] of [["position", mesh.now], ["normal", mesh.normal], ["tint", mesh.tint]]) {
         gl.bindBuffer(gl.ARRAY_BUFFER, mesh.buffers[name]); gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
       }
     }
@@ -116,51 +116,51 @@
         for (const at of [a, b, c]) for (let i = 0; i < 3; i++) n[at + i] += w[i];
       }
     }
-    // points = rest + sum of fields times weights; colours show levels, or how far each point has moved
+    // now = points + sum of fields times weights; colours show levels, or the displacement of each point
     bend(mesh, weights, factor, largest) {
-      const { place, now, fields, tint } = mesh;
-      now.set(place);
+      const { points, now, fields, tint } = mesh;
+      now.set(points);
       fields.forEach((field, k) => {
         const w = factor * weights[k];
         if (w) for (let i = 0; i < now.length; i++) now[i] += w * field[i];
       });
-      const points = now.length / 3, first = this.frame * points;
-      if (mesh.levels) for (let i = 0; i < points; i++) tint.set(colour(mesh.levels[first + i] / 255), 3 * i);
+      const count = now.length / 3, first = this.frame * count;
+      if (mesh.levels) for (let i = 0; i < count; i++) tint.set(colour(mesh.levels[first + i] / 255), 3 * i);
       else if (largest > 0 && !mesh.plain) for (let i = 0; i < now.length; i += 3) {
-        const size = Math.hypot(now[i] - place[i], now[i + 1] - place[i + 1], now[i + 2] - place[i + 2]);
+        const size = Math.hypot(now[i] - points[i], now[i + 1] - points[i + 1], now[i + 2] - points[i + 2]);
         tint.set(colour(size / (factor * largest)), i);
       }
       this.normals(mesh);
       this.fill(mesh);
     }
     update() {
-      const told = this.told;
+      const data = this.data;
       for (const mesh of this.meshes) {
         if (!mesh.fields.length) continue;
-        if (told.shapes) {
-          const shape = told.shapes[this.shape], w = new Float32Array(mesh.fields.length), [re, im] = shape.fields;
+        if (data.shapes) {
+          const shape = data.shapes[this.shape], w = new Float32Array(mesh.fields.length), [re, im] = shape.fields;
           w[re] = Math.cos(this.phase); if (im !== null) w[im] = -Math.sin(this.phase);
           this.bend(mesh, w, this.factor * shape.scale, shape.largest);
         } else {
           const m = mesh.fields.length;
-          this.bend(mesh, mesh.weights.subarray(this.frame * m, this.frame * m + m), this.factor * told.exaggeration, mesh.largest);
+          this.bend(mesh, mesh.weights.subarray(this.frame * m, this.frame * m + m), this.factor * data.exaggeration, mesh.largest);
         }
       }
-      this.say();
+      this.report();
       this.draw();
     }
-    say() {
-      const told = this.told, state = this.root.querySelector(".viewer-state");
-      if (told.shapes) {
-        const shape = told.shapes[this.shape];
-        state.textContent = `${shape.label}; drawn with its coordinate at ${shown(this.factor * shape.scale * told.unit)}`;
-      } else if (told.state !== undefined) {
-        state.textContent = told.state;
+    report() {
+      const data = this.data, state = this.root.querySelector(".viewer-state");
+      if (data.shapes) {
+        const shape = data.shapes[this.shape];
+        state.textContent = `${shape.label}; drawn with its coordinate at ${shown(this.factor * shape.scale * data.unit)}`;
+      } else if (data.state !== undefined) {
+        state.textContent = data.state;
       } else {
         const bent = this.meshes.some((mesh) => mesh.fields.length);
-        state.textContent = `t = ${(1e3 * told.times[this.frame]).toFixed(2)} ms`
-          + (bent ? `, deformation ${shown(this.factor * told.exaggeration)} times larger` : "")
-          + (told.readings || []).map((r) => `, ${r.label} ${shown(r.values[this.frame])} ${r.unit}`).join("");
+        state.textContent = `t = ${(1e3 * data.times[this.frame]).toFixed(2)} ms`
+          + (bent ? `, deformation ${shown(this.factor * data.exaggeration)} times larger` : "")
+          + (data.readings || []).map((r) => `, ${r.label} ${shown(r.values[this.frame])} ${r.unit}`).join("");
       }
     }
     draw() {
@@ -170,8 +170,8 @@
       gl.viewport(0, 0, width, height); gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       const back = minus(this.eye, this.focus), far = Math.hypot(...back), z = unit(back), x = unit(cross(this.up, z)), y = cross(z, x);
       const view = [x[0], y[0], z[0], 0, x[1], y[1], z[1], 0, x[2], y[2], z[2], 0, -dot(x, this.eye), -dot(y, this.eye), -dot(z, this.eye), 1];
-      // all that is shown fits, whether the picture is narrow or wide
-      const [across, upright] = this.told.reach, near = 0.02 * far, end = 6 * far;
+      // everything fits, in narrow and in wide pictures
+      const [across, upright] = this.data.reach, near = 0.02 * far, end = 6 * far;
       const f = 0.93 * Math.min(1 / upright, width / height / across);
       const lens = [f * height / width, 0, 0, 0, 0, f, 0, 0, 0, 0, (end + near) / (near - end), -1, 0, 0, 2 * end * near / (near - end), 0];
       gl.uniformMatrix4fv(this.in.view, false, view); gl.uniformMatrix4fv(this.in.lens, false, lens);
@@ -192,7 +192,7 @@
         return [0.5 * wide + 0.5 * f * high * dot(x, p) / depth, 0.5 * high - 0.5 * f * high * dot(y, p) / depth];
       }, wide, high);
     }
-    // the bar: a round length in the plane of the point that is looked at, which is so many pixels long
+    // the bar: a round length in the plane through the focus, where a metre has so many pixels
     measure(pixels) {
       if (!this.ruler) return;
       const most = 120 / pixels, ten = 10 ** Math.floor(Math.log10(most)), metres = ten * [5, 2, 1].find((k) => k * ten <= most);
@@ -200,7 +200,7 @@
       this.ruler.querySelector("i").style.width = `${metres * pixels}px`;
       this.ruler.querySelector("span").textContent = `${shown(metres / size)} ${unit}`;
     }
-    // names at their points, moved up or down where there is one already; those without room wait until it is closer
+    // names at their points, moved up or down where another name is; names without space are hidden until one zooms in
     label(project, wide, high) {
       const taken = [], off = this.part("names") && !this.part("names").checked;
       for (const { at, text } of this.labels) {
@@ -216,18 +216,18 @@
     turn(across, upwards) {
       const back = minus(this.eye, this.focus), side = unit(cross(this.up, back));
       const tilted = turned(back, side, upwards), lean = Math.abs(dot(unit(tilted), this.up));
-      const kept = turned(lean < 0.995 ? tilted : back, this.up, across);
-      this.eye = this.focus.map((v, k) => v + kept[k]);
+      const moved = turned(lean < 0.995 ? tilted : back, this.up, across);
+      this.eye = this.focus.map((v, k) => v + moved[k]);
       this.draw();
     }
     zoom(factor) { this.eye = this.focus.map((v, k) => v + factor * (this.eye[k] - v)); this.draw(); }
     choose(k) {
       this.shape = k; this.phase = 0;
-      const told = this.told, bar = this.root.querySelector(".viewer-scale");
+      const data = this.data, bar = this.root.querySelector(".viewer-scale");
       const bent = this.meshes.find((mesh) => mesh.fields.length && !mesh.plain);
       if (bar) {
         bar.hidden = !bent;
-        bar.querySelector("span").textContent = told.shapes ? "largest displacement" : bent && bent.top ? bent.top : `${shown(1e6 * (bent ? bent.largest : 0))} µm`;
+        bar.querySelector("span").textContent = data.shapes ? "largest displacement" : bent && bent.top ? bent.top : `${shown(1e6 * (bent ? bent.largest : 0))} µm`;
       }
       this.update();
     }
@@ -242,28 +242,28 @@
       if (!this.playing) return;
       const passed = this.last === null ? 0 : Math.min((now - this.last) / 1e3, 0.1);
       this.last = now;
-      if (this.told.shapes) this.phase += 2 * Math.PI * 0.7 * passed;
+      if (this.data.shapes) this.phase += 2 * Math.PI * 0.7 * passed;
       else {
-        this.way = ((this.way || this.frame) + this.told.rate * passed) % this.told.times.length;
-        this.frame = Math.floor(this.way);
+        this.progress = ((this.progress || this.frame) + this.data.rate * passed) % this.data.times.length;
+        this.frame = Math.floor(this.progress);
         this.part("time").value = this.frame;
       }
       this.update();
       requestAnimationFrame((next) => this.tick(next));
     }
     listen() {
-      const canvas = this.canvas, held = new Map();
-      canvas.addEventListener("pointerdown", (e) => { canvas.setPointerCapture(e.pointerId); held.set(e.pointerId, [e.clientX, e.clientY]); });
-      for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (e) => held.delete(e.pointerId));
+      const canvas = this.canvas, pointers = new Map();
+      canvas.addEventListener("pointerdown", (e) => { canvas.setPointerCapture(e.pointerId); pointers.set(e.pointerId, [e.clientX, e.clientY]); });
+      for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (e) => pointers.delete(e.pointerId));
       canvas.addEventListener("pointermove", (e) => {
-        const from = held.get(e.pointerId);
+        const from = pointers.get(e.pointerId);
         if (!from) return;
-        const others = [...held].filter(([id]) => id !== e.pointerId).map(([, at]) => at);
+        const others = [...pointers].filter(([id]) => id !== e.pointerId).map(([, at]) => at);
         if (others.length) {
-          const apart = (at) => Math.hypot(at[0] - others[0][0], at[1] - others[0][1]) || 1;
-          this.zoom(apart(from) / apart([e.clientX, e.clientY]));
+          const distance = (at) => Math.hypot(at[0] - others[0][0], at[1] - others[0][1]) || 1;
+          this.zoom(distance(from) / distance([e.clientX, e.clientY]));
         } else this.turn(-0.008 * (e.clientX - from[0]), -0.008 * (e.clientY - from[1]));
-        held.set(e.pointerId, [e.clientX, e.clientY]);
+        pointers.set(e.pointerId, [e.clientX, e.clientY]);
       });
       canvas.addEventListener("wheel", (e) => { if (!e.ctrlKey && !e.shiftKey && document.activeElement !== canvas) return;
         e.preventDefault(); this.zoom(Math.exp(0.0012 * e.deltaY)); }, { passive: false });
@@ -275,7 +275,7 @@
       const on = (name, event, act) => { const part = this.part(name); if (part) part.addEventListener(event, () => act(part)); };
       on("play", "click", () => this.play(!this.playing));
       on("home", "click", () => { this.home(); this.draw(); });
-      on("time", "input", (part) => { this.play(false); this.frame = this.way = Number(part.value); this.update(); });
+      on("time", "input", (part) => { this.play(false); this.frame = this.progress = Number(part.value); this.update(); });
       on("names", "change", () => this.draw());
       on("shape", "change", (part) => this.choose(Number(part.value)));
       on("factor", "input", (part) => { this.factor = 10 ** Number(part.value); this.update(); });

@@ -1,1 +1,1 @@
-"""How plots and tables look, and their deterministic bytes."""
+"""Look of plots and tables, and their deterministic bytes."""

@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from flexclear.pipeline.post.plotting.style import INK
 from flexclear.pipeline.post.shapes.body_shape import circle
 
-#: direction of the light, seen by the observer: from above his left shoulder
+#: direction to the light in the observer's axes: from above the left shoulder
 LIGHT = np.array([-0.35, 0.65, 0.68])
 AMBIENT = 0.45
 
@@ -26,16 +26,16 @@ class View:
     axes: np.ndarray
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Places on the paper of points (..., 3), shape (..., 2)."""
+        """Return the positions on the paper of points (..., 3), shape (..., 2)."""
         return points @ self.axes[:2].T
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """How near points are to the observer, shape (...)."""
+        """Return the coordinate of points towards the observer, shape (...)."""
         return points @ self.axes[2]
 
 
 def view(towards: np.ndarray, up: np.ndarray) -> View:
-    """The view of an observer in direction `towards`; `up` is upwards on the paper."""
+    """Return the view of an observer in direction `towards`; `up` is upwards on the paper."""
     towards_eye = towards / np.linalg.norm(towards)
     right = np.cross(up, towards_eye)
     right /= np.linalg.norm(right)
@@ -43,21 +43,21 @@ def view(towards: np.ndarray, up: np.ndarray) -> View:
 
 
 def shell(
-    axes: Axes, seen: View, rings: np.ndarray, values: np.ndarray | None, color: str = "#9aa5b1", **look: Any
+    axes: Axes, camera: View, rings: np.ndarray, values: np.ndarray | None, color: str = "#9aa5b1", **look: Any
 ) -> None:
-    """A closed tube of rings (ring, around, 3), the last point of each its first.
+    """Draw a closed tube of rings (ring, around, 3), whose first and last points coincide.
 
     values: one per ring in [0, 1], drawn as colours; without them the tube has one colour.
     """
     index = np.arange(rings[..., 0].size).reshape(rings.shape[:2])
     faces = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
     shades = None if values is None else np.repeat(values, rings.shape[1])
-    skin(axes, seen, rings.reshape(-1, 3), faces, shades, color, closed=True, **look)
+    skin(axes, camera, rings.reshape(-1, 3), faces, shades, color, closed=True, **look)
 
 
 def skin(
     axes: Axes,
-    seen: View,
+    camera: View,
     points: np.ndarray,
     faces: np.ndarray,
     values: np.ndarray | None,
@@ -66,39 +66,39 @@ def skin(
     closed: bool = False,
     **look: Any,
 ) -> None:
-    """Faces (m, corners) between points (n, 3), the near ones before the far ones.
+    """Draw faces (m, corners) between points (n, 3), the near ones over the far ones.
 
-    values: one per point in [0, 1], drawn as colours.  closed: whether all faces run round the same way, so that those
-    behind are left out; else either side of a face may be the outer one.
+    values: one per point in [0, 1], drawn as colours.  closed: True when all faces have the same orientation, so that
+    those at the back are left out; else either side of a face may be the outer one.
     """
     corners = points[faces]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])
     size = np.linalg.norm(normal, axis=1)
     volume = float(np.sum((corners.mean(axis=1) - points.mean(axis=0)) * normal))
-    outward = normal / np.where(size > 0.0, size, 1.0)[:, None] @ seen.axes.T * (1.0 if volume >= 0.0 else -1.0)
+    outward = normal / np.where(size > 0.0, size, 1.0)[:, None] @ camera.axes.T * (1.0 if volume >= 0.0 else -1.0)
     shown = (size > 0.0) & (outward[:, 2] > 0.0 if closed else True)
     light = LIGHT / np.linalg.norm(LIGHT)
     lit = outward[shown] @ light if closed else np.abs(outward[shown]) @ np.abs(light)
     corners, faces = corners[shown], faces[shown]
     base = np.array(to_rgb(color)) if values is None else colormaps["viridis"](values[faces].mean(axis=1))[:, :3]
     colors = np.clip(base * (AMBIENT + (1.0 - AMBIENT) * np.clip(lit, 0.0, 1.0))[:, None], 0.0, 1.0)
-    order = np.argsort(seen.depth(corners).mean(axis=1), kind="stable")
+    order = np.argsort(camera.depth(corners).mean(axis=1), kind="stable")
     # edges of the faces' own colour close the gaps between them, but would show through where they are translucent
     edges = {"edgecolors": colors[order], "lw": 0.3} if "alpha" not in look else {"edgecolors": "none"}
-    axes.add_collection(PolyCollection(list(seen.project(corners)[order]), facecolors=colors[order], **edges, **look))
+    axes.add_collection(PolyCollection(list(camera.project(corners)[order]), facecolors=colors[order], **edges, **look))
 
 
 def tube(start: np.ndarray, end: np.ndarray, radius: float, around: int = 24) -> np.ndarray:
-    """Rings of a straight round bar with flat ends, for `shell`, shape (4, around + 1, 3)."""
+    """Return the rings of a straight round bar with flat ends, for `shell`, shape (4, around + 1, 3)."""
     ring = radius * circle(end - start, around)
     return np.stack([start + 0.0 * ring, start + ring, end + ring, end + 0.0 * ring])
 
 
-def triad(axes: Axes, seen: View, origin: np.ndarray, length: float, names: tuple[str, str, str]) -> None:
-    """The three axes of a frame as arrows with names."""
-    start = seen.project(origin)
+def triad(axes: Axes, camera: View, origin: np.ndarray, length: float, names: tuple[str, str, str]) -> None:
+    """Draw the three axes of a frame as arrows with names."""
+    start = camera.project(origin)
     for direction, name in zip(np.eye(3), names, strict=True):
-        end = seen.project(origin + length * direction)
+        end = camera.project(origin + length * direction)
         axes.annotate(
             "",
             (end[0], end[1]),

@@ -23,7 +23,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 INK, SOFT, GRID = "#222222", "#6b6b6b", "#e3e3e3"
 #: letters per inch of a line of a heading
 TITLE_LETTERS, SUBTITLE_LETTERS = 9.4, 14.0
-#: decades of a logarithmic axis that have room for numbers between the powers of ten
+#: decades of a logarithmic axis that have space for numbers between the powers of ten
 FEW_DECADES = 2.2
 
 RC: dict[str, Any] = {
@@ -59,7 +59,7 @@ RC: dict[str, Any] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Matplotlib with this project's look, whatever the user's settings are."""
+    """Set Matplotlib to this project's look, whatever the user's settings are."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(cast(Any, RC))
@@ -67,9 +67,9 @@ def style() -> Iterator[None]:
 
 
 def files(name: str, figure: Figure) -> dict[str, bytes]:
-    """The figure as ``name.png`` and ``name.svg``, without dates or versions; closes it."""
+    """Return the figure as ``name.png`` and ``name.svg``, without dates or versions, and close it."""
     result = {}
-    # the layout is solved once and then fixed; it would be solved again for each format
+    # the layout is solved once and then fixed; else each format would solve it again
     figure.draw_without_rendering()
     with mpl.rc_context({"figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)
@@ -82,24 +82,24 @@ def files(name: str, figure: Figure) -> dict[str, bytes]:
 
 
 def canvas(size: tuple[int, int], **options: Any) -> FigureCanvasAgg:
-    """What draws a figure of so many pixels (width, height), and gives them back (`pixels`)."""
+    """Return a canvas with a figure of so many pixels (width, height); `pixels` returns its picture."""
     return FigureCanvasAgg(Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, **options))
 
 
 def pixels(drawn: FigureCanvasAgg) -> np.ndarray:
-    """What was drawn, as bytes of shape (height, width, 3)."""
+    """Return the picture of a canvas as bytes, shape (height, width, 3)."""
     return np.asarray(drawn.buffer_rgba())[:, :, :3].copy()
 
 
 def grid(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
-    """A figure and its axes, always as a 2-D array."""
+    """Return a figure and its axes, always as a 2-D array."""
     return plt.subplots(rows, columns, figsize=size, squeeze=False, **options)
 
 
 def panels(
     count: int, columns: int, width: float, above: float, height: float, **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure and the axes of so many panels, row by row; above: what the figure is higher than its rows (inches)."""
+    """Return a figure and the axes of its panels, row by row; above: height of the figure minus its rows (inches)."""
     rows = -(-count // columns)
     figure, axes = grid(rows, columns, (width, above + height * rows), **options)
     for left in axes.flat[count:]:
@@ -108,15 +108,15 @@ def panels(
 
 
 def scale_of(axes: Axes) -> str:
-    """The scale of errors: logarithmic where a line of the axes has a positive value, else linear."""
+    """Return the scale for errors: logarithmic where a line of the axes has a positive value, else linear."""
     values = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
     return "log" if any((value > 0.0).any() for value in values) else "linear"
 
 
 def plain(axis: Axis) -> None:
-    """Plain numbers at 1, 2 and 5 of a logarithmic axis: a range of less than a decade has hardly any power of ten.
+    """Set plain numbers at 1, 2 and 5 of a logarithmic axis: less than a decade has hardly any power of ten.
 
-    Of longer ranges only the powers of ten are written, since the others would run into each other.
+    Longer ranges have numbers only at powers of ten, since the others would overlap.
     """
 
     def written(value: float, _: int | None) -> str:
@@ -130,11 +130,11 @@ def plain(axis: Axis) -> None:
 
 
 def heading(figure: Figure, title: str, subtitle: str = "") -> None:
-    """Title at the left, and a softer text below it; both in as many lines as the width asks for."""
+    """Add a title at the left, and a softer text below; both in as many lines as the width requires."""
     width = figure.get_figwidth()
     lines = textwrap.wrap(title, round(TITLE_LETTERS * width))
     below = textwrap.wrap(subtitle, round(SUBTITLE_LETTERS * width))
-    # the layout leaves room for the title's lines: empty ones are for the text below
+    # the layout reserves space for the title's lines: empty ones are for the text below
     text = "\n".join([*lines, *("" for _ in below)])
     figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK, parse_math=False)
     if below:
@@ -143,7 +143,7 @@ def heading(figure: Figure, title: str, subtitle: str = "") -> None:
 
 
 def shared_legend(figure: Figure, axes: Axes, columns: int, faint: str = "") -> None:
-    """One legend below all panels, from the labelled lines of `axes`; faint: label of the line that keeps its look."""
+    """Add one legend below all panels, from the labelled lines of `axes`; faint: label of the unchanged line."""
     handles, labels = axes.get_legend_handles_labels()
     legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8.8, handlelength=2.4)
     for line in legend.get_lines():

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Title, column heads, rows of text, and what is to be said about it (one paragraph each)."""
+    """Title, column heads, rows of text, and notes (one paragraph each)."""
 
     title: str
     columns: tuple[str, ...]
@@ -26,12 +26,12 @@ class Table:
 
 
 def files(name: str, table: Table) -> dict[str, bytes]:
-    """The table as ``name.csv`` and ``name.md``."""
+    """Return the table as ``name.csv`` and ``name.md``."""
     return {f"{name}.csv": as_csv(table).encode(), f"{name}.md": as_markdown(table).encode()}
 
 
 def as_csv(table: Table) -> str:
-    """Heads and rows; notes are not data and stay out."""
+    """Return heads and rows as CSV; notes are not data and stay out."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(table.columns)
@@ -40,20 +40,20 @@ def as_csv(table: Table) -> str:
 
 
 def as_markdown(table: Table) -> str:
-    """Title, aligned pipe table and notes."""
+    """Return title, aligned pipe table and notes as Markdown."""
     notes = "".join(f"\n{note}\n" for note in table.notes)
     return f"**{table.title}**\n\n{pipe_table(table.columns, table.rows)}\n{notes}"
 
 
 def pipe_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown that reads the same on a terminal: the first column is text, the others are numbers."""
+    """Return a pipe table that reads the same on a terminal: the first column is text, the others are numbers."""
     width = [max(3, *(len(row[i]) for row in (columns, *rows))) for i in range(len(columns))]
     rule = "|".join(["", "-" * (width[0] + 2), *("-" * (w + 1) + ":" for w in width[1:]), ""])
     return "\n".join([_line(columns, width), rule, *(_line(row, width) for row in rows)])
 
 
 def from_markdown(text: str) -> Table:
-    """The table that `as_markdown` wrote; ValueError for other text."""
+    """Return the table that `as_markdown` wrote; ValueError for other text."""
     blocks = text.strip().split("\n\n")
     lines = blocks[1].splitlines() if len(blocks) > 1 else []
     if not blocks[0].startswith("**") or len(lines) < 2 or not lines[0].startswith("|"):
@@ -63,7 +63,7 @@ def from_markdown(text: str) -> Table:
 
 
 def as_html(table: Table, *, prose: bool = False) -> str:
-    """A ``<figure>`` with the table and its notes; `prose`: whether cells hold sentences."""
+    """Return a ``<figure>`` with the table and its notes; `prose`: True when cells hold sentences."""
     head = "".join(f"<th scope='col'>{html.escape(column)}</th>" for column in table.columns)
     rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>\n" for row in table.rows)
     # links between pages of the documentation lead nowhere from here

@@ -1,5 +1,4 @@
 """Pictures of shapes and motion with pyvista; the only package that imports it.
 
-`pictures.pictures` makes them; nothing is imported here, because asking `gl` what this machine
-can draw must stay quick.
+`pictures.make` draws them; nothing is imported here, so that `gl` can report quickly what this machine can draw.
 """

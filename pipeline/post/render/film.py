@@ -30,17 +30,17 @@ SOFT = "#5b6570"
 
 @dataclass(frozen=True, slots=True)
 class Actors:
-    """What moves in the picture: an actor of each part, meshes of flexible bodies."""
+    """Moving objects of the picture: an actor of each part, meshes of flexible bodies."""
 
     parts: tuple[Any, ...]
     flexible: tuple[pv.PolyData, ...]
 
 
 def still(drawn: mechanism.Mechanism, step: int, size: tuple[int, int] = (1200, 900), margin: int = 0) -> np.ndarray:
-    """One picture of the mechanism at an output, shape (height, width, 3); margin: left at both sides [pixels]."""
+    """Draw the mechanism at an output, shape (height, width, 3); margin: empty space at both sides [pixels]."""
     scene = plotter(size)
     actors = _build(scene, drawn)
-    _place(drawn, actors, step, glow=False)
+    _place(drawn, actors, step, impact=False)
     look(scene, drawn, margin)
     result = image(scene)
     scene.close()
@@ -55,11 +55,11 @@ def frames(
     curves: Sequence[Quantity] = (),
     progress: Progress = silent,
 ) -> Iterator[np.ndarray]:
-    """The whole run, so many pictures a second, of shape (height, width, 3).
+    """Yield the pictures of the whole run, shape (height, width, 3).
 
-    watched: names of bodies, joints and contacts, of which the first of each is shown next to the mechanism.  curves:
-    quantities that are shown instead of them.
-    Around the strongest impacts time is stretched, so that they are seen (`film_speed`).
+    rate: pictures a second.  watched: names of bodies, joints and contacts; the first of each kind is shown next to the
+    mechanism.  curves: quantities that are shown instead. Around the strongest impacts time is stretched
+    (`film_speed`).
     """
     shown = film_speed.frame_times(drawn.run, drawn.looks.duration, drawn.looks.impact_slowdown, rate)
     steps = shown.steps(drawn.run)
@@ -67,7 +67,7 @@ def frames(
     actors = _build(scene, drawn)
     margin = 0 if drawn.stress is None else ruler.BAR
     look(scene, drawn, margin)
-    # words are drawn by matplotlib below: a text in the scene costs as much as the mechanism
+    # matplotlib draws the words below: a text in the scene costs as much as the mechanism
     caption = film_speed.Caption((VIEW, 26), SOFT)
     larger = "".join(f", {text}" for text in ruler.exaggeration(drawn))
     scale = ruler.pixels_per_metre(drawn, (VIEW, HEIGHT), margin)
@@ -77,8 +77,8 @@ def frames(
     with style.style():
         plots = panel(drawn.run, post, (SIDE, HEIGHT), watched, curves)
         for k, step in enumerate(steps):
-            struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
-            _place(drawn, actors, int(step), struck)
+            impact = _in_contact(drawn.run, int(steps[k - 1]) if k else 0, int(step))
+            _place(drawn, actors, int(step), impact)
             picture = image(scene)
             caption.onto(picture, f"{film_speed.speed_text(float(shown.slower[k]))}{larger}, bar: {in_unit(bar, 'm')}")
             picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
@@ -90,8 +90,8 @@ def frames(
     scene.close()
 
 
-def _struck(run: xr.Dataset, before: int, now: int) -> bool:
-    """Whether any contact was closed since the frame before: impacts are shorter than a frame."""
+def _in_contact(run: xr.Dataset, before: int, now: int) -> bool:
+    """Return True when any contact was closed since the frame before: impacts are shorter than a frame."""
     return "contact_gap" in run and bool((run.contact_gap.values[before : now + 1] < 0.0).any())
 
 
@@ -102,7 +102,7 @@ def _build(scene: pv.Plotter, drawn: mechanism.Mechanism) -> Actors:
 
 
 def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh: pv.PolyData | None = None) -> Any:
-    """A surface as an actor, shaded by its own normals: round ones smoothly, edges sharp."""
+    """Return a surface as an actor, shaded by its own normals: round ones smoothly, edges sharp."""
     shown = polydata(surface) if mesh is None else mesh
     actor = scene.add_mesh(shown, color=color, opacity=opacity, specular=0.3, specular_power=18)
     actor.prop.interpolation = "Phong"
@@ -128,18 +128,18 @@ def _flexible(scene: pv.Plotter, drawn: mechanism.Mechanism, body: mechanism.Fle
     return mesh
 
 
-def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, glow: bool) -> None:
+def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, impact: bool) -> None:
     for part, actor in zip(drawn.parts, actors.parts, strict=True):
         if part.owner is not None:
             actor.user_matrix = mechanism.part_pose(drawn.run, part, step)
         if part.contact is not None:
-            actor.prop.color = mechanism.IMPACT_COLOR if glow else mechanism.CLEARANCE_COLOR
+            actor.prop.color = mechanism.IMPACT_COLOR if impact else mechanism.CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
         mesh.points, mesh["shade"] = mechanism.placed(drawn.run, bent, step)[0], mechanism.shade(drawn.run, bent, step)
 
 
 def floor(scene: pv.Plotter, drawn: mechanism.Mechanism) -> None:
-    """A pale disc under the mechanism; none behind a planar one, and none where its scene says from where to look."""
+    """Add a pale disc under the mechanism, unless the motion is planar or the scene sets the direction of view."""
     if drawn.view.planar or drawn.looks.direction is not None:
         return
     up = drawn.view.up
@@ -154,7 +154,7 @@ def floor(scene: pv.Plotter, drawn: mechanism.Mechanism) -> None:
 
 
 def look(scene: pv.Plotter, drawn: mechanism.Mechanism, margin: int = 0) -> None:
-    """Put the camera where all that is drawn over the run is in the picture, between its margins [pixels]."""
+    """Place the camera so that everything drawn over the run is in the picture, between its margins [pixels]."""
     width, height = scene.window_size
     position, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
     scene.camera_position = [tuple(position), tuple(focus), tuple(drawn.view.up)]
@@ -163,7 +163,7 @@ def look(scene: pv.Plotter, drawn: mechanism.Mechanism, margin: int = 0) -> None
 
 
 def plotter(size: tuple[int, int]) -> pv.Plotter:
-    """An off-screen plotter. Call it only where `pipeline.post.render.gl.works()`."""
+    """Return an off-screen plotter. Call it only where `pipeline.post.render.gl.works()`."""
     # without a display VTK warns and then draws off-screen all the same
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     scene = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
@@ -175,13 +175,13 @@ def plotter(size: tuple[int, int]) -> pv.Plotter:
 
 
 def skin(points: np.ndarray, faces: np.ndarray) -> pv.PolyData:
-    """Points (n, 3) joined by faces (m, corners); faces of one corner are bare points."""
+    """Join points (n, 3) by faces (m, corners); faces of one corner are bare points."""
     points = np.ascontiguousarray(points)
     return pv.PolyData(points) if faces.shape[1] == 1 else pv.PolyData.from_regular_faces(points, faces)
 
 
 def polydata(surface: Surface) -> pv.PolyData:
-    """A surface for pyvista, its normals included."""
+    """Return a surface for pyvista, its normals included."""
     mesh = pv.PolyData.from_regular_faces(surface.points, surface.triangles)
     mesh.point_data["Normals"] = surface.normals.astype(np.float32)
     mesh.point_data.active_normals_name = "Normals"
@@ -189,13 +189,13 @@ def polydata(surface: Surface) -> pv.PolyData:
 
 
 def shading(bundle: xr.Dataset) -> dict[str, Any]:
-    """How a body's skin is shaded: rods smoothly, solids with their edges, bare nodes as dots."""
+    """Return the shading of a body's skin: rods smooth, solids with their edges, bare nodes as dots."""
     if bundle.sizes["corner"] == 1:
         return {"style": "points", "point_size": 9.0, "render_points_as_spheres": True}
     return {"smooth_shading": True, "split_sharp_edges": has_edges(bundle)}
 
 
 def image(scene: pv.Plotter) -> np.ndarray:
-    """The picture as it is now, as bytes, shape (height, width, 3)."""
-    scene.render()  # a second screenshot would show the first one again
+    """Return the current picture as bytes, shape (height, width, 3)."""
+    scene.render()  # else a second screenshot would show the first one again
     return np.asarray(scene.screenshot(return_img=True))

@@ -1,4 +1,4 @@
-"""Films: how fast they run, slower around the strongest impacts, so that these are seen; and how they are written."""
+"""Films: their speed, slower around the strongest impacts, and their files."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ import xarray as xr
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import impacts
 
-#: length of a film [s], and how much slower it runs around impacts
+#: length of a film [s], and its slowdown around impacts
 SECONDS, SLOWER = 3.75, 8.0
-#: so many of the strongest impacts are shown slowly, each within this fraction of the run
+#: number of the strongest impacts that are shown slowly, each within this fraction of the run
 SHOWN, AROUND = 3, 0.008
 
 
 @dataclass(frozen=True, slots=True)
 class FrameTimes:
-    """times: of the run at each frame [s].  slower: how many times slower than in reality the film is there."""
+    """times: of the run at each frame [s].  slower: ratio of film time to run time at each frame."""
 
     times: np.ndarray
     slower: np.ndarray
 
     def steps(self, run: xr.Dataset, most: int | None = None) -> np.ndarray:
-        """The outputs of the run at these times, or at `most` of them, evenly spread."""
+        """Return the outputs of the run at these times, or at `most` of them, evenly spread."""
         time, times = run["time"].values, self.times
         if most is not None:
             times = times[np.unique(np.linspace(0, times.size - 1, most).astype(int))]
@@ -38,26 +38,26 @@ class FrameTimes:
 def frame_times(
     run: xr.Dataset, seconds: float | None = None, slower: float | None = None, rate: int = 24
 ) -> FrameTimes:
-    """The times of the frames of a film, so many a second, in which impacts take `slower` times longer."""
+    """Return the times of a film's frames, `rate` a second, in which impacts take `slower` times longer."""
     time, seconds = run["time"].values, seconds or SECONDS
     start, span = float(time[0]), float(time[-1] - time[0])
     strong = strongest(run)
-    way = np.linspace(0.0, 1.0, 4001)
-    weight = np.ones_like(way)
+    run_fraction = np.linspace(0.0, 1.0, 4001)
+    weight = np.ones_like(run_fraction)
     factor = SLOWER if slower is None else slower
     for when in strong:
-        # a smooth bump: the film slows down and speeds up again, it does not jump
-        closeness = np.clip(1.0 - np.abs(way - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
+        # a smooth bump: the film slows down and speeds up without jumps
+        closeness = np.clip(1.0 - np.abs(run_fraction - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
         weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * closeness, 1.0))
-    passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(way))])
+    passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(run_fraction))])
     total = max(round(seconds * rate * min(1.4, passed[-1])), 2)
-    fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
+    fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, run_fraction)
     length = total / rate
-    return FrameTimes(start + span * fraction, length / passed[-1] * np.interp(fraction, way, weight) / span)
+    return FrameTimes(start + span * fraction, length / passed[-1] * np.interp(fraction, run_fraction, weight) / span)
 
 
 def strongest(run: xr.Dataset) -> np.ndarray:
-    """When the strongest impacts begin [s], at most SHOWN, ascending; none without contacts."""
+    """Return the begins of the strongest impacts [s], at most SHOWN, ascending; none without contacts."""
     all_impacts = impacts(run)
     if "impact_time" not in all_impacts:
         return np.empty(0)
@@ -71,7 +71,7 @@ def strongest(run: xr.Dataset) -> np.ndarray:
 
 
 def speed_text(slower: float) -> str:
-    """The speed in words."""
+    """Return the speed in words."""
     if 0.95 < slower < 1.05:
         return "as fast as it is"
     return f"{slower:.2g} times slower" if slower > 1.0 else f"{1.0 / slower:.2g} times faster"
@@ -93,7 +93,7 @@ class Caption:
         area[:] = np.round(area * (1.0 - shade[..., None]) + ink * shade[..., None]).astype(picture.dtype)
 
     def _drawn(self, text: str) -> np.ndarray:
-        """How dark each pixel is, in [0, 1]."""
+        """Return the darkness of each pixel, in [0, 1]."""
         width, height = self.size
         canvas = style.canvas((width, height))
         canvas.figure.text(14 / width, 0.45, text, fontsize=9.5, va="center", color="black", parse_math=False)
@@ -108,12 +108,12 @@ EQUAL_BYTES = ["-threads", "1", "-map_metadata", "-1", "-fflags", "+bitexact", "
 
 
 def rate(kind: str) -> int:
-    """Pictures a second of a film; half as many in a GIF."""
+    """Return the pictures a second of a film; half as many in a GIF."""
     return RATE if kind == "mp4" else RATE // 2
 
 
 def write(frames: Iterator[np.ndarray], rate: int, kind: str = "mp4") -> tuple[str, bytes]:
-    """Frames of shape (height, width, 3) as MP4, or as GIF where that is asked for or no ffmpeg is found."""
+    """Write frames of shape (height, width, 3) as MP4, or as GIF where requested or where ffmpeg is missing."""
     import imageio.v2 as imageio
 
     with tempfile.TemporaryDirectory() as folder:

@@ -1,8 +1,8 @@
-"""What a rigid body looks like: bars, plates and blocks between the joints that it has.
+"""Shapes of rigid bodies: bars, plates and blocks between their joints.
 
-Mass and inertia say little about a shape: the uniform cylinder with the inertia of a crank is a drum that hides the
+Mass and inertia determine little of a shape: the uniform cylinder with the inertia of a crank is a drum that hides the
 mechanism. So bodies are drawn as links between their joints, and the inertia only gives the thickness of slender bars,
-the radius of discs, and the size of what has no joint.
+the radius of discs, and the size of bodies without joints.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from flexclear.pipeline.core.system.external_files import read_mesh
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 
-#: half width of a link as a fraction of the mechanism's size, and of the distance of its joints at most
+#: half width of a link as a fraction of the mechanism's size, and at most of the distance of its joints
 WIDTH, WIDEST = 0.016, 0.2
 #: thickness of flat links, in half widths
 FLAT = 0.9
 #: points closer to each other than this many half widths are one
 NEAR = 0.3
-#: a solid is slender where it is so many times longer than thick
+#: a solid is slender where its length is so many times its thickness
 SLENDER = 2.5
-#: largest half extent of a body without joints apart, as a fraction of the mechanism's size
+#: largest half extent of a body without separate joints, as a fraction of the mechanism's size
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
 TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")
@@ -37,9 +37,9 @@ SLIDING = ("prismatic", "cylindrical")
 BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
 #: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits
 ROUND = 0.01
-#: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are seen
+#: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are visible
 THINNEST = 0.03
-#: bytes of a surface: more is no picture that anybody waits for; and how far its points may be [m]
+#: largest file of a surface [bytes], since larger ones take too long to draw; and largest coordinate of its points [m]
 LARGEST_FILE, FARTHEST = 200_000_000, 1e15
 #: faces of cells, by their corners, seen from outside
 _SIDES = {
@@ -50,7 +50,7 @@ _SIDES = {
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """A joint's frame on a body: frame name, its origin and axes in the body's, type of the joint, which side it is."""
+    """A joint's frame on a body: name, origin and axes in the body's axes, joint type, True for the first side."""
 
     frame: str
     origin: np.ndarray
@@ -72,10 +72,10 @@ class Solid:
 
 
 def equivalent(mass: float, inertia: np.ndarray) -> Solid:
-    """The uniform cylinder or box of this mass [kg] and inertia about its centre of mass [kg m^2]."""
+    """Return the uniform cylinder or box of this mass [kg] and inertia about its centre of mass [kg m^2]."""
     moments, axes = np.linalg.eigh(inertia)
     low, middle, high = moments / mass
-    if high - low <= ROUND * high:  # alike about every axis: a cube shows how it turns
+    if high - low <= ROUND * high:  # equal moments: a cube shows rotations
         return Solid(_right(axes), _visible(np.full(3, np.sqrt(1.5 * low))), round=False)
     if middle - low <= ROUND * high:
         across, along = 0.5 * (low + middle), high
@@ -98,34 +98,34 @@ def _right(axes: np.ndarray) -> np.ndarray:
 
 
 def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int = 0) -> Surface:
-    """Surface of a body in its own axes [m]; empty where the joints' own balls are all there is.
+    """Return the surface of a body in its own axes [m]; empty where the balls of the joints are enough.
 
-    com: centre of mass [m].  solid: what has its inertia, about that.  size: of the mechanism [m].  layer: counts
-    bodies, so that flat links in one plane are not equally thick and their faces do not lie in each other.
+    com: centre of mass [m].  solid: equivalent solid about it, or None.  size: of the mechanism [m].  layer: counts
+    bodies, so that flat links in one plane have different thicknesses and their faces do not coincide.
     """
     joined = [seat for seat in seats if seat.joint != "fixed"] or list(seats)
-    places = _apart([seat.origin for seat in (*joined, *seats)], NEAR * WIDTH * size)
-    if len(places) < 2:
-        return _lone(joined, places, com, solid, size)
-    spans = np.linalg.norm(places[:, None] - places[None], axis=-1)
+    points = _distinct([seat.origin for seat in (*joined, *seats)], NEAR * WIDTH * size)
+    if len(points) < 2:
+        return _lone(joined, points, com, solid, size)
+    spans = np.linalg.norm(points[:, None] - points[None], axis=-1)
     width = min(WIDTH * size, WIDEST * float(spans.max()))
     normal = _common_axis(joined)
-    if normal is not None and np.ptp(places @ normal) < width:
-        return _plate(places, normal, width, layer)
-    axis = _line(places, width)
+    if normal is not None and np.ptp(points @ normal) < width:
+        return _plate(points, normal, width, layer)
+    axis = _line(points, width)
     if axis is not None:
-        low, high = places[np.argmin(places @ axis)], places[np.argmax(places @ axis)]
+        low, high = points[np.argmin(points @ axis)], points[np.argmax(points @ axis)]
         return surfaces.bar(low, high, _thickness(solid, axis, width))
-    flat = _plane(places, width)
+    flat = _plane(points, width)
     if flat is not None:
-        return _plate(places, flat, 1.3 * width, layer)
-    middle = places.mean(axis=0)
-    bars = [surfaces.bar(middle, point, 0.8 * width) for point in places if np.linalg.norm(point - middle) > width]
+        return _plate(points, flat, 1.3 * width, layer)
+    middle = points.mean(axis=0)
+    bars = [surfaces.bar(middle, point, 0.8 * width) for point in points if np.linalg.norm(point - middle) > width]
     return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
 
 
 def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
-    """The shapes that a scene gives of a body, in the body frame [m]; files are relative to `folder`.
+    """Return the shapes that a scene gives for a body, in the body frame [m]; files are relative to `folder`.
 
     Raises InputError for files that cannot be read.
     """
@@ -145,10 +145,10 @@ def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
     return surfaces.merged(drawn)
 
 
-def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
-    """A body whose joints are all at one point, or that has none."""
+def _lone(seats: Sequence[Seat], points: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
+    """Return the surface of a body without joints, or with all joints at one point."""
     width = WIDTH * size
-    point = places[0] if len(places) else com
+    point = points[0] if len(points) else com
     arm = com - point
     reach = float(np.linalg.norm(arm))
     kinds = [seat.joint for seat in seats]
@@ -166,14 +166,14 @@ def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Sol
     if solid is None:
         return surfaces.moved(surfaces.sphere(2.0 * width), point)
     half = solid.half * min(1.0, LARGEST * size / float(solid.half.max()))
-    if kinds and np.ptp(half) <= 1e-9 * half.max():  # alike about all axes and fixed to something: a ball
+    if kinds and np.ptp(half) <= 1e-9 * half.max():  # equal moments and fixed to something: a ball
         return surfaces.moved(surfaces.sphere(float(half[0])), com)
     part = surfaces.cylinder(half[0], 2.0 * half[2]) if solid.round else surfaces.box(tuple(2.0 * half))
     return surfaces.moved(part, com, solid.axes)
 
 
 def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) -> Surface:
-    """A body that hangs on one joint: a bar where its inertia is that of one, else a bob on an arm."""
+    """Return a body that hangs on one joint: a bar where its inertia is that of one, else a bob on an arm."""
     axis = (com - point) / np.linalg.norm(com - point)
     half = 0.0 if solid is None else float(solid.half.max())
     if solid is not None and _slender(solid, axis) and half < 1.5 * np.linalg.norm(com - point):
@@ -184,7 +184,7 @@ def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
 
 
 def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Surface:
-    """A gear's wheel in its body's axes [m], as large as its pitch circle; inner: a ring whose teeth point inwards."""
+    """Return a gear's wheel in its body's axes [m], as large as its pitch circle; inner: a ring with teeth inwards."""
     width, axes = WIDTH * size, surfaces.along(seat.axes[:, 2])
     if not inner:
         return surfaces.moved(_disc(radius, width), seat.origin, axes)
@@ -196,7 +196,7 @@ def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Sur
 
 
 def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
-    """A disc about z with a mark that shows how it turns."""
+    """Return a disc about z with a mark that shows its rotation."""
     width = WIDTH * size
     radius = 3.0 * width
     if solid is not None and solid.round and abs(solid.axes[:, 2] @ axis) > 0.99:
@@ -210,7 +210,7 @@ def _disc(radius: float, width: float) -> Surface:
 
 
 def _thickness(solid: Solid | None, axis: np.ndarray, width: float) -> float:
-    """Radius of a bar along an axis: that of the slender solid with its inertia, within what can be seen."""
+    """Return the radius of a bar along an axis: that of the slender solid with its inertia, within visible limits."""
     if solid is None or not _slender(solid, axis):
         return 0.8 * width
     return float(np.clip(np.sort(solid.half)[1], 0.4 * width, 1.7 * width))
@@ -221,16 +221,16 @@ def _slender(solid: Solid, axis: np.ndarray) -> bool:
     return float(solid.half.max()) > SLENDER * float(np.sort(solid.half)[1]) and abs(float(longest @ axis)) > 0.95
 
 
-def _plate(places: np.ndarray, normal: np.ndarray, width: float, layer: int) -> Surface:
+def _plate(points: np.ndarray, normal: np.ndarray, width: float, layer: int) -> Surface:
     axes = surfaces.along(normal)
-    middle = places.mean(axis=0)
-    flat = (places - middle) @ axes
+    middle = points.mean(axis=0)
+    flat = (points - middle) @ axes
     thickness = FLAT * width * (1.0 - 0.12 * (layer % 5))
     return surfaces.moved(surfaces.prism(surfaces.hull(flat[:, :2], width), thickness), middle, axes)
 
 
 def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
-    """The axis about which all joints of a body turn, slides in its plane aside; None where there is none."""
+    """Return the axis about which all joints of a body turn (slides across it are allowed), or None."""
     axes = [seat.axes[:, 2] for seat in seats if seat.joint in TURNING]
     if not axes or any(abs(axis @ axes[0]) < 0.999 for axis in axes):
         return None
@@ -239,30 +239,30 @@ def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
     return None if others or any(abs(axis @ axes[0]) > 0.05 for axis in slides) else axes[0]
 
 
-def _line(places: np.ndarray, width: float) -> np.ndarray | None:
-    """Direction of a line on which all points lie."""
-    way = places - places.mean(axis=0)
-    _, size, axes = np.linalg.svd(way, full_matrices=False)
+def _line(points: np.ndarray, width: float) -> np.ndarray | None:
+    """Return the direction of a line on which all points lie, or None."""
+    offsets = points - points.mean(axis=0)
+    _, size, axes = np.linalg.svd(offsets, full_matrices=False)
     return axes[0] if len(size) < 2 or size[1] < 0.5 * width else None
 
 
-def _plane(places: np.ndarray, width: float) -> np.ndarray | None:
-    """Normal of a plane in which all points lie."""
-    _, size, axes = np.linalg.svd(places - places.mean(axis=0))
+def _plane(points: np.ndarray, width: float) -> np.ndarray | None:
+    """Return the normal of a plane in which all points lie, or None."""
+    _, size, axes = np.linalg.svd(points - points.mean(axis=0))
     return axes[2] if len(size) < 3 or size[2] < 0.5 * width else None
 
 
-def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
-    """The points, those closer than `same` to an earlier one left out, shape (n, 3)."""
+def _distinct(points: Sequence[np.ndarray], same: float) -> np.ndarray:
+    """Return the points without those closer than `same` to an earlier one, shape (n, 3)."""
     offsets: list[np.ndarray] = []
-    for point in places:
+    for point in points:
         if all(np.linalg.norm(point - other) > same for other in offsets):
             offsets.append(point)
     return np.array(offsets).reshape(-1, 3)
 
 
 def read(path: Path, unit: float) -> Surface:
-    """A surface from a file that meshio reads; tetrahedra and hexahedra give their boundary."""
+    """Return the surface in a file that meshio reads; tetrahedra and hexahedra give their boundary."""
     remedy = "give an STL, VTK, PLY or OBJ file"
     mesh = read_mesh(path, f"{path}", "is no surface that can be drawn", remedy, LARGEST_FILE)
     faces = []
@@ -284,23 +284,23 @@ def read(path: Path, unit: float) -> Surface:
 
 
 def _boundary(cells: np.ndarray, sides: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Triangles of the faces that belong to one cell only."""
+    """Return triangles of the faces that belong to one cell only."""
     faces = cells[:, list(sides)].reshape(-1, len(sides[0]))
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return surfaces.triangulated(faces[first[count == 1]])
 
 
-#: origin [m] and axes of a frame, in the world, at the start
+#: function of a frame's name that returns origin [m] and axes in the world, at the start
 Placed = Callable[[str], tuple[np.ndarray, np.ndarray]]
-#: joint types that a wheel turns on
+#: joint types on which a wheel turns
 WHEELED = ("revolute", "cylindrical")
-#: axes are parallel to this, and a distance is none below this fraction of the longest
+#: relative tolerance within which axes are parallel, radii equal and ratios one
 SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Wheel:
-    """A wheel on a joint's second frame; radius of its pitch circle [m]; inner: whether its teeth point inwards."""
+    """A wheel on a joint's second frame; radius of its pitch circle [m]; inner: True for teeth inwards."""
 
     frame: str
     radius: float
@@ -308,10 +308,10 @@ class Wheel:
 
 
 def wheels(given: Mapping[str, Any], placed: Placed) -> dict[str, list[Wheel]]:
-    """Wheels by body, of gears between parallel axes and between a wheel and a rack.
+    """Return wheels by body, of gears between parallel axes and between a wheel and a rack.
 
-    given: parameters of the run.  The pitch circles of `first` and `second` touch: they are as the ratio of the speeds
-    says, and their centres as far apart as the axes.
+    given: parameters of the run.  The pitch circles of `first` and `second` touch: the ratio of speeds gives the ratio
+    of their radii, and the axes the distance of their centres.
     """
     found: dict[str, list[Wheel]] = {}
     for gear in given.get("gear", {}).values():
@@ -345,6 +345,6 @@ def _pair(joints: Mapping[str, Any], gear: Mapping[str, Any], placed: Placed) ->
         second = distance / (1.0 - ratio)
         return [Wheel(frames[0], -ratio * second), Wheel(frames[1], second)]
     if abs(ratio - 1.0) < SAME:
-        return []  # a belt's pulleys: of any size
+        return []  # pulleys of a belt may have any size
     second = distance / abs(ratio - 1.0)
     return [Wheel(frames[0], ratio * second, inner=ratio > 1.0), Wheel(frames[1], second, inner=ratio < 1.0)]

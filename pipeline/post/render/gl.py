@@ -1,4 +1,4 @@
-"""Whether this machine can draw. A missing GL library does not raise: it ends the process."""
+"""Test of this machine's ability to draw. A missing GL library does not raise: it ends the process."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import sys
 from functools import cache
 from importlib.util import find_spec
 
-#: what to install where the libraries that draw are there, but cannot
+#: remedy where the libraries that draw exist, but cannot draw
 REMEDY = "pictures with pyvista need GL libraries: apt-get install libgl1 libegl1 (or libosmesa6)"
-#: the same where these libraries are not there
+#: remedy where these libraries are missing
 EXTRA = "pictures and films need further libraries: pip install 'flexclear[render]'"
-#: what draws, and what makes films of it
+#: libraries that draw, and that make films
 LIBRARIES = ("pyvista", "imageio")
 
 _PROBE = (
@@ -22,7 +22,7 @@ _PROBE = (
 
 
 def state() -> str:
-    """Which GL libraries are there, in a few words; quick, fit for a cache key; with none at its end, nothing draws."""
+    """Name the GL libraries of this machine; quick, fit for a cache key; a final none: nothing can be drawn."""
     if missing():
         return f"without {' and '.join(missing())}: none"
     if not sys.platform.startswith("linux"):
@@ -32,12 +32,12 @@ def state() -> str:
 
 
 def missing() -> list[str]:
-    """Which of the libraries that draw are not installed."""
+    """Return the missing ones of the libraries that draw."""
     return [name for name in LIBRARIES if find_spec(name) is None]
 
 
 def remedy() -> str:
-    """What to install where nothing can be drawn."""
+    """Return the remedy where nothing can be drawn."""
     return EXTRA if missing() else REMEDY
 
 

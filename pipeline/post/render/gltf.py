@@ -1,6 +1,6 @@
 """A run as a glTF 2.0 file: bodies on their tracks, flexible ones with a morph target for each mode.
 
-VTK's own export has neither animations nor morph targets, so that of a motion nothing would be left.
+VTK's own export has neither animations nor morph targets, so that it would lose the motion.
 
 Source: Khronos Group (2021), glTF 2.0 Specification, sec. 3.7.2 (meshes), 3.11 (animations), 5.
 """
@@ -24,7 +24,7 @@ TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 
 class _File:
-    """The file as it grows: its description, and its binary part."""
+    """The file under construction: its description, and its binary part."""
 
     def __init__(self) -> None:
         self.binary = bytearray()
@@ -34,7 +34,7 @@ class _File:
         self.animations: list[dict[str, Any]] = []
 
     def array(self, values: np.ndarray, kind: int = FLOAT, target: int | None = None) -> int:
-        """The number of the accessor of values of shape (n,) or (n, components)."""
+        """Add values of shape (n,) or (n, components) and return the number of their accessor."""
         data = np.ascontiguousarray(values, dtype="<f4" if kind == FLOAT else "<u4")
         flat = data.reshape(len(data), -1)
         view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": data.nbytes}
@@ -46,7 +46,7 @@ class _File:
         return len(self.document["accessors"]) - 1
 
     def node(self, name: str, shape: Surface, color: str, opacity: float, fields: np.ndarray | None = None) -> int:
-        """The number of a node with this surface, and morph targets where fields are given."""
+        """Add a node with this surface, and morph targets where fields are given, and return its number."""
         material: dict[str, Any] = {
             "pbrMetallicRoughness": {
                 "baseColorFactor": [*_linear(color), opacity],
@@ -72,17 +72,17 @@ class _File:
         return len(self.document["nodes"]) - 1
 
     def begin(self, name: str) -> None:
-        """A new animation; what moves from here on is part of it."""
+        """Begin a new animation; later calls of `move` belong to it."""
         self.animations.append({"name": name, "channels": [], "samplers": []})
 
     def move(self, node: int, path: str, times: int, values: np.ndarray) -> None:
-        """How a node moves in the present animation."""
+        """Add the motion of a node to the current animation."""
         samplers, channels = self.animations[-1]["samplers"], self.animations[-1]["channels"]
         samplers.append({"input": times, "output": self.array(values), "interpolation": "LINEAR"})
         channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
 
     def bytes(self, title: str) -> bytes:
-        """The file, as GLB."""
+        """Return the file, as GLB."""
         # the world's z is up here, y in glTF
         self.document["nodes"].append(
             {
@@ -107,7 +107,7 @@ class _File:
 
 
 def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> bytes:
-    """A GLB file with a body and an animation of each of its modes, drawn so many times larger, shape (mode,)."""
+    """Return a GLB file of a body with an animation of each mode, drawn so many times larger, shape (mode,)."""
     file = _File()
     points, own = fields_of(bundle)
     count, fields = len(own), own * scale[:, None, None]
@@ -121,7 +121,7 @@ def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> bytes:
 
 
 def motion(drawn: Mechanism, steps: np.ndarray, slower: float) -> bytes:
-    """A GLB file with the run at these outputs, played so many times slower than it is."""
+    """Return a GLB file with the run at these outputs, played so many times slower than it is."""
     run, file = drawn.run, _File()
     time = slower * (run["time"].values[steps] - run["time"].values[steps[0]])
     times = file.array(time)
@@ -140,7 +140,7 @@ def motion(drawn: Mechanism, steps: np.ndarray, slower: float) -> bytes:
 
 
 def _bent(file: _File, body: Flexible, name: str, q: np.ndarray) -> tuple[int, np.ndarray]:
-    # targets as large as the run makes them, weights within one: what viewers expect
+    # targets as large as the run's displacements, weights within one: viewers expect that
     largest = np.maximum(np.abs(q).max(axis=0), 1e-30)
     fields = body.scale * largest[:, None, None] * linear_fields(body.bundle)
     node = file.node(name, skin(body.bundle, rest(body.bundle)), body.color or COLORS[0], 1.0, fields)
@@ -150,12 +150,12 @@ def _bent(file: _File, body: Flexible, name: str, q: np.ndarray) -> tuple[int, n
 def _follow(file: _File, node: int, times: int, matrices: np.ndarray) -> None:
     file.move(node, "translation", times, matrices[:, :3, 3])
     quaternions = np.array([matrix_to_quaternion(matrix[:3, :3]) for matrix in matrices])
-    for k in range(1, len(quaternions)):  # the short way round from each to the next
+    for k in range(1, len(quaternions)):  # the shorter rotation from each to the next
         if quaternions[k] @ quaternions[k - 1] < 0.0:
             quaternions[k] = -quaternions[k]
     file.move(node, "rotation", times, quaternions[:, [1, 2, 3, 0]])
 
 
 def _linear(color: str) -> list[float]:
-    """A colour of the screen as the linear one that glTF asks for."""
+    """Return a colour of the screen as the linear one of glTF."""
     return [(int(color[k : k + 2], 16) / 255.0) ** 2.2 for k in (1, 3, 5)]

@@ -1,4 +1,4 @@
-"""A ball or pin in its socket: where its centre may be without contact, and its path, in space."""
+"""A ball or pin in its socket: the region of its centre without contact, and its path, in space."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View
 from flexclear.pipeline.post.single_run.series import parameters
 
-#: colour of a path, as in the plots of orbits; most points of it that are drawn
+#: colour of a path, as in the plots of orbits; largest number of its drawn points
 PATH_COLOR, PLACES = "#009E73", 1500
-#: radius of the mark at the centre and of the path, as fractions of the room's size
+#: radius of the mark at the centre and of the path, as fractions of the region's size
 MARK, PATH = 0.05, 0.006
-#: where a sphere and where a flat room are examined from
+#: directions of view of a sphere and of a flat region
 SLANTED, ABOVE = np.array([0.5, -1.0, 0.7]), np.array([0.0, -0.45, 1.0])
 
 
@@ -31,26 +31,26 @@ class JointView:
 
 
 def with_clearance(run: xr.Dataset) -> list[int]:
-    """Columns of the contacts that are joints with clearance; ends of stops have no path."""
+    """Return columns of the contacts that are joints with clearance; ends of stops have no path."""
     joints = parameters(run).get("joint", {})
     return [k for k, name in enumerate(run["contact"].values) if str(name) in joints] if "contact" in run.sizes else []
 
 
 def shown(run: xr.Dataset, contact: int) -> JointView:
-    """What is drawn of one joint with clearance."""
+    """Return the drawn surfaces of one joint with clearance."""
     offset = run["contact_offset"].values[:, contact]
     room, half = _room(parameters(run)["joint"][str(run["contact"].values[contact])], offset)
     some = np.unique(np.linspace(0, len(offset) - 1, PLACES).astype(int))
     flat = np.ptp(room.points[:, 2]) < 0.1 * half
-    seen = View(ABOVE if flat else SLANTED, np.eye(3)[1 if flat else 2], False)
-    return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), seen)
+    view = View(ABOVE if flat else SLANTED, np.eye(3)[1 if flat else 2], False)
+    return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), view)
 
 
 def _room(given: dict, offset: np.ndarray) -> tuple[Surface, float]:
-    """Where the centre may be, and a length that marks are in proportion to [m].
+    """Return the region of the centre without contact, and a length for the size of marks [m].
 
-    A sphere or disc of the clearance, a slot longer by its travel; of a ball on a plane the plane in which the centre
-    lies when the ball touches.
+    A sphere or disc of the clearance, a slot longer by its travel; for a ball on a plane the plane of the centre at
+    contact.
     """
     if given["type"] == "ball-on-plane":
         low, high = offset.min(axis=0), offset.max(axis=0)

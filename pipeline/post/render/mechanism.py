@@ -1,4 +1,4 @@
-"""A run as moving solids: which bodies, joints and rods there are, and where they are at one output."""
+"""A run as moving solids: its bodies, joints and rods, and their poses at one output."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from flexclear.pipeline.post.single_run.series import parameters
 COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")
 JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf", "#E69F00", "#d7191c"
 GROUND_COLOR = "#8d98a4"
-#: as fractions of the mechanism's size: joint spheres where no ball radius is known, radius of pins, thickness of rails
+#: fractions of the mechanism's size: joint spheres without a known ball radius, radius of pins, thickness of rails
 BALL, PIN, RAIL = 0.022, 0.011, 0.008
 #: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
 SOCKET = 1.3
-#: size of what has none: one body that rests [m]
+#: size of a mechanism without extent: one body that rests [m]
 LONE = 1.0
-#: outputs at which the program measures how far a mechanism reaches
+#: outputs at which the program measures the extent of a mechanism
 SAMPLES = 24
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
 #: largest drawn deformation as a fraction of the body's length
@@ -42,7 +42,7 @@ DEFORMATION_SHARE = 0.05
 class Part:
     """A solid that moves with a body.
 
-    surface: about the body's centre of mass, or about the origin of `frame`, in the body's axes; of the ground in the
+    surface: about the body's centre of mass, or about the origin of `frame`, in the body's axes; for the ground in the
     world.  contact: its column among the contacts, where it shows a joint with clearance.
     """
 
@@ -58,7 +58,7 @@ class Part:
 class Flexible:
     """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration, colour.
 
-    stressed: whether its colours show von Mises stress, and not displacement.
+    stressed: True when its colours show von Mises stress instead of displacement.
     """
 
     index: int
@@ -71,9 +71,9 @@ class Flexible:
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """What a scene says of its pictures.
+    """Settings of a scene for its pictures.
 
-    bodies: `geometry` and `color` by body.  folder: what files of shapes are relative to.  The rest as of `[view]`.
+    bodies: `geometry` and `color` by body.  folder: base of relative paths of shape files.  The rest as of `[view]`.
     """
 
     bodies: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -88,21 +88,21 @@ class Looks:
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """All that is drawn of one run."""
+    """The drawn mechanism of one run."""
 
     run: xr.Dataset
     parts: tuple[Part, ...]
     flexible: tuple[Flexible, ...]
     view: View
     size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
-    cloud: np.ndarray  #: points that represent all that is drawn over the run, world axes [m], shape (n, 3)
+    cloud: np.ndarray  #: points that span everything drawn over the run, world axes [m], shape (n, 3)
     looks: Looks
-    stress: float | None = None  #: the stress at the upper end of the colours [Pa], where they show stress
+    stress: float | None = None  #: stress at the upper end of the colours [Pa], where they show stress
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where the bodies and frames of a run are. given: parameters of its scene.  bundles: by name of the body."""
+    """Poses of the bodies and frames of a run. given: parameters of its scene.  bundles: by name of the body."""
 
     run: xr.Dataset
     given: Mapping[str, Any]
@@ -119,12 +119,12 @@ class Layout:
         return _names(self.run, "frame")
 
     def owner(self, frame: str) -> int | None:
-        """Index of the body that has a frame; None for the ground."""
+        """Return the index of the body that has a frame; None for the ground."""
         body = frame.partition(".")[0]
         return self.bodies.index(body) if body in self.bodies else None
 
     def local(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Origin [m] and axes (columns) of a frame in those of its body."""
+        """Return origin [m] and axes (columns) of a frame in those of its body."""
         body, _, name = frame.partition(".")
         if body in self.bundles:
             data = self.bundles[body].sel(frame=name)
@@ -133,7 +133,7 @@ class Layout:
         return np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())
 
     def at_start(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Origin [m] and axes of a frame, in the world, at the first output."""
+        """Return origin [m] and axes of a frame, in the world, at the first output."""
         (origin, axes), owner = self.local(frame), self.owner(frame)
         if owner is None:
             return origin, axes
@@ -143,13 +143,13 @@ class Layout:
         return where, matrix[:3, :3] @ axes
 
     def centre(self, body: str) -> np.ndarray:
-        """Centre of mass of a moving body at rest, in its axes [m]."""
+        """Return the centre of mass of a moving body at rest, in its axes [m]."""
         if body in self.bundles:
             return centre_at_rest(self.bundles[body])
         return np.array(self.given["body"][body].get("com", (0.0, 0.0, 0.0)))
 
     def seated(self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
-        """A part at a frame, given in its axes."""
+        """Return a part at a frame, given in the frame's axes."""
         (origin, axes), owner = self.local(frame), self.owner(frame)
         if owner is None:
             return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
@@ -163,9 +163,9 @@ class Layout:
 def mechanism(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None, *, stressed: bool = False
 ) -> Mechanism:
-    """The drawn mechanism of a run; bundles by name of the flexible body.
+    """Return the drawn mechanism of a run; bundles by name of the flexible body.
 
-    stressed: whether the colours of flexible bodies show von Mises stress.  InputError for a run that has none.
+    stressed: True colours flexible bodies by von Mises stress.  InputError for a run that records none.
     """
     looks, at = looks or Looks(), Layout(run, parameters(run), bundles)
     if stressed and not body_shape.stress_recorded(run):
@@ -176,17 +176,17 @@ def mechanism(
     flexible = tuple(
         _flexible(run, name, bundle, looks, stressed=stressed) for name, bundle in bundles.items() if name in at.bodies
     )
-    places = run.frame_position.values if at.frames else run.position.values
-    shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
+    positions = run.frame_position.values if at.frames else run.position.values
+    shown = np.concatenate([positions.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
     parts = (*_bodies(at, looks, size), *_joints(at, size))
-    seen = view(run, at.given, looks.direction, looks.up)
+    chosen_view = view(run, at.given, looks.direction, looks.up)
     top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
-    return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks, top)
+    return Mechanism(run, parts, flexible, chosen_view, size, _cloud(run, parts, flexible), looks, top)
 
 
 def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
-    """Corners of the boxes of all parts, and points of flexible bodies, at some outputs of the run."""
+    """Return corners of the boxes of all parts, and points of flexible bodies, at some outputs of the run."""
     clouds = []
     for step in np.unique(np.linspace(0, run.sizes["time"] - 1, SAMPLES).astype(int)):
         for part in parts:
@@ -199,7 +199,7 @@ def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible])
 
 
 def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
-    """Homogeneous matrix of a body, from axes through its centre of mass to the world."""
+    """Return the homogeneous matrix of a body, from axes through its centre of mass to the world."""
     matrix = np.eye(4)
     matrix[:3, :3] = quaternion_to_matrix(run.quaternion.values[step, index])
     matrix[:3, 3] = run.position.values[step, index]
@@ -207,7 +207,7 @@ def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
 
 
 def part_pose(run: xr.Dataset, part: Part, step: int) -> np.ndarray:
-    """Homogeneous matrix from the axes in which a part's surface is given to the world."""
+    """Return the homogeneous matrix from the axes of a part's surface to the world."""
     matrix = np.eye(4) if part.owner is None else pose(run, part.owner, step)
     if part.frame is not None:
         matrix[:3, 3] = run.frame_position.values[step, part.frame]
@@ -215,7 +215,7 @@ def part_pose(run: xr.Dataset, part: Part, step: int) -> np.ndarray:
 
 
 def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """World points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
+    """Return world points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
     q = run.modal_coordinate.values[step, body.columns]
     points, size = surface(body.bundle, q, body.scale)
     matrix = pose(run, body.index, step)
@@ -224,14 +224,14 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
 
 
 def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
-    """What the colours of a body show at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
+    """Return the coloured values at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
     if body.stressed:
         return body_shape.stress_on_surface(run, body.bundle, _names(run, "body")[body.index], step)
     return placed(run, body, step)[1]
 
 
 def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surface:
-    """The surface of a flexible body through points as of `placed` or `rest`; empty for bare nodes.
+    """Return the surface of a flexible body through points as of `placed` or `rest`; empty for bare nodes.
 
     Unless `sharp`, points keep their number, so that fields fit; edges of solids are then shaded softly.
     """
@@ -239,23 +239,23 @@ def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surf
 
 
 def centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
-    """Centre of mass in the bundle's axes [m]: the run's position is that, the bundle's origin is elsewhere."""
+    """Return the centre of mass in the bundle's axes [m]; it is the run's position, unlike the bundle's origin."""
     moment: np.ndarray = bundle.first_moment.values
     return moment / float(bundle.mass)
 
 
 def rest(bundle: xr.Dataset) -> np.ndarray:
-    """Points of the skin of a body that is not deformed, its centre of mass at the origin [m], shape (point, 3)."""
+    """Return points of the skin of an undeformed body, its centre of mass at the origin [m], shape (point, 3)."""
     return surface(bundle, np.zeros(bundle.sizes["mode"]))[0] - centre_at_rest(bundle)
 
 
 def _names(run: xr.Dataset, dim: str) -> list[str]:
-    """Names along a dimension; none where the run has no such parts."""
+    """Return the names along a dimension; none where the run lacks the dimension."""
     return [str(name) for name in run[dim].values] if dim in run.coords else []
 
 
 def _seats(at: Layout) -> dict[str, list[Seat]]:
-    """Where joints sit on each body."""
+    """Return the joints' frames on each body."""
     by_body: dict[str, list[Seat]] = {}
     for joint in at.given.get("joint", {}).values():
         for k, frame in enumerate(joint["between"]):
@@ -265,7 +265,7 @@ def _seats(at: Layout) -> dict[str, list[Seat]]:
 
 
 def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
-    """Rigid bodies and the ground, as their scene draws them or as links between their joints."""
+    """Yield rigid bodies and the ground, as their scene draws them or as links between their joints."""
     kinds: dict[tuple[Any, ...], str] = {}
     seats, geared = _seats(at), wheels(at.given, at.at_start)
     for name, body in at.given.get("body", {}).items():
@@ -276,7 +276,7 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
             if own is not None:
                 yield Part(None, own, look.get("color", GROUND_COLOR))
         elif name in at.bundles:
-            if own is not None:  # next to the deformed mesh: what is fixed to it
+            if own is not None:  # shapes fixed to the deformed mesh
                 yield Part(owner, surfaces.moved(own, -at.centre(name)), look.get("color", COLORS[0]))
         elif "inertia" in body:
             com, inertia = at.centre(name), np.array(body["inertia"])
@@ -291,7 +291,7 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
 def _with_wheels(
     geared: Sequence[Wheel], seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int
 ) -> Surface:
-    """A body between its joints, with the wheels of its gears."""
+    """Return a body between its joints, with the wheels of its gears."""
     discs = [
         forms.wheel_of_gear(
             next(seat for seat in seats if seat.frame == wheel.frame), wheel.radius, size, inner=wheel.inner
@@ -304,7 +304,7 @@ def _with_wheels(
 
 
 def _joints(at: Layout, size: float) -> Iterator[Part]:
-    """Balls, pins, rails, crosses and planes of the joints."""
+    """Yield balls, pins, rails, crosses and planes of the joints."""
     contacts = _names(at.run, "contact")
     for name, joint in at.given.get("joint", {}).items():
         kind, (first, second) = joint["type"], joint["between"]
@@ -320,7 +320,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
                 yield at.seated(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
         elif "revolute" in kind or kind == "clearance-slot":
             radius = float(joint.get("pin_radius", PIN * size))
-            long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # what is shorter, the links would hide
+            long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # the links would hide shorter ones
             yield at.seated(second, surfaces.cylinder(radius, long), color, contact)
             if kind == "clearance-slot":
                 half = np.array([[-0.5 * joint["travel"], 0.0], [0.5 * joint["travel"], 0.0]])
@@ -344,7 +344,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
 
 
 def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
-    """A plane without end, as far as a ball goes on it; around the frame's origin where the plane itself moves."""
+    """Return an unlimited plane as far as its ball goes; around the frame's origin where the plane itself moves."""
     first, second = joint["between"]
     low = high = np.zeros(2)
     reach = 0.25 * size
@@ -358,7 +358,7 @@ def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
 
 
 def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
-    """Least and largest displacement along a joint's axis [m], that of the assembled start included."""
+    """Return least and largest displacement along a joint's axis [m], that of the assembled start included."""
     for name in (joint, f"{joint}.translation"):
         if "coordinate" in run.coords and name in run.coordinate.values:
             values = run.joint_position.sel(coordinate=name).values

@@ -1,4 +1,4 @@
-"""The plots that run next to a film, and a film of a joint: drawn once, then only the moving marks."""
+"""Plots next to a film, and a film of a joint: drawn once, and then only their moving marks."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import film_speed, joint_view
 from flexclear.pipeline.post.single_run.series import derive
 
-#: a body that turns by less does not turn [degrees]
+#: largest angle of a body that does not turn [degrees]
 STILL = 1e-3
-#: next to titles [pixels]
+#: margin next to titles [pixels]
 MARGIN = 6.0
 #: size of a picture of a joint [pixels], and length of its trail as a fraction of the run
 JOINT_SIZE, TRAIL = (960, 540), 0.02
@@ -30,7 +30,7 @@ JOINT_SIZE, TRAIL = (960, 540), 0.02
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """What moves along a curve. begin: the output from which on it shows the curve; None for a dot."""
+    """A moving mark on a curve. begin: first output of the shown part of the curve at each output; None for a dot."""
 
     artist: Any
     x: np.ndarray
@@ -38,7 +38,7 @@ class Cursor:
     begin: np.ndarray | None = None
 
     def draw(self, step: int) -> None:
-        """At one output."""
+        """Draw the mark at one output."""
         shown = slice(step if self.begin is None else self.begin[step], step + 1)
         self.artist.set_data(self.x[shown], self.y[shown])
         self.artist.axes.draw_artist(self.artist)
@@ -46,7 +46,7 @@ class Cursor:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A figure whose still part is stored as pixels, what moves in it, and the clock."""
+    """A figure whose static part is stored as pixels, its moving marks, and the clock."""
 
     canvas: FigureCanvasAgg
     background: Any
@@ -55,7 +55,7 @@ class Panel:
     time: np.ndarray  #: [s]
 
     def frame(self, step: int, more: str = "", digits: int = 1) -> np.ndarray:
-        """Pixels at one output, shape (height, width, 3); more, digits: after the time, and after its point."""
+        """Return pixels at one output, shape (height, width, 3); more: text after the time; digits: of the time."""
         self.canvas.restore_region(self.background)
         for cursor in self.cursors:
             cursor.draw(step)
@@ -71,11 +71,10 @@ def panel(
     watch: Sequence[str] = (),
     curves: Sequence[Quantity] = (),
 ) -> Panel:
-    """Plots of one run: the watched body's motion, a reaction, and a ball or pin in its socket where there is one.
+    """Build the plots of one run: the watched body's motion, a reaction, and a ball or pin in its socket, if any.
 
-    watch: names of bodies, joints and contacts, of which the first of each is shown; else the body that moves
-    farthest, the first contact, the first joint.  curves: quantities, the first two of which the run has take the place
-    of motion and reaction.
+    watch: names of bodies, joints and contacts, of which the first of each is shown; else the body that moves farthest,
+    the first contact, the first joint.  curves: quantities; the first two that the run has replace motion and reaction.
     """
     loose = [str(run["contact"].values[k]) for k in joint_view.with_clearance(run)]
     contact = bool(loose)
@@ -104,7 +103,7 @@ def panel(
 def joint_frames(
     run: xr.Dataset, contact: int, seconds: float | None, slower: float | None, rate: int
 ) -> Iterator[np.ndarray]:
-    """A joint with clearance: where its ball or pin is, and its force; pictures of shape (540, 960, 3)."""
+    """Yield pictures of a joint with clearance, its ball or pin and its force, shape (540, 960, 3)."""
     with style.style():
         canvas = style.canvas(JOINT_SIZE, layout=ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12))
         left, right = canvas.figure.subplots(1, 2, width_ratios=[1.1, 1.0])
@@ -124,7 +123,7 @@ def joint_frames(
 
 
 def _clock(canvas: FigureCanvasAgg, fontsize: float, height: float, color: str) -> Any:
-    """The text that is to show the time; the rest of the figure is drawn, with an area that is left for it."""
+    """Return the text that will show the time; the rest of the figure is drawn, with space for that text."""
     canvas.figure.suptitle(" ", fontsize=fontsize)
     look: dict[str, Any] = {"fontsize": fontsize, "fontweight": "bold", "color": color, "animated": True}
     clock = canvas.figure.text(0.5, height, "", ha="center", va="center", **look)
@@ -133,7 +132,7 @@ def _clock(canvas: FigureCanvasAgg, fontsize: float, height: float, color: str) 
 
 
 def _fit(title: Any, axes: style.Axes, canvas: FigureCanvasAgg) -> None:
-    """Let a title that would be cut off at the right begin further left, and be smaller where it is wider than all."""
+    """Shift a title that would be cut off at the right to the left; shrink one that is wider than the figure."""
     width, most = title.get_window_extent(canvas.get_renderer()).width, canvas.figure.bbox.width - 2.0 * MARGIN
     if width > most:
         title.set_fontsize(title.get_fontsize() * most / width)
@@ -142,22 +141,22 @@ def _fit(title: Any, axes: style.Axes, canvas: FigureCanvasAgg) -> None:
 
 
 def _first(names: Iterable[object], watch: Sequence[str]) -> int | None:
-    """Index of the first watched one among names; None where none is watched."""
+    """Return the index of the first watched one among names; None where none is watched."""
     known = [str(name) for name in names]
     return next((known.index(name) for name in watch if name in known), None)
 
 
 def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
-    """The first watched body; else the one that moves farthest."""
+    """Return the first watched body; else the one that moves farthest."""
     name = _first(run.body.values, watch)
     if name is not None:
         return name
-    way = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
-    return int(np.argmax(way.max(axis=0)))
+    distance = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
+    return int(np.argmax(distance.max(axis=0)))
 
 
 def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> Cursor:
-    """How far the body has turned, or, where it does not turn, how far it has gone along the axis of its way."""
+    """Draw the rotation of the body, or, without rotation, its displacement along the axis of its largest motion."""
     turned, moved = turned_by(run, str(run.body.values[body])), post.displacement.values[:, body]
     angle = np.degrees(turned.angle)
     if np.abs(angle).max() > STILL:
@@ -188,7 +187,7 @@ def _watched(axes: style.Axes, run: xr.Dataset, line: Curve) -> Cursor:
 
 
 def _energy(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequence[str]) -> Cursor:
-    """Instead of a reaction, where there is no joint."""
+    """Draw the kinetic energy instead of a reaction, where the run has no joint."""
     axes.set_title("kinetic energy (J)")
     return _curve(axes, run, run.kinetic.values, "#0072B2")
 
@@ -197,11 +196,11 @@ def _curve(axes: style.Axes, run: xr.Dataset, values: np.ndarray, color: str, wi
     time = 1e3 * run.time.values
     axes.plot(time, values, color=color, lw=width)
     axes.set(xlabel="time (ms)", xlim=(time[0], time[-1]))
-    axes.locator_params(axis="x", nbins=5)  # free, they change with the width that the layout leaves for their labels
+    axes.locator_params(axis="x", nbins=5)  # else they change with the width that the layout leaves
     return Cursor(_dot(axes, 6), time, values)
 
 
 def _dot(axes: style.Axes, size: float) -> Any:
-    """The mark that moves along a curve."""
+    """Return the mark that moves along a curve."""
     (dot,) = axes.plot([], [], "o", color=style.INK, ms=size, animated=True)
     return dot

@@ -1,9 +1,8 @@
 """A run as a series for ParaView: skins of all bodies, and the forces of joints, contacts and loads as arrows.
 
 Two files for each output, as VTK XML written here: pyvista's writer takes a second and a half longer, and GL libraries;
-meshio's, which compresses, takes seventeen times as long.
-Surfaces carry the number of their body and the computed displacement; arrows are surfaces, too, with the force as
-`force` [N].
+meshio's, which compresses, takes seventeen times as long. Surfaces carry the number of their body and the computed
+displacement; arrows are surfaces, too, with the force as `force` [N].
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ LONGEST, THICK = 0.3, 0.006
 
 
 def series(drawn: Mechanism, steps: np.ndarray, name: str = "motion") -> dict[str, bytes]:
-    """``motion.pvd`` and the files that it names, by name."""
+    """Return ``motion.pvd`` and the files that it names, by name."""
     files: dict[str, bytes] = {}
     entries = []
     largest = max((float(np.linalg.norm(f, axis=-1).max(initial=0.0)) for _, _, f in _forces(drawn.run)), default=0.0)
@@ -48,7 +47,7 @@ def series(drawn: Mechanism, steps: np.ndarray, name: str = "motion") -> dict[st
 
 
 def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> dict[str, bytes]:
-    """``<name>.pvd``, a series with the number of the mode for time, and the files that it names."""
+    """Return ``<name>.pvd``, a series with the number of the mode for time, and the files that it names."""
     files, lines = {}, []
     rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
     for k, frequency in enumerate(bundle["frequency"].values):
@@ -62,7 +61,7 @@ def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> dict[str, bytes]:
 
 
 def collection(lines: list[str]) -> bytes:
-    """A ParaView collection of data sets."""
+    """Return a ParaView collection of data sets."""
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n<Collection>\n'
     return (head + "\n".join(lines) + "\n</Collection>\n</VTKFile>\n").encode()
 
@@ -84,8 +83,8 @@ def _bodies(drawn: Mechanism, step: int) -> bytes:
 
 def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
     shapes, forces = [], []
-    for _, places, force in _forces(drawn.run):
-        for point, value in zip(places[step], force[step], strict=True):
+    for _, points, force in _forces(drawn.run):
+        for point, value in zip(points[step], force[step], strict=True):
             length = LONGEST * drawn.size * float(np.linalg.norm(value)) / largest
             if length > 0.01 * LONGEST * drawn.size:
                 shapes.append(arrow(point, value / np.linalg.norm(value) * length, THICK * drawn.size))
@@ -93,16 +92,16 @@ def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
     return vtp(surfaces.merged(shapes), {"force": np.concatenate(forces) if forces else np.empty((0, 3))})
 
 
-def arrow(point: np.ndarray, way: np.ndarray, thick: float) -> Surface:
-    """An arrow that begins at a point, as long and directed as `way`."""
-    length = float(np.linalg.norm(way))
+def arrow(point: np.ndarray, vector: np.ndarray, thick: float) -> Surface:
+    """Return an arrow that begins at a point, as long and directed as `vector`."""
+    length = float(np.linalg.norm(vector))
     head = min(6.0 * thick, 0.4 * length)
-    neck = point + (1.0 - head / length) * way
-    return surfaces.merged([surfaces.bar(point, neck, thick), surfaces.cone(neck, point + way, 2.4 * thick)])
+    neck = point + (1.0 - head / length) * vector
+    return surfaces.merged([surfaces.bar(point, neck, thick), surfaces.cone(neck, point + vector, 2.4 * thick)])
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Forces on bodies with the points where they act: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
+    """Yield forces on bodies with their points of action: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
     given, frames = (
         parameters(run),
         {str(name): k for k, name in enumerate(run["frame"].values)} if "frame" in run.coords else {},
@@ -110,19 +109,19 @@ def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     for family, variable, dim in (("joint", "joint_force", "joint"), ("load", "load_force", "load")):
         if variable not in run:
             continue
-        places, forces = [], []
+        points, forces = [], []
         for k, name in enumerate(str(n) for n in run[dim].values):
             part = given.get(family, {}).get(name, {})
             frame = part["between"][1] if "between" in part else part.get("frame")
             if frame in frames:
-                places.append(run["frame_position"].values[:, frames[frame]])
+                points.append(run["frame_position"].values[:, frames[frame]])
                 forces.append(k)
         if forces:
-            yield family, np.stack(places, axis=1), run[variable].values[:, forces]
+            yield family, np.stack(points, axis=1), run[variable].values[:, forces]
 
 
 def vtp(shape: Surface, data: dict[str, np.ndarray]) -> bytes:
-    """A surface with data of its points as VTK polygonal data, in XML with base64."""
+    """Return a surface with data of its points as VTK polygonal data, in XML with base64."""
     polygons = shape.triangles
     arrays = "".join(_array(name, values) for name, values in data.items())
     return (

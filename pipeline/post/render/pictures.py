@@ -1,4 +1,4 @@
-"""What is made of a run, its reduced bodies and its vibrations: pictures, films, pages, files for other programs."""
+"""Pictures, films, pages and files for other programs from a run, its reduced bodies and its vibrations."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ SERIES, KEYS = 100, 240
 
 @dataclass(frozen=True)
 class Shown:
-    """What there is to be shown.
+    """Data and settings of pictures.
 
-    run: schema RUN; linear: schema LINEAR; bundles: schema BUNDLE by name of the flexible body.  watched,
-    curves: as of `film.frames`.  title: of pages.
+    run: schema RUN; linear: schema LINEAR; bundles: schema BUNDLE by name of the flexible body.  watched, curves: as of
+    `film.frames`.  title: of pages.
     """
 
     run: xr.Dataset | None = None
@@ -44,17 +44,17 @@ class Shown:
     progress: Progress = silent
 
     def mechanism(self, *, stressed: bool = False) -> Mechanism:
-        """The run as moving solids; stressed: coloured by von Mises stress."""
+        """Return the run as moving solids; stressed: coloured by von Mises stress."""
         return mechanism(self.of_run, self.bundles, self.looks, stressed=stressed)
 
     @property
     def of_run(self) -> xr.Dataset:
-        """The run, which there is."""
+        """The run, which must exist."""
         assert self.run is not None
         return self.run
 
     def page(self, what: str, views: Sequence[str], below: str = "") -> bytes:
-        """A page of views, its title that of the scene and what it shows."""
+        """Return a page of views, with the scene and the subject as its title."""
         return viewer_page(f"{self.title}: {what}" if self.title else what, views, below)
 
 
@@ -62,19 +62,19 @@ Maker = Callable[[Shown, str], dict[str, bytes]]
 
 
 def make(what: str, kind: str, shown: Shown) -> dict[str, bytes]:
-    """File contents by name.  Raises InputError where `what` cannot be shown so, or the scene has no such thing."""
+    """Return file contents by name.  Raises InputError for a scene without the requested subject."""
     return MAKERS[what][kind](shown, kind)
 
 
 def png(pixels: np.ndarray) -> bytes:
-    """PNG file of pixels of shape (height, width, 3)."""
+    """Return the PNG file of pixels of shape (height, width, 3)."""
     buffer = io.BytesIO()
     imsave(buffer, np.ascontiguousarray(pixels), format="png", metadata=cast(Any, {"Software": None}))
     return buffer.getvalue()
 
 
 def _still(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
-    """When the bodies are farthest from where they started, or the largest stress of the run is largest."""
+    """Draw the output at which the bodies are farthest from their start, or the stress is largest."""
     _must_draw()
     from flexclear.pipeline.post.render import film, ruler
 
@@ -96,7 +96,7 @@ def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes
 
 
 def _must_draw() -> None:
-    """Before pyvista is imported: without GL libraries it ends the process."""
+    """Raise SolverError without GL libraries, before pyvista is imported: the import would end the process."""
     if not gl.works():
         raise SolverError(f"no pictures of solids: {gl.remedy()}")
 
@@ -128,9 +128,9 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
 
 
 def _side(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """From where a body is examined, and what is up."""
-    seen = player.side(bundle)
-    return seen.direction, seen.up
+    """Return the direction of view of a body, and the upward direction."""
+    view = player.side(bundle)
+    return view.direction, view.up
 
 
 def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
@@ -149,7 +149,7 @@ def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _mode_page(shown: Shown, kind: str) -> dict[str, bytes]:
-    """The mode sets of all bodies next to each other."""
+    """Return a page with the mode sets of all bodies next to each other."""
     views = [
         viewer(player.modes(bundle), f"{body}: {mode_sheet.range_text(bundle)}", play=True)
         for body, bundle in _bodies(shown).items()
@@ -171,7 +171,7 @@ def _mode_series(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joints(shown: Shown) -> dict[int, str]:
-    """Joints with clearance by their columns among the contacts."""
+    """Return joints with clearance by their columns among the contacts."""
     joints = joint_view.with_clearance(shown.of_run)
     if not joints:
         raise InputError("--what joint", "the scene has no joint with clearance", "show its motion")
@@ -185,7 +185,7 @@ def _joint_figures(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
-    """Each joint's ball or pin in its socket, and their curves below."""
+    """Return a page with each joint's ball or pin in its socket, and their curves below."""
     views = [
         viewer(player.joint(shown.of_run, k, shown.looks), f"{name}: path of the centre")
         for k, name in _joints(shown).items()
@@ -205,7 +205,7 @@ def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
-    """The mechanism at rest, and how it vibrates about that."""
+    """Return the mechanism at rest, and its vibrations about that pose."""
     assert shown.linear is not None
     if not bool((shown.linear["frequency"] > 0.0).any()):
         raise InputError("--what vibrations", "the mechanism has no motion that vibrates in this pose")
@@ -231,7 +231,7 @@ def _vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
     return {f"vibrations.{suffix}": content}
 
 
-#: what is shown, and as what
+#: functions by subject and format
 MAKERS: dict[str, dict[str, Maker]] = {
     "motion": {
         "png": _still,

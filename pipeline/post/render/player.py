@@ -1,7 +1,7 @@
-"""What the viewer of the pages shows (`pipeline/post/pages/viewer.js`): a motion, modes of bodies, vibrations.
+"""Data for the viewer of the pages (`pipeline/post/pages/viewer.js`): a motion, modes of bodies, vibrations.
 
-A bent body is its resting points plus fields times weights, as reduced bodies are; so a page holds each field once, and
-deformations can be made larger there. Nothing here draws, and no GL library is needed.
+A bent body is its resting points plus fields times weights, as in reduced bodies; so a page holds each field once, and
+the viewer can enlarge deformations. Nothing here draws, and no GL library is needed.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ FRACTION = 0.12
 
 
 def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
-    """A run, for the viewer: bodies on their tracks, flexible ones bent."""
+    """Return a run for the viewer: bodies on their tracks, flexible ones bent."""
     run, steps = drawn.run, _steps(drawn.run, drawn.looks, frames)
     tracks: dict[tuple[int | None, int | None], int] = {}
     meshes = []
     for part in drawn.parts:
-        place = (part.owner, part.frame)
-        track = -1 if part.owner is None else tracks.setdefault(place, len(tracks))
+        key = (part.owner, part.frame)
+        track = -1 if part.owner is None else tracks.setdefault(key, len(tracks))
         meshes.append(_still(part.surface, part.color, part.opacity) | {"track": track})
     for body in drawn.flexible:
         track = tracks.setdefault((body.index, None), len(tracks))
@@ -57,7 +57,7 @@ def _largest_stress(drawn: mechanism.Mechanism, steps: np.ndarray) -> dict[str, 
 
 
 def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, Any]:
-    """The centre of a ball or pin in its socket, for the viewer: where it may be, its path, and itself.
+    """Return a ball or pin in its socket for the viewer: the region of its centre, its path, and its centre.
 
     contact: index of a joint with clearance, not of the end of a stop.
     """
@@ -87,7 +87,7 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
 
 
 def modes(bundle: xr.Dataset) -> dict[str, Any]:
-    """All modes of a reduced body, for the viewer."""
+    """Return all modes of a reduced body for the viewer."""
     points, fields = fields_of(bundle)
     largest = np.linalg.norm(fields, axis=2).max(axis=1)
     names = [f"mode {k + 1}: {hertz(f)}" for k, f in enumerate(bundle["frequency"].values)]
@@ -102,14 +102,14 @@ def modes(bundle: xr.Dataset) -> dict[str, Any]:
 
 
 def scales(bundle: xr.Dataset) -> np.ndarray:
-    """The factor by which each mode of a body is drawn [kg^0.5 m], shape (mode,)."""
+    """Return the factor by which each mode of a body is drawn [kg^0.5 m], shape (mode,)."""
     return np.array([scale_to(bundle, unit, FRACTION) for unit in np.eye(bundle.sizes["mode"])])
 
 
 def vibrations(drawn: mechanism.Mechanism, linear: Vibrations) -> dict[str, Any]:
-    """The natural vibrations of a mechanism about a pose, for the viewer.
+    """Return the natural vibrations of a mechanism about a pose, for the viewer.
 
-    Of each complex shape real and imaginary part are shown in turn, so that running waves run.
+    Real and imaginary part of each complex shape are shown in turn, so that travelling waves travel.
     """
     meshes = []
     for piece in linear.pieces:
@@ -129,7 +129,7 @@ def vibrations(drawn: mechanism.Mechanism, linear: Vibrations) -> dict[str, Any]
 
 
 def side(bundle: xr.Dataset) -> View:
-    """From where a body alone is examined: its length across the picture."""
+    """Return the view of a body alone: its length across the picture."""
     x = bundle["node_position"].values
     (axis, *_), _ = box(bundle)
     axis = axis * (1.0 if axis @ (x[-1] - x[0]) >= 0.0 else -1.0)
@@ -139,7 +139,7 @@ def side(bundle: xr.Dataset) -> View:
 
 
 def _steps(run: xr.Dataset, looks: mechanism.Looks, frames: int) -> np.ndarray:
-    """The outputs that are shown."""
+    """Return the outputs that are shown."""
     if run.sizes["time"] == 1:
         return np.zeros(1, dtype=int)
     return film_speed.frame_times(run, looks.duration, looks.impact_slowdown).steps(run, frames)
@@ -159,7 +159,7 @@ def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[
         "weights": _floats(q[steps]),
         "largest": largest,
     }
-    if body.stressed:  # one byte a point and frame
+    if body.stressed:  # one byte for each point and frame
         top = body_shape.largest_stress(run) or 1.0
         name = str(run["body"].values[body.index])
         levels = np.array([body_shape.stress_on_surface(run, bundle, name, int(step)) for step in steps]) / top
@@ -189,17 +189,17 @@ def _still(part: surfaces.Surface, color: str, opacity: float) -> dict[str, Any]
 
 
 def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
-    """Points keep their number, so that fields fit; sharp edges of solids are shaded softly."""
+    """Return a skin whose points keep their number, so that fields fit; sharp edges of solids are shaded softly."""
     triangles = surfaces.triangulated(faces(bundle))
     return {"points": _floats(points), "triangles": _wholes(triangles), "color": mechanism.COLORS[0], "opacity": 1.0}
 
 
-def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
-    """Where the eye is, and how far what it sees reaches across and upright, over the distance."""
-    position, focus = eye(seen, cloud, ASPECT)
-    local = (cloud - position) @ axes_of(seen, position, focus)
+def _camera(view: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
+    """Return eye, focus, upward direction, and the reach of the scene across and upright over its distance."""
+    position, focus = eye(view, cloud, ASPECT)
+    local = (cloud - position) @ axes_of(view, position, focus)
     reach = np.abs(local[:, :2] / local[:, 2:]).max(axis=0) / zoom
-    return {"eye": position.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
+    return {"eye": position.tolist(), "focus": focus.tolist(), "up": view.up.tolist(), "reach": reach.tolist()}
 
 
 def _floats(values: np.ndarray) -> str:
@@ -211,7 +211,7 @@ def _wholes(values: np.ndarray) -> str:
 
 
 def _scaled(values: np.ndarray) -> dict[str, Any]:
-    """Numbers as 16 bits of their largest: three digits are more than a picture shows."""
+    """Return numbers as 16 bits of their largest: three digits are more than a picture shows."""
     largest = float(np.abs(values).max(initial=0.0)) or 1.0
     data = np.round(values / largest * 32767).astype("<i2")
     return {"data": base64.b64encode(data.tobytes()).decode(), "largest": largest}

@@ -1,6 +1,6 @@
 """The start pose of a scene with names: bodies, frames, joints, axes, drives, gravity, clearances and gaps.
 
-What is drawn is a run of one output (`pipeline.dynamics.model.start_pose`); nothing here computes a motion.
+The pose is a run of one output (`pipeline.dynamics.model.start_pose`); nothing here computes a motion.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from flexclear.pipeline.post.single_run.series import parameters
 
 BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", "#7a4a00"
 CLEARANCE, GAP = "#a35f00", "#c4161c"
-#: as fractions of the mechanism's size: half length of a drawn axis, its thickness, radius of a drive's arrow, of a gap
+#: fractions of the mechanism's size: half length and thickness of a drawn axis, radius of a drive's arrow, of a gap
 AXIS, THIN, ARC, THICK = 0.055, 0.0016, 0.035, 0.004
-#: axes of joints that differ by less are parallel [-]
+#: largest angle between parallel axes of joints [-]
 PARALLEL = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A name at a point of the world [m]: text, what is said below it, colour."""
+    """A name at a point of the world [m]: text, detail below it, colour."""
 
     text: str
     detail: str
@@ -42,7 +42,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """What a joint misses, as `pipeline.dynamics.model.start_pose.Gap`: from, to [m], angle [rad]."""
+    """Gap of a joint, as `pipeline.dynamics.model.start_pose.Gap`: from, to [m], angle [rad]."""
 
     joint: str
     start: np.ndarray
@@ -50,8 +50,8 @@ class Missing:
     angle: float
 
     @property
-    def said(self) -> str:
-        """Distance and angle, as a picture says them."""
+    def words(self) -> str:
+        """Distance and angle in words, as in a picture."""
         distance = float(np.linalg.norm(self.end - self.start))
         turned = f"{np.degrees(self.angle):.3g}° off" if self.angle > 1e-7 else ""
         return " and ".join(filter(None, [f"gap {in_unit(distance, 'm')}" if distance > 0.0 else "", turned]))
@@ -59,7 +59,7 @@ class Missing:
 
 @dataclass(frozen=True, slots=True)
 class StartView:
-    """The drawn mechanism, its marks, and sentences for below the picture."""
+    """The drawn mechanism, its marks, and sentences below the picture."""
 
     drawn: mechanism.Mechanism
     marks: tuple[Mark, ...]
@@ -71,10 +71,10 @@ class StartView:
 def start_view(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], gaps: Sequence[Missing], looks: mechanism.Looks | None = None
 ) -> StartView:
-    """The view of a start; gaps: of joints that do not fit."""
+    """Return the view of a start; gaps: of joints that do not fit."""
     text, drawn = parameters(run), mechanism.mechanism(run, bundles, looks)
     at = mechanism.Layout(run, text, bundles)
-    # where each joint's second frame is in the world, and the axes of its first one
+    # world position of each joint's second frame, and the axes of its first one
     joints = {
         name: (at.at_start(second)[0], at.at_start(first)[1])
         for name, (first, second) in ((name, joint["between"]) for name, joint in text.get("joint", {}).items())
@@ -82,7 +82,7 @@ def start_view(
     normal = _normal(text, joints)
     if normal is not None and drawn.looks.direction is None:
         drawn = replace(drawn, view=flat(normal, text, drawn.looks.up))
-    # with red lines to be seen inside of them
+    # translucent, so that red lines inside are visible
     opacity = 0.4 if gaps else 1.0
     solid = [
         *(replace(part, opacity=min(part.opacity, opacity)) for part in drawn.parts),
@@ -97,24 +97,24 @@ def start_view(
 
 
 def _still(body: mechanism.Flexible, opacity: float) -> mechanism.Part:
-    """A meshed body as it is where nothing is deformed."""
+    """Return a meshed body without deformation."""
     shown = mechanism.skin(body.bundle, mechanism.rest(body.bundle), sharp=has_edges(body.bundle))
     return mechanism.Part(
         body.index, shown, body.color or mechanism.COLORS[body.index % len(mechanism.COLORS)], opacity
     )
 
 
-def page_view(seen: StartView) -> dict[str, Any]:
-    """What the viewer of a page shows: the pose, with its names."""
+def page_view(start: StartView) -> dict[str, Any]:
+    """Return the pose with its names, for the viewer of a page."""
     labels = [
         {"text": mark.text, "detail": mark.detail, "at": mark.point.tolist(), "color": mark.color}
-        for mark in seen.marks
+        for mark in start.marks
     ]
-    return player.motion(seen.drawn) | {"labels": labels, "state": " · ".join(seen.notes)}
+    return player.motion(start.drawn) | {"labels": labels, "state": " · ".join(start.notes)}
 
 
 def _normal(text: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray | None:
-    """The direction about which all joints turn and across which all slide; None where there is none."""
+    """Return the direction about which all joints turn and across which all slide, or None."""
     kinds = {name: joint["type"] for name, joint in text.get("joint", {}).items() if joint["type"] != "fixed"}
     turning = [joints[name][1][:, 2] for name, kind in kinds.items() if kind in forms.TURNING]
     sliding = [joints[name][1][:, 2] for name, kind in kinds.items() if kind == "prismatic"]
@@ -130,7 +130,7 @@ def _lines(
     gaps: Sequence[Missing],
     size: float,
 ) -> Iterator[tuple[Surface, str]]:
-    """Axes of joints, arrows of drives, and gaps."""
+    """Yield axes of joints, arrows of drives, and gaps."""
     driven = {drive["joint"]: drive for drive in text.get("drive", {}).values() if "joint" in drive}
     for name, (where, axes) in joints.items():
         kind, z = text["joint"][name]["type"], axes[:, 2]
@@ -147,23 +147,23 @@ def _lines(
 
 
 def _turning(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
-    """A round arrow about the axis, in the sense in which the joint's coordinate grows."""
+    """Return a round arrow about the axis, in the sense in which the joint's coordinate grows."""
     angle = np.linspace(0.2, 1.5 * np.pi, 40)[:, None]
     ring = where + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
-    way = ring[-1] - ring[-2]
-    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], way, size)])
+    direction = ring[-1] - ring[-2]
+    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], direction, size)])
 
 
 def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
-    """An arrow along the axis, next to it."""
+    """Return an arrow along the axis, next to it."""
     side = where + 0.5 * ARC * size * axes[:, 0]
     end = side + 1.5 * AXIS * size * axes[:, 2]
     return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _head(end, axes[:, 2], size)])
 
 
-def _head(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
-    """Of an arrow."""
-    return surfaces.cone(base, base + 12.0 * THIN * size * way / np.linalg.norm(way), 5.0 * THIN * size)
+def _head(base: np.ndarray, direction: np.ndarray, size: float) -> Surface:
+    """Return the head of an arrow."""
+    return surfaces.cone(base, base + 12.0 * THIN * size * direction / np.linalg.norm(direction), 5.0 * THIN * size)
 
 
 def _marks(
@@ -173,10 +173,10 @@ def _marks(
     joints: Mapping[str, tuple[np.ndarray, np.ndarray]],
     gaps: Sequence[Missing],
 ) -> Iterator[Mark]:
-    """Names; those that matter most come first."""
-    used, places = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
+    """Yield names, the most important ones first."""
+    used, positions = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
     for gap in gaps:
-        yield Mark(gap.joint, f"does not fit: {gap.said}", 0.5 * (gap.start + gap.end), GAP)
+        yield Mark(gap.joint, f"does not fit: {gap.words}", 0.5 * (gap.start + gap.end), GAP)
     for name, body in text.get("body", {}).items():
         if body["type"] != "ground":
             index = list(run["body"].values).index(name)
@@ -184,8 +184,8 @@ def _marks(
     for name, joint in text.get("joint", {}).items():
         used |= set(joint["between"])
         clear = joint.get("clearance")
-        played = f" {in_unit(clear, 'm')}" if clear else ""
-        detail = f"{joint['type']}{played}: {' – '.join(joint['between'])}"
+        clearance = f" {in_unit(clear, 'm')}" if clear else ""
+        detail = f"{joint['type']}{clearance}: {' – '.join(joint['between'])}"
         yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
     for name, drive in text.get("drive", {}).items():
         if "joint" in drive:
@@ -193,14 +193,14 @@ def _marks(
             where = joints[drive["joint"]][0]
             yield Mark(name, f"drives {which}: {drive['law']['type']}", where, DRIVE)
         else:
-            yield Mark(name, f"drives {drive['frame']}", places[drive["frame"]], DRIVE)
+            yield Mark(name, f"drives {drive['frame']}", positions[drive["frame"]], DRIVE)
             used.add(drive["frame"])
     for name, load in text.get("load", {}).items():
         at = load.get("between", [load["frame"]] if "frame" in load else [])
         if at:
             used |= set(at)
-            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([places[f] for f in at], axis=0), LOAD)
-    for name, where in places.items():
+            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([positions[f] for f in at], axis=0), LOAD)
+    for name, where in positions.items():
         if name not in used:
             yield Mark(name, "frame", where, FRAME)
 
@@ -211,7 +211,7 @@ def _of_body(body: Mapping[str, Any]) -> str:
 
 
 def _middle(run: xr.Dataset, drawn: mechanism.Mechanism, index: int) -> np.ndarray:
-    """A point on what is drawn of a body, as near as possible to the middle of that."""
+    """Return a point on the drawn shape of a body, close to the middle of that shape."""
     for part in drawn.parts:
         if part.owner == index and part.frame is None and part.contact is None:
             matrix = mechanism.pose(run, index, 0)
@@ -221,7 +221,7 @@ def _middle(run: xr.Dataset, drawn: mechanism.Mechanism, index: int) -> np.ndarr
 
 
 def _notes(drawn: mechanism.Mechanism, parameters: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
-    """What the names do not say."""
+    """Yield sentences on facts without a name."""
     yield f"start at t = {parameters.get('time', {}).get('start', 0.0):g} s"
     yield from exaggeration(drawn)
     if not np.any(gravity(parameters)):
@@ -231,45 +231,45 @@ def _notes(drawn: mechanism.Mechanism, parameters: Mapping[str, Any], gaps: Sequ
 
 
 SIZE, MARGIN = (1600, 1000), 330
-#: heights of lines of names [pixels]: with their details below, and without; where the columns begin and end
+#: heights of lines of names [pixels], with details below and without; begin and end of the columns
 LINES, TOP, BOTTOM = (33.0, 17.0), 70.0, 90.0
-#: letters of a detail that have room in a column
+#: letters of a detail that fit in a column
 LETTERS = 56
 
 
-def picture(seen: StartView, title: str) -> np.ndarray:
-    """Pixels, shape (height, width, 3): the mechanism in the middle, its names in columns left and right of it."""
+def picture(start: StartView, title: str) -> np.ndarray:
+    """Draw the mechanism in the middle, its names in columns left and right; pixels, shape (height, width, 3)."""
     from flexclear.pipeline.post.render import film
 
     width, height = SIZE
     canvas = style.canvas(SIZE)
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    axes.imshow(film.still(seen.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
+    axes.imshow(film.still(start.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
     with style.style():
-        points = project(seen.drawn, np.array([mark.point for mark in seen.marks]).reshape(-1, 3), SIZE, MARGIN)
-        shown = _columns(axes, seen.marks, points)
+        points = project(start.drawn, np.array([mark.point for mark in start.marks]).reshape(-1, 3), SIZE, MARGIN)
+        shown = _columns(axes, start.marks, points)
         axes.text(20, 26, title, fontsize=13, fontweight="bold", color=style.INK, va="center", parse_math=False)
-        left_out = [] if shown == len(seen.marks) else [f"{shown} of {len(seen.marks)} names; the page has all"]
-        notes = " · ".join([*seen.notes, *left_out])
+        left_out = [] if shown == len(start.marks) else [f"{shown} of {len(start.marks)} names; the page has all"]
+        notes = " · ".join([*start.notes, *left_out])
         axes.text(20, 49, notes, fontsize=9.5, color=style.SOFT, va="center", parse_math=False)
-        _directions(axes, seen.drawn, seen.gravity)
-        ruler(axes, seen.drawn, SIZE, MARGIN)
+        _directions(axes, start.drawn, start.gravity)
+        ruler(axes, start.drawn, SIZE, MARGIN)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
     return style.pixels(canvas)
 
 
 def columns(points: np.ndarray, room: int) -> tuple[list[int], list[int]]:
-    """Which names stand left and which right, each from top to bottom; the first `room` in each column, at most.
+    """Return the names in the left and in the right column, each from top to bottom, at most `room` in a column.
 
-    points: of the names in the picture, shape (n, 2), those that matter most first.
+    points: of the names in the picture, shape (n, 2), the most important ones first.
     """
     recorded = list(range(min(len(points), 2 * room)))
     across = sorted(recorded, key=lambda k: (points[k, 0], k))
     half = (len(recorded) + 1) // 2
     middle = 0.5 * SIZE[0]
-    # as many on either side as have room; a few more on one where they are
+    # the columns follow the points, unless that would make one of them much longer
     count = int(np.clip(sum(points[k, 0] < middle for k in recorded), len(recorded) - room, room))
     count = count if abs(count - half) <= 0.25 * len(recorded) else half
     sides = across[:count], across[count:]
@@ -277,7 +277,7 @@ def columns(points: np.ndarray, room: int) -> tuple[list[int], list[int]]:
 
 
 def _columns(axes: style.Axes, marks: Sequence[Mark], points: np.ndarray) -> int:
-    """Draw the names and lines to their points; how many there was room for."""
+    """Draw the names and lines to their points, and return the number of drawn names."""
     tall = SIZE[1] - TOP - BOTTOM
     line = LINES[0] if len(marks) <= 2 * int(tall / LINES[0]) else LINES[1]
     sides = columns(points, int(tall / line))
@@ -297,7 +297,7 @@ def _columns(axes: style.Axes, marks: Sequence[Mark], points: np.ndarray) -> int
 
 
 def heights(requested: np.ndarray, line: float, top: float, bottom: float) -> np.ndarray:
-    """Heights as near to those that are requested (ascending) as lines of this height leave room; shape (n,)."""
+    """Return heights as near to the requested ones (ascending) as lines of this height allow; shape (n,)."""
     result = np.array(requested, dtype=float)
     for k in range(len(result)):
         result[k] = max(result[k], top + 0.5 * line if k == 0 else result[k - 1] + line)
@@ -309,15 +309,15 @@ def heights(requested: np.ndarray, line: float, top: float, bottom: float) -> np
 
 
 def _directions(axes: style.Axes, drawn: Mechanism, gravity: np.ndarray) -> None:
-    """The world's axes and gravity, as they lie in the picture."""
+    """Draw the world's axes and gravity, as projected in the picture."""
     middle = drawn.cloud.mean(axis=0)
-    ways = [(np.eye(3)[k], "xyz"[k], style.SOFT) for k in range(3)]
+    directions = [(np.eye(3)[k], "xyz"[k], style.SOFT) for k in range(3)]
     size = float(np.linalg.norm(gravity))
     if size > 0.0:
-        ways.append((gravity / size, f"gravity {size:.4g} m/s²", LOAD))
-    for way, text, color in ways:
+        directions.append((gravity / size, f"gravity {size:.4g} m/s²", LOAD))
+    for direction, text, color in directions:
         origin = np.array([70.0, SIZE[1] - 75.0]) + (np.array([95.0, -20.0]) if color == LOAD else 0.0)
-        ends = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * way]), SIZE, MARGIN)
+        ends = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * direction]), SIZE, MARGIN)
         unit = project(drawn, np.array([middle, middle + 1e-3 * drawn.size * drawn.view.up]), SIZE, MARGIN)
         arrow = 46.0 * (ends[1] - ends[0]) / float(np.linalg.norm(unit[1] - unit[0]))
         tip, beyond = origin + arrow, 11.0 / max(float(np.linalg.norm(arrow)), 11.0)

@@ -1,4 +1,4 @@
-"""Triangulated surfaces of simple solids, with normals; pure numbers, whoever draws them.
+"""Triangulated surfaces of simple solids, with normals; pure numbers for any drawing library.
 
 Edges are sharp: points are repeated where two faces meet at an angle, each with the normal of its face.
 """
@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-#: corners of what is drawn round
+#: corners of round shapes
 ROUND = 32
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """points, normals [m, -], shape (n, 3); triangles: indices of points, outside seen anticlockwise, shape (m, 3)."""
+    """points, normals [m, -], shape (n, 3); triangles: indices of points, anticlockwise from outside, shape (m, 3)."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -28,7 +28,7 @@ EMPTY = Surface(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3), dtype=int))
 
 
 def merged(parts: Sequence[Surface]) -> Surface:
-    """Several surfaces as one."""
+    """Join several surfaces into one."""
     if not parts:
         return EMPTY
     offsets = np.cumsum([0, *(len(part.points) for part in parts[:-1])])
@@ -40,13 +40,13 @@ def merged(parts: Sequence[Surface]) -> Surface:
 
 
 def moved(surface: Surface, origin: np.ndarray, axes: np.ndarray | None = None) -> Surface:
-    """The surface in a frame with this origin [m] and these axes (columns), seen from the frame's parent."""
+    """Return the surface of a frame with this origin [m] and these axes (columns), in axes of the frame's parent."""
     R = np.eye(3) if axes is None else axes
     return Surface(surface.points @ R.T + origin, surface.normals @ R.T, surface.triangles)
 
 
 def along(direction: np.ndarray) -> np.ndarray:
-    """Right-handed axes, columns, whose z is a direction, shape (3, 3)."""
+    """Return right-handed axes, columns, whose z is a direction, shape (3, 3)."""
     z = direction / np.linalg.norm(direction)
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
@@ -54,7 +54,7 @@ def along(direction: np.ndarray) -> np.ndarray:
 
 
 def prism(outline: np.ndarray, thickness: float) -> Surface:
-    """A convex outline, anticlockwise, shape (n, 2), extruded along z by `thickness`, the middle at z = 0."""
+    """Extrude a convex outline, anticlockwise, shape (n, 2), along z by `thickness`, the middle at z = 0."""
     n, h = len(outline), 0.5 * thickness
     centre = outline.mean(axis=0)
     edge = np.roll(outline, -1, axis=0) - outline
@@ -68,16 +68,16 @@ def prism(outline: np.ndarray, thickness: float) -> Surface:
     return merged([walls, *(_cap(outline, centre, side * h, side) for side in (1.0, -1.0))])
 
 
-def hull(places: np.ndarray, margin: float) -> np.ndarray:
-    """Outline around points in a plane, shape (n, 2), at a distance `margin` from them, anticlockwise, shape (m, 2)."""
+def hull(positions: np.ndarray, margin: float) -> np.ndarray:
+    """Return the outline, anticlockwise, (m, 2), at a distance `margin` from points in a plane, (n, 2)."""
     turn = np.linspace(0.0, 2.0 * np.pi, ROUND, endpoint=False)
     circle = margin * np.column_stack([np.cos(turn), np.sin(turn)])
-    spread = (places[:, None, :] + circle).reshape(-1, 2)
+    spread = (positions[:, None, :] + circle).reshape(-1, 2)
     return spread[ConvexHull(spread).vertices]
 
 
 def turned(profile: np.ndarray, corners: int = ROUND) -> Surface:
-    """A surface of revolution about z, round there and with sharp edges along its profile.
+    """Return a surface of revolution about z, round there and with sharp edges along its profile.
 
     profile: radius and height of points [m], shape (n, 2), from the lower end to the upper one along the outside.
     """
@@ -93,19 +93,19 @@ def turned(profile: np.ndarray, corners: int = ROUND) -> Surface:
 
 
 def cylinder(radius: float, length: float) -> Surface:
-    """About the origin, its axis along z."""
+    """Return a cylinder about the origin, its axis along z."""
     half = 0.5 * length
     return turned(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
 
 
 def box(size: Sequence[float]) -> Surface:
-    """About the origin."""
+    """Return a box about the origin."""
     x, y = 0.5 * size[0], 0.5 * size[1]
     return prism(np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), size[2])
 
 
 def sphere(radius: float) -> Surface:
-    """About the origin."""
+    """Return a sphere about the origin."""
     across = ROUND // 2
     theta, phi = np.meshgrid(
         np.linspace(0.0, np.pi, across + 1), np.linspace(0.0, 2.0 * np.pi, ROUND + 1), indexing="ij"
@@ -115,54 +115,54 @@ def sphere(radius: float) -> Surface:
 
 
 def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
-    """A round bar with flat ends."""
-    way = end - start
-    return moved(cylinder(radius, float(np.linalg.norm(way))), 0.5 * (start + end), along(way))
+    """Return a round bar with flat ends."""
+    axis = end - start
+    return moved(cylinder(radius, float(np.linalg.norm(axis))), 0.5 * (start + end), along(axis))
 
 
 def cone(base: np.ndarray, tip: np.ndarray, radius: float) -> Surface:
-    """A round cone, closed below."""
+    """Return a round cone, closed below."""
     side = turned(np.array([[0.0, 0.0], [radius, 0.0], [0.0, np.linalg.norm(tip - base)]]))
     return moved(side, base, along(tip - base))
 
 
-def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:
-    """A thin round tube through points, shape (n, 3), open at its ends; points that repeat are left out."""
-    distinct = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])
-    places = places[distinct]
-    if len(places) < 2:
-        return moved(sphere(radius), places[0])
-    way = np.gradient(places, axis=0)
-    across = np.empty_like(places)
-    side = along(way[0])[:, 0]
-    for k, tangent in enumerate(_unit(way)):  # the side is carried along, so that the tube does not twist
+def tube(positions: np.ndarray, radius: float, corners: int = 6) -> Surface:
+    """Return a thin round tube through points, shape (n, 3), open at its ends; repeated points are left out."""
+    distinct = np.concatenate([[True], np.linalg.norm(np.diff(positions, axis=0), axis=1) > 1e-3 * radius])
+    positions = positions[distinct]
+    if len(positions) < 2:
+        return moved(sphere(radius), positions[0])
+    tangents = np.gradient(positions, axis=0)
+    across = np.empty_like(positions)
+    side = along(tangents[0])[:, 0]
+    for k, tangent in enumerate(_unit(tangents)):  # the side is carried along, so that the tube does not twist
         rest = side - (side @ tangent) * tangent
         size = float(np.linalg.norm(rest))
         side = rest / size if size > 1e-6 else along(tangent)[:, 0]
         across[k] = side
-    other = np.cross(_unit(way), across)
+    other = np.cross(_unit(tangents), across)
     turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)[None, :, None]
     normals = across[:, None] * np.cos(turn) + other[:, None] * np.sin(turn)
-    points = places[:, None] + radius * normals
-    return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(places), corners + 1)[:, ::-1])
+    points = positions[:, None] + radius * normals
+    return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(positions), corners + 1)[:, ::-1])
 
 
 def grid(rows: int, columns: int) -> np.ndarray:
-    """Triangles between points in rows and columns, shape (2 (rows - 1) (columns - 1), 3)."""
+    """Return triangles between points in rows and columns, shape (2 (rows - 1) (columns - 1), 3)."""
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     return np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=2).reshape(-1, 3)
 
 
 def triangulated(faces: np.ndarray) -> np.ndarray:
-    """Faces of three or four corners as triangles, shape (m, 3); bare points and lines give none."""
+    """Return faces of three or four corners as triangles, shape (m, 3); bare points and lines give none."""
     if faces.shape[1] < 3:
         return np.empty((0, 3), dtype=int)
     return faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
 def shaded(points: np.ndarray, triangles: np.ndarray, *, sharp: bool = False) -> Surface:
-    """Points and triangles with normals: averaged over each point's triangles, or of each triangle where `sharp`."""
+    """Add normals to points and triangles: averaged over each point's triangles, or of each triangle where `sharp`."""
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     if sharp:
@@ -181,7 +181,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def _at(flat: np.ndarray, height: float) -> np.ndarray:
-    """Points in the plane (..., 2) with their z."""
+    """Return points in the plane (..., 2) with their z."""
     return np.concatenate([flat, np.full((*flat.shape[:-1], 1), height)], axis=-1)
 
 

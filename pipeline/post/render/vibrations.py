@@ -15,13 +15,13 @@ from flexclear.pipeline.post.shapes.body_shape import hertz, linear_fields
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
 FRACTION = 0.12
-#: largest drawn rotation of any frame [rad]: points of a body that turns further would leave it, they move linearly
+#: largest drawn rotation of any frame [rad]: points move linearly, and would leave a body that turns further
 TURN = 0.5
-#: size of a film's pictures and of those on a sheet, and how many are next to each other there
+#: size of a film's pictures and of those on a sheet, and number of pictures in a row of a sheet
 SIZE, TILE, COLUMNS = (960, 540), (480, 360), 3
-#: how long one vibration is shown [s], and how many periods it goes through meanwhile
+#: duration of one vibration in a film [s], and number of its periods
 SECONDS, PERIODS = 1.5, 2
-#: most vibrations that are shown, the slowest ones
+#: largest number of shown vibrations, the slowest ones
 SHOWN = 12
 #: displacement of the centre of mass and rotation in each vibration, (vibration, part, 3), by index of the body
 Motions = Mapping[int, tuple[np.ndarray, np.ndarray]]
@@ -31,8 +31,8 @@ Motions = Mapping[int, tuple[np.ndarray, np.ndarray]]
 class Piece:
     """One skin at rest, world axes, and its complex displacement in each vibration.
 
-    moved: real and imaginary part [m per unit of the vibration's coordinate], shape (vibration, 2, point, 3).
-    plain: whether its own colour is drawn, else how far each point moves.
+    moved: real and imaginary part [m per unit of the vibration's coordinate], shape (vibration, 2, point, 3). plain:
+    True for the skin's own colour, else colours show the displacement of each point.
     """
 
     surface: surfaces.Surface
@@ -53,7 +53,7 @@ class Vibrations:
 
 
 def as_run(linear: xr.Dataset) -> xr.Dataset:
-    """An equilibrium as a run of one output, in which nothing moves."""
+    """Return an equilibrium as a run of one output, in which nothing moves."""
     still = linear[
         [n for n in ("position", "quaternion", "frame_position", "modal_coordinate", "joint_position") if n in linear]
     ]
@@ -62,7 +62,7 @@ def as_run(linear: xr.Dataset) -> xr.Dataset:
 
 
 def vibrations(drawn: Mechanism, linear: xr.Dataset) -> Vibrations:
-    """What vibrates of a mechanism: motions that only decay or drift are left out.
+    """Return the vibrations of a mechanism: motions that only decay or drift are left out.
 
     drawn: of the equilibrium as a run of one output.  linear: schema LINEAR.
     """
@@ -92,7 +92,7 @@ def vibrations(drawn: Mechanism, linear: xr.Dataset) -> Vibrations:
 
 
 def _scale(linear: xr.Dataset, size: float, largest: np.ndarray) -> np.ndarray:
-    """The factor of each vibration, so that neither displacements nor rotations are drawn too large."""
+    """Return the factor of each vibration, which limits both displacements and rotations."""
     turned = np.linalg.norm(linear["frame_rotation"].values, axis=-1).reshape(len(largest), -1).max(axis=1, initial=0.0)
     factor: np.ndarray = np.minimum(
         FRACTION * size / np.where(largest > 0.0, largest, 1.0), TURN / np.where(turned > 0.0, turned, 1e-300)
@@ -101,9 +101,9 @@ def _scale(linear: xr.Dataset, size: float, largest: np.ndarray) -> np.ndarray:
 
 
 def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexible]) -> Motions:
-    """How each body moves in the vibrations, from one of its named frames; bodies without one rest.
+    """Return the motion of each body in the vibrations, from one of its named frames; bodies without one rest.
 
-    What a flexible body bends there is taken off.
+    The deformation of a flexible body at the frame is subtracted.
     """
     bent = {body.index: body for body in flexible}
     frames = [str(name) for name in linear["frame"].values]
@@ -128,7 +128,7 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
 
 
 def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
+    """Return displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
     move, turn = motions[owner]
     return move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
 
@@ -143,7 +143,7 @@ def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motio
 
 
 def frames(drawn: Mechanism, modes: Vibrations, rate: int, progress: Progress = silent) -> Iterator[np.ndarray]:
-    """The slowest vibrations in turn, at most SHOWN, pictures of shape (540, 960, 3), so many a second."""
+    """Yield the slowest vibrations in turn, at most SHOWN, pictures of shape (540, 960, 3), so many a second."""
     count = round(SECONDS * rate / PERIODS)
     picture, close = _stage(drawn, modes, SIZE)
     shown = min(len(modes.labels), SHOWN)
@@ -156,7 +156,7 @@ def frames(drawn: Mechanism, modes: Vibrations, rate: int, progress: Progress = 
 
 
 def sheet(drawn: Mechanism, modes: Vibrations) -> np.ndarray:
-    """The vibrations at their largest, in rows of three, slowest first: at most SHOWN of them."""
+    """Return the vibrations at their largest, in rows of three, slowest first: at most SHOWN of them."""
     picture, close = _stage(drawn, modes, TILE)
     tiles = [picture(k, 0.0) for k in range(min(len(modes.labels), SHOWN))]
     close()
@@ -168,21 +168,21 @@ def sheet(drawn: Mechanism, modes: Vibrations) -> np.ndarray:
 
 
 def _cloud(modes: Vibrations) -> np.ndarray:
-    """Points that represent all that is drawn, at both ends of each vibration that is shown."""
+    """Return points that represent the drawn extent, at both ends of each shown vibration."""
     clouds = []
     for piece in modes.pieces:
         for k in range(min(len(modes.labels), SHOWN)):
-            way = modes.scale[k] * piece.moved[k, 0, ::5]
-            clouds += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
+            displacement = modes.scale[k] * piece.moved[k, 0, ::5]
+            clouds += [piece.surface.points[::5] + displacement, piece.surface.points[::5] - displacement]
     return np.concatenate(clouds)
 
 
 def _stage(
     drawn: Mechanism, modes: Vibrations, size: tuple[int, int]
 ) -> tuple[Callable[[int, float], np.ndarray], Callable[[], None]]:
-    """What draws one vibration at a phase [rad], shape (height, width, 3), and what closes the stage.
+    """Return a function that draws a vibration at a phase [rad], (height, width, 3), and one that closes the stage.
 
-    Imports pyvista, which ends the process where there are no GL libraries.
+    Imports pyvista, which ends the process without GL libraries.
     """
     from flexclear.pipeline.post.render import film
 
@@ -200,10 +200,10 @@ def _stage(
     def picture(vibration: int, phase: float) -> np.ndarray:
         scale, largest = modes.scale[vibration], modes.largest[vibration] or 1.0
         for piece, mesh in zip(modes.pieces, skins, strict=True):
-            way = np.cos(phase) * piece.moved[vibration, 0] - np.sin(phase) * piece.moved[vibration, 1]
-            mesh.points = piece.surface.points + scale * way
+            displacement = np.cos(phase) * piece.moved[vibration, 0] - np.sin(phase) * piece.moved[vibration, 1]
+            mesh.points = piece.surface.points + scale * displacement
             if not piece.plain:
-                mesh["displacement"] = np.linalg.norm(way, axis=1) / largest
+                mesh["displacement"] = np.linalg.norm(displacement, axis=1) / largest
         pixels = film.image(stage)
         caption.onto(pixels, f"{modes.labels[vibration]}; drawn larger than it is")
         return pixels

@@ -1,4 +1,4 @@
-"""From where a mechanism is examined: a planar one along its normal, any other from above and in front."""
+"""Direction of view of a mechanism: a planar one along its normal, any other from above and in front."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-#: from a spatial mechanism to the eye, and how far the eye is from a planar mechanism's normal: depth is then seen
+#: direction from a spatial mechanism to the eye, and tilt of the eye from a planar mechanism's normal, to show depth
 SPATIAL, TILT = np.array([-0.95, 1.45, 0.68]), 0.32
 #: speeds out of the plane that are rounding, as a fraction of those in it
 PLANAR = 1e-3
-#: angle of vision from the lower to the upper edge of a picture [degrees], and what is left around the mechanism
+#: angle of vision from the lower to the upper edge of a picture [degrees], and margin around the mechanism
 ANGLE, MARGIN = 30.0, 1.08
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """direction: from the mechanism to the eye, not scaled, shape (3,).  up: what is up in the picture."""
+    """direction: from the mechanism to the eye, not scaled, shape (3,).  up: upward direction of the picture."""
 
     direction: np.ndarray
     up: np.ndarray
@@ -32,10 +32,10 @@ def view(
     asked: Sequence[float] | None = None,
     upwards: Sequence[float] | None = None,
 ) -> View:
-    """The view of a run.
+    """Return the view of a run.
 
-    given: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
-    asked, upwards: direction to the eye, and what is up, as the user wants them.
+    given: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms. asked,
+    upwards: direction to the eye, and upward direction, as the user requests them.
     """
     up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     if asked is not None:
@@ -48,7 +48,7 @@ def view(
 
 
 def flat(normal: np.ndarray, given: Mapping[str, Any], upwards: Sequence[float] | None = None) -> View:
-    """The view of a planar mechanism along its normal; the other arguments as of `view`."""
+    """Return the view of a planar mechanism along its normal; the other arguments as of `view`."""
     up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     above = _across(up, normal)
     right = np.cross(above, normal)
@@ -57,13 +57,13 @@ def flat(normal: np.ndarray, given: Mapping[str, Any], upwards: Sequence[float] 
     return View(np.linalg.norm(SPATIAL) * (normal + TILT * (0.6 * above - 0.5 * right)), above, True)
 
 
-def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Where the eye is, and what it looks at, so that all points of a cloud (n, 3) are in the picture.
+def eye(camera: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return position and focus of the eye, so that all points of a cloud (n, 3) are in the picture.
 
     aspect: width of the picture over its height; the angle of vision is ANGLE upright.
     """
-    towards_eye = seen.direction / np.linalg.norm(seen.direction)
-    up = _across(seen.up, towards_eye)
+    towards_eye = camera.direction / np.linalg.norm(camera.direction)
+    up = _across(camera.up, towards_eye)
     axes = np.array([np.cross(up, towards_eye), up, towards_eye])
     local = cloud @ axes.T
     middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
@@ -74,15 +74,15 @@ def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tupl
     return focus + MARGIN * distance / zoom * towards_eye, focus
 
 
-def axes_of(seen: View, position: np.ndarray, focus: np.ndarray) -> np.ndarray:
-    """Right, up and back of an eye (`eye`), columns of shape (3, 3)."""
+def axes_of(camera: View, position: np.ndarray, focus: np.ndarray) -> np.ndarray:
+    """Return right, up and back of an eye (`eye`), columns of shape (3, 3)."""
     back = (position - focus) / np.linalg.norm(position - focus)
-    right = np.cross(seen.up, back) / np.linalg.norm(np.cross(seen.up, back))
+    right = np.cross(camera.up, back) / np.linalg.norm(np.cross(camera.up, back))
     return np.column_stack([right, np.cross(back, right), back])
 
 
 def _spatial(up: np.ndarray) -> View:
-    """From above and in front, whatever is up."""
+    """Return the view from above and in front, for any upward direction."""
     side = np.eye(3)[int(np.argmin(np.abs(up) + np.array([0.0, 1e-9, 2e-9])))]
     x = side - (side @ up) * up
     x /= np.linalg.norm(x)
@@ -90,7 +90,7 @@ def _spatial(up: np.ndarray) -> View:
 
 
 def plane(run: xr.Dataset) -> np.ndarray | None:
-    """The normal of the plane in which all bodies move, shape (3,); None where they move in space, or not at all."""
+    """Return the normal of the plane in which all bodies move, shape (3,); None for spatial motion or rest."""
     turning = run["angular_velocity"].values.reshape(-1, 3)
     moving = run["velocity"].values.reshape(-1, 3)
     spin, speed = (float(np.linalg.norm(values, axis=1).max(initial=0.0)) for values in (turning, moving))
@@ -109,20 +109,20 @@ def plane(run: xr.Dataset) -> np.ndarray | None:
 
 
 def gravity(given: Mapping[str, Any]) -> np.ndarray:
-    """Sum of the gravity loads among a scene's parameters [m/s^2], shape (3,)."""
+    """Return the sum of the gravity loads among a scene's parameters [m/s^2], shape (3,)."""
     fields = [load["acceleration"] for load in given.get("load", {}).values() if load["type"] == "gravity"]
     return np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
 
 
 def _up(given: Mapping[str, Any]) -> np.ndarray:
-    """Against gravity, where there is some; else z."""
+    """Return the direction against gravity; z without gravity."""
     total = gravity(given)
     size = float(np.linalg.norm(total))
     return -total / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
 def _across(up: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """`up` made perpendicular to a direction; another axis where they are nearly parallel."""
+    """Return `up` made perpendicular to a direction; another axis where they are nearly parallel."""
     unit = direction / np.linalg.norm(direction)
     for candidate in (up, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])):
         rest = candidate - (candidate @ unit) * unit

@@ -1,6 +1,6 @@
-"""Whether a sequence of states, one per period, is periodic, quasi-periodic or chaotic: diagnostics.
+"""Diagnostics of a sequence of states, one per period: periodic, quasi-periodic or chaotic.
 
-All take sections: states at equal phases, in any coordinates that distinguish states. None knows of mechanisms.
+All take sections: states at equal phases, in any coordinates that distinguish states. None depends on mechanisms.
 
 Sources: 0-1 test: Gottwald & Melbourne (2009), On the implementation of the 0-1 test for chaos, SIAM J. Appl. Dyn.
 Syst. 8, 129-145. Batch means: Schmeiser (1982), Batch size effects in the analysis of simulation output, Operations
@@ -21,13 +21,13 @@ AWAY = np.pi / 5.0
 BATCHES = 20
 #: longest period that is searched for, in periods of the drive
 LONGEST = 32
-#: lines of a spectrum that may hold nearly everything, where a motion has few frequencies
+#: number of lines that hold nearly the whole spectrum of a motion with few frequencies
 LINES = 16
-#: a state that comes back to this fraction of the motion's size has come back: what is left is far below any picture
+#: a state returns within this fraction of the motion's size: the rest is invisible in any picture
 RETURNED = 1e-4
 #: returns from which a contraction is reported
 FEWEST = 4
-#: an observable is still when it changes by less than this fraction of its size: rounding and the steps' errors
+#: an observable is constant when it changes by less than this fraction of its size: rounding and integration errors
 STANDING = 1e-9
 
 
@@ -41,7 +41,7 @@ class Interval:
 
 
 def exponent(growth: np.ndarray, period: float) -> Interval:
-    """Largest Lyapunov exponent [1/s] from the logarithms of a neighbour's growth per period, shape (n,).
+    """Return the largest Lyapunov exponent [1/s] from logarithms of a perturbed run's growth per period, shape (n,).
 
     The interval is that of batch means, since growths of neighbouring periods are correlated.
     """
@@ -54,11 +54,11 @@ def exponent(growth: np.ndarray, period: float) -> Interval:
 
 
 def zero_one(series: np.ndarray) -> float:
-    """K of the 0-1 test, close to 0 for regular and close to 1 for chaotic motion; NaN for a series that is still.
+    """Return K of the 0-1 test, close to 0 for regular and close to 1 for chaotic motion; NaN for a constant series.
 
-    series: one observable, shape (n,), of some hundreds at least.  Its mean is taken off, so that the mean square
-    displacement of the translation variables has no oscillating term; its correlation with time, up to n / 10, is K,
-    of which the median over random frequencies is returned.
+    series: one observable, shape (n,), of some hundreds at least.  The mean is subtracted, so that the mean square
+    displacement of the translation variables has no oscillating term; K is its correlation with time, up to n / 10. The
+    median of K over random frequencies is returned.
     """
     n = len(series)
     x = series - series.mean()
@@ -75,10 +75,10 @@ def zero_one(series: np.ndarray) -> float:
 
 
 def period_of(states: np.ndarray, size: float) -> tuple[int, float]:
-    """Smallest number of periods after which the last quarter of the states comes back; 0 where none up to LONGEST is.
+    """Return the number of periods after which the last quarter of the states returns; 0 if none up to LONGEST.
 
-    states: shape (n, d).  size: of the whole motion, of which RETURNED counts as nothing.
-    Returns the number, and the largest distance of a return as a fraction of the size: of the number's, or of the best.
+    states: shape (n, d).  size: of the whole motion, of which RETURNED counts as nothing. Also returns the largest
+    distance of a return as a fraction of the size, for that number or for the best.
     """
     last = states[-max(len(states) // 4, 4) :]
     best = np.inf
@@ -91,9 +91,9 @@ def period_of(states: np.ndarray, size: float) -> tuple[int, float]:
 
 
 def contraction(states: np.ndarray, period: int = 1) -> float:
-    """Factor per period by which successive returns come closer, fitted while they do; else NaN.
+    """Return the factor per period by which successive returns come closer, fitted while they do; else NaN.
 
-    states: shape (n, d), with some of the transient.  Distances count until they come within tenfold of where they end.
+    states: shape (n, d), with some of the transient.  Distances count until they are within tenfold of the final ones.
     """
     distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
     settled = 10.0 * float(np.median(distance[-max(len(distance) // 4, 1) :]))
@@ -104,7 +104,7 @@ def contraction(states: np.ndarray, period: int = 1) -> float:
 
 
 def spectrum(series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fraction of the variance at each frequency (cycles per period), Hann window; shapes (n // 2 + 1,)."""
+    """Return the fraction of the variance at each frequency (cycles per period), Hann window; shapes (n // 2 + 1,)."""
     x = (series - series.mean()) * np.hanning(len(series))
     power = np.abs(np.fft.rfft(x)) ** 2
     total = power.sum()
@@ -112,8 +112,8 @@ def spectrum(series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def few_lines(series: np.ndarray) -> float:
-    """Fraction of the variance in the LINES largest lines of the spectrum, each with its two neighbours on both
-    sides."""
+    """Return the fraction of the variance in the LINES largest lines of the spectrum, with two neighbours on each
+    side."""
     _, power = spectrum(series)
     left, fraction = power.copy(), 0.0
     for _ in range(LINES):
@@ -125,7 +125,7 @@ def few_lines(series: np.ndarray) -> float:
 
 
 def principal(states: np.ndarray) -> np.ndarray:
-    """The states along their directions of largest variance, each component of unit size at first; (n, <= 3)."""
+    """Return the states along their directions of largest variance, each component scaled before; (n, <= 3)."""
     centred = states - states.mean(axis=0)
     scale = centred.std(axis=0)
     moving = scale > STANDING * max(float(np.abs(states).max()), 1e-300)
@@ -136,7 +136,7 @@ def principal(states: np.ndarray) -> np.ndarray:
 
 
 def autocorrelation(series: np.ndarray, lags: int = 20) -> np.ndarray:
-    """Correlation of a series with itself, 0 to `lags` periods later; NaN where it is still."""
+    """Return the correlation of a series with itself, 0 to `lags` periods later; NaN for a constant series."""
     x = series - series.mean()
     total = float(x @ x)
     if total == 0.0:

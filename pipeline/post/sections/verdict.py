@@ -1,16 +1,16 @@
-"""Periodic, quasi-periodic or chaotic: the verdict on a scene's sections, with its evidence (schema VERDICT).
+"""Verdict on a scene's sections: periodic, quasi-periodic or chaotic, with its evidence (schema VERDICT).
 
 One rule for all:
 
-- *periodic* when the states come back, and the largest exponent is not positive;
-- *chaotic* when the whole confidence interval of the largest exponent is above what freedoms give on which nothing
-  depends, and the 0-1 test says so;
-- *quasi-periodic* when the exponent may be zero, the 0-1 test says regular, and a few lines hold the spectrum;
+- *periodic* when the states return, and the largest exponent is not positive;
+- *chaotic* when the whole confidence interval of the largest exponent is above the apparent exponent of neutral
+  freedoms, and the 0-1 test agrees;
+- *quasi-periodic* when the exponent may be zero, the 0-1 test gives regular, and a few lines hold the spectrum;
 - *undecided* otherwise.
 
-A freedom on which nothing depends, such as the spin of a leg with balls at both ends, lets neighbours part in
-proportion to time: in n periods its exponent is seen as ln(n) / n per period, and no smaller one can be determined from
-it.
+A neutral freedom, on which nothing depends, such as the spin of a leg with balls at both ends, lets perturbed runs
+diverge in proportion to time: after n periods its apparent exponent is ln(n) / n per period, and no smaller exponent
+can be determined.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
 REGULAR, CHAOTIC = 0.2, 0.8
 #: fraction of the variance that few lines hold in the spectrum of a motion with few frequencies
 DISCRETE = 0.95
-#: states below which the 0-1 test and the spectrum show nothing
+#: number of states below which the 0-1 test and the spectrum show nothing
 ENOUGH = 200
 
 VERDICT: Schema = table("""
@@ -52,7 +52,7 @@ impact_correlation? | lag contact | 1 | correlation of the first impact's phase 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a motion is, and why in words.
+    """Kind of a motion, and reasons in words.
 
     numbers: as in the schema VERDICT.  principal: states along their directions of largest variance, (n, components).
     """
@@ -64,7 +64,7 @@ class Verdict:
 
 
 def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) -> Verdict:
-    """The verdict on states at equal phases, shape (n, d), and logarithms of a neighbour's growth per period, (k,).
+    """Judge states at equal phases, shape (n, d), and logarithms of a perturbed run's growth per period, (k,).
 
     period [s].  size: of the whole motion, in the units of the states.
     """
@@ -112,7 +112,7 @@ def _rule(
 
 
 def derive(sections: xr.Dataset) -> xr.Dataset:
-    """Verdict and evidence (schema VERDICT) of a scene's sections (schema SECTIONS)."""
+    """Return verdict and evidence (schema VERDICT) of a scene's sections (schema SECTIONS)."""
     states, size = features(sections)
     period = float(sections.attrs["period"])
     verdict = judge(states, sections.growth.values, period, size)
@@ -133,7 +133,7 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
 
 
 def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:
-    """States at the sections, each kind of coordinate in units of its own change over a period; their size then.
+    """Return states at the sections, each kind of coordinate in units of its change over a period, and their size then.
 
     Shape (section, ...): positions, rotation matrices (which have no sign to choose), velocities, offsets.
     """
@@ -144,9 +144,9 @@ def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:
             continue
         values, orbit = (sections[which].values for which in (name, f"orbit_{name}"))
         for k in range(values.shape[1]):
-            here, way = (x[:, k] if form is None else form(x[:, k]).reshape(len(x), 9) for x in (values, orbit))
-            size = float(np.linalg.norm(way - way.mean(axis=0), axis=1).max())
-            if size > chaos.STANDING * max(float(np.abs(way).max()), 1e-300):
+            here, path = (x[:, k] if form is None else form(x[:, k]).reshape(len(x), 9) for x in (values, orbit))
+            size = float(np.linalg.norm(path - path.mean(axis=0), axis=1).max())
+            if size > chaos.STANDING * max(float(np.abs(path).max()), 1e-300):
                 columns.append(here / size)
     if not columns:
         return np.zeros((sections.sizes["section"], 1)), 1.0
@@ -154,7 +154,7 @@ def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:
 
 
 def first_impacts(sections: xr.Dataset, contact: str) -> np.ndarray:
-    """Phase of the first impact in each period that has one [s]."""
+    """Return the phase of the first impact in each period that has one [s]."""
     mine = sections.impact_contact.values == contact
     _, first = np.unique(sections.impact_section.values[mine], return_index=True)
     phases: np.ndarray = sections.impact_phase.values[mine][first]

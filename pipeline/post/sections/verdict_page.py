@@ -38,7 +38,7 @@ HEAD = ("scene", "verdict", "exponent, 1/s", "95 %", "K", "comes back after", "t
 
 
 def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], page: str, pictures: str) -> str:
-    """The whole page. verdicts, sections: schemas VERDICT and SECTIONS, by scene; pictures: their folder."""
+    """Return the whole page. verdicts, sections: schemas VERDICT and SECTIONS, by scene; pictures: their folder."""
     first = next(iter(sections.values()))
     text = INTRODUCTION.format(
         scenes=" ".join(verdicts),
@@ -54,7 +54,7 @@ def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Datas
 
 
 def csv_text(verdicts: Mapping[str, xr.Dataset]) -> str:
-    """The verdicts and their exponents [1/s] for programs: columns `COLUMNS`, a line for each scene."""
+    """Return the verdicts and their exponents [1/s] for programs: columns `COLUMNS`, a line for each scene."""
     rows = [
         (
             name,
@@ -68,7 +68,7 @@ def csv_text(verdicts: Mapping[str, xr.Dataset]) -> str:
 
 
 def row(name: str, verdict: xr.Dataset) -> tuple[str, ...]:
-    """A line of the table."""
+    """Return a line of the table."""
     after = int(verdict.returns_after)
     return (
         f"`{name}`",
@@ -88,7 +88,7 @@ POINT = {"s": 9, "lw": 0, "color": COLOR, "alpha": 0.8}
 
 
 def make(sections: xr.Dataset, verdict: xr.Dataset) -> dict[str, bytes]:
-    """sections.png and sections.svg."""
+    """Draw sections.png and sections.svg."""
     with style.style():
         figure, axes = style.grid(1, 4, (13.2, 3.9))
         section, returns, power, growth = axes[0]

@@ -1,7 +1,7 @@
-"""Surface of a deformed body out of its bundle, rod or solid; pure numbers, whoever draws them.
+"""Surface of a deformed body from its bundle, rod or solid; pure numbers for any drawing library.
 
-A bundle draws its body by cells of one kind: two corners are a rod's, three or four a face of a solid's boundary,
-and one a node of a body that is known by matrices alone.
+A bundle draws its body by cells of one kind: two corners are a rod's, three or four a face of a solid's boundary, and
+one a node of a body that is known by matrices alone.
 """
 
 from __future__ import annotations
@@ -11,25 +11,25 @@ import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import von_mises
 
-#: points drawn per element, and around the section; fine enough that no facet is seen at 1000 pixels
+#: points drawn per element, and around the section; fine enough that no facet is visible at 1000 pixels
 PER_CELL, AROUND = 6, 24
 
 
 def is_rod(bundle: xr.Dataset) -> bool:
-    """Whether the body is drawn as a rod."""
+    """Return True when the body is drawn as a rod."""
     return bundle.sizes["corner"] == 2
 
 
 def has_edges(bundle: xr.Dataset) -> bool:
-    """Whether the surface has edges, and is not round all over."""
+    """Return True when the surface has edges, unlike that of a round rod."""
     return not is_rod(bundle) or "outline" in bundle
 
 
 def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the deformed surface [m], shape (point, 3), and the size of their displacement [m], (point,).
+    """Return points of the deformed surface [m], shape (point, 3), and the size of their displacement [m], (point,).
 
-    bundle: schema BUNDLE.  q: modal coordinates [kg^0.5 m], shape (mode,).  scale: factor on the deformation.
-    Body axes; of a rod the displacement is that of the section's centre.
+    bundle: schema BUNDLE.  q: modal coordinates [kg^0.5 m], shape (mode,).  scale: factor on the deformation. Body
+    axes; for a rod the displacement is that of the section's centre.
     """
     if is_rod(bundle):
         rings, size = rod_surface(bundle, q, scale)
@@ -39,7 +39,7 @@ def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.n
 
 
 def faces(bundle: xr.Dataset) -> np.ndarray:
-    """Corners of the faces between the points of `surface`, shape (face, corners); of one corner for bare nodes."""
+    """Return corners of the faces between the points of `surface`, shape (face, corners); one corner for bare nodes."""
     if not is_rod(bundle):
         return bundle.cell_node.values.astype(int)
     around = AROUND + 1
@@ -50,7 +50,7 @@ def faces(bundle: xr.Dataset) -> np.ndarray:
 
 
 def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
-    """Factor that makes the largest displacement this fraction of the body's length; 1 for no displacement.
+    """Return the factor that makes the largest displacement this fraction of the body's length; 1 without displacement.
 
     Where the centre line of a rod does not move (torsion), the largest section rotation is made 1 rad.
     """
@@ -64,7 +64,7 @@ def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
 
 
 def box(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Principal directions of the undeformed nodes, rows of shape (3, 3), and their extents [m], longest first."""
+    """Return principal directions of the undeformed nodes, rows, (3, 3), and their extents [m], longest first."""
     x = bundle.node_position.values
     axes = np.linalg.svd(x - x.mean(axis=0), full_matrices=True)[2]
     extent = np.ptp(x @ axes.T, axis=0)
@@ -72,47 +72,47 @@ def box(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return axes[order], extent[order]
 
 
-#: a small step of a coordinate, in which a skin moves linearly
+#: small step of a coordinate, for which a skin moves linearly
 SMALL = 1e-6
 
 
 def hertz(frequency: float) -> str:
-    """A frequency in words."""
+    """Format a frequency."""
     return "static" if not frequency > 0.0 else f"{frequency:.5g} Hz"
 
 
 def fields_of(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Points of a body's skin at rest (point, 3), and how each moves per unit of each coordinate, (mode, point, 3)."""
+    """Return points of a body's skin at rest (point, 3), and their derivatives by each coordinate, (mode, point, 3)."""
     count = bundle.sizes["mode"]
     rest = surface(bundle, np.zeros(count))[0]
     return rest, np.array([(surface(bundle, SMALL * unit)[0] - rest) / SMALL for unit in np.eye(count)])
 
 
 def linear_fields(bundle: xr.Dataset) -> np.ndarray:
-    """How each point of a body's skin moves per unit of each coordinate, about its centre of mass; body axes."""
+    """Return derivatives of a body's skin points by each coordinate, relative to its centre of mass; body axes."""
     centre = bundle["modal_first_moment"].values / float(bundle["mass"])
     return fields_of(bundle)[1] - centre.T[:, None, :]
 
 
 def stress_recorded(run: xr.Dataset) -> list[str]:
-    """Bodies whose stress a run has."""
+    """Return the bodies whose stress a run records."""
     return list(dict.fromkeys(map(str, run["gauge_body"].values))) if "von_mises_stress" in run else []
 
 
 def stress_of_bodies(run: xr.Dataset) -> np.ndarray:
-    """Von Mises stress of whole bodies, at their nodes or sections where it is largest [Pa], shape (time, body)."""
+    """Return the largest von Mises stress of whole bodies, over their nodes or sections [Pa], shape (time, body)."""
     return np.asarray(run["von_mises_stress"].values[:, run["gauge"].values == run["gauge_body"].values])
 
 
 def largest_stress(run: xr.Dataset) -> float:
-    """Largest of these over the run [Pa]."""
+    """Return the largest stress of any body over the run [Pa]."""
     return float(stress_of_bodies(run).max())
 
 
 def stress_on_surface(run: xr.Dataset, bundle: xr.Dataset, body: str, step: int) -> np.ndarray:
-    """Von Mises stress [Pa] at the points of `surface`, of one body at one output, shape (point,).
+    """Return von Mises stress [Pa] at the points of `surface`, of one body at one output, shape (point,).
 
-    Of a rod the largest of the section, linear between sections.
+    For a rod it is the largest of the section, linear between sections.
     """
     if not is_rod(bundle):
         factor = run["stress_factor"].values[step, run["stress_field_body"].values == body]
@@ -124,11 +124,11 @@ def stress_on_surface(run: xr.Dataset, bundle: xr.Dataset, body: str, step: int)
 
 
 def centre_line(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Undeformed points [m], displacements [m] and section rotation vectors [rad] along the rod.
+    """Return undeformed points [m], displacements [m] and section rotation vectors [rad] along the rod.
 
-    bundle: schema BUNDLE with its cells in order from start to end.  q: modal coordinates
-    [kg^0.5 m], shape (mode,).  scale: factor on the deformation.  Each result has shape (point, 3),
-    body axes; bending is interpolated by cubics from the node rotations, twist linearly.
+    bundle: schema BUNDLE with its cells in order from start to end.  q: modal coordinates [kg^0.5 m], shape (mode,).
+    scale: factor on the deformation.  Each result has shape (point, 3), body axes; bending is interpolated by cubics
+    from the node rotations, twist linearly.
     """
     x = bundle.node_position.values
     u = scale * bundle.shape_translation.values @ q
@@ -142,9 +142,9 @@ def centre_line(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[
 
 
 def rod_surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the deformed rod_surface [m], shape (ring, around, 3), and the displacement size [m], (ring,).
+    """Return points of the deformed rod surface [m], shape (ring, around, 3), and the displacement size [m], (ring,).
 
-    The sections stay plane and turn with the rod, so that torsion is seen too; both ends are capped.
+    The sections stay plane and turn with the rod, so that torsion is visible too; both ends are capped.
     """
     points, displacement, turn = centre_line(bundle, q, scale)
     cells = _spokes(bundle, points)
@@ -161,14 +161,14 @@ def rod_surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[
 
 
 def _spokes(bundle: xr.Dataset, points: np.ndarray) -> np.ndarray:
-    """From the centre line to the outline of each cell [m], shape (cell, around, 3)."""
+    """Return vectors from the centre line to the outline of each cell [m], shape (cell, around, 3)."""
     if "outline" in bundle:
         return np.asarray(bundle["outline"].values)
     return np.asarray(bundle.radius.values[:, None, None] * circle(points[-1] - points[0]))
 
 
 def circle(axis: np.ndarray, around: int = AROUND) -> np.ndarray:
-    """Points around an axis, at the distance one from it, the last one the first, shape (around + 1, 3)."""
+    """Return points of a unit circle about an axis, the last one the first, shape (around + 1, 3)."""
     axis = axis / np.linalg.norm(axis)
     side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     side /= np.linalg.norm(side)
@@ -179,7 +179,7 @@ def circle(axis: np.ndarray, around: int = AROUND) -> np.ndarray:
 def _element(
     x: np.ndarray, u: np.ndarray, rotation: np.ndarray, s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points, displacements and rotations inside one element at local coordinates s in [0, 1)."""
+    """Return points, displacements and rotations inside one element at local coordinates s in [0, 1)."""
     axis = x[1] - x[0]
     along = (u[1] - u[0]) @ axis / (axis @ axis) * axis
     slope = np.cross(rotation, axis) + along

@@ -1,1 +1,1 @@
-"""What follows from one run: series, impacts, wear, horizon."""
+"""Results that follow from one run: series, impacts, wear, horizon."""

@@ -1,4 +1,4 @@
-"""What the post stage derives from one run: dimensions, units and meaning (artifact `post`)."""
+"""Schema of the post stage's results from one run: dimensions, units and meaning (artifact `post`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 from flexclear.pipeline.core.artifacts.schema import RUN, Schema
 from flexclear.pipeline.core.scene.output import table
 
-#: what an ensemble is described of by mean, standard deviation and quantiles over its members
+#: variables of an ensemble with mean, standard deviation and quantiles over its members
 _OF_MEMBERS = table("""
 rotation_y? | ensemble_time ensemble_body | rad | rotation y
 displacement? | ensemble_time ensemble_body axis | m | displacement

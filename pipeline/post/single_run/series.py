@@ -1,7 +1,7 @@
-"""From one run (and its ensemble) to the series that figures, tables and people look at: impacts and wear included.
+"""Series of one run (and its ensemble) for figures and tables, impacts and wear included.
 
-Wear: depths by Archard's law, and where on pin and socket it happens. Totals are the run's own integrals. Over the
-surfaces they are spread along the way of the contact between recorded rows, which are the outputs and all events; a
+Wear: depths by Archard's law, and their distribution over pin and socket. Totals are the run's own integrals. They are
+spread over the surfaces along the path of the contact between recorded rows, which are the outputs and all events; a
 contact that turns by more than a sector between two outputs is spread along the shorter arc.
 """
 
@@ -26,17 +26,17 @@ Arrays = dict[str, np.ndarray]
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
-    """What `derived` gives, of datasets."""
+    """Return `derived` for datasets."""
     return derived(of(run), None if ensemble is None else of(ensemble)).to_xarray()
 
 
 def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> LabelledArrays:
-    """The post artifact of one run (schema POST): rotations, displacements, reactions, impacts, horizon.
+    """Return the post artifact of one run (schema POST): rotations, displacements, reactions, impacts, horizon.
 
-    run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one there are no ensemble
-    variables.  The horizon is the run's own (its end where it has none), the ensemble's is called so.
-    Nothing is interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`.
-    Raises InputError for what is left of a run that was stopped.
+    run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one the artifact has no ensemble
+    variables.  `horizon` is the run's own (its end where it has none), `ensemble_horizon` the ensemble's. Nothing is
+    interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`. Raises InputError for the
+    results of a run that was stopped.
     """
     require_complete(run)
     arrays: Arrays = {**motion(run), **contacts(run), **impacts(run), **wear(run, parameters(run).get("joint", {}))}
@@ -63,7 +63,7 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
 
 
 def motion(run: xr.Dataset | LabelledArrays) -> Arrays:
-    """Angle about y, total rotation and displacement of every body."""
+    """Return angle about y, total rotation and displacement of every body."""
     q, position = run["quaternion"].values, run["position"].values
     return {
         "rotation_y": angle_about_y(q),
@@ -73,7 +73,7 @@ def motion(run: xr.Dataset | LabelledArrays) -> Arrays:
 
 
 def reactions(run: xr.Dataset | LabelledArrays) -> np.ndarray:
-    """Magnitude of what each joint transmits [N], shape (time, joint).
+    """Return the magnitude of the force that each joint transmits [N], shape (time, joint).
 
     For a joint with clearance that is the contact force.
     """
@@ -87,7 +87,7 @@ def reactions(run: xr.Dataset | LabelledArrays) -> np.ndarray:
 
 
 def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Arrays:
-    """Largest magnitudes and their times, of all rows: regular outputs, events, deepest points of contacts.
+    """Return largest magnitudes and their times, of all rows: regular outputs, events, deepest points of contacts.
 
     reaction: of every joint [N], shape (time, joint).
     """
@@ -113,7 +113,7 @@ def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Arrays:
 
 
 def contacts(run: xr.Dataset | LabelledArrays) -> Arrays:
-    """Eccentricity, clearance and fraction of time in contact, per contact."""
+    """Return eccentricity, clearance and fraction of time in contact, per contact."""
     if "contact_offset" not in run:
         return {}
     distance = np.linalg.norm(run["contact_offset"].values, axis=-1)
@@ -127,7 +127,7 @@ def contacts(run: xr.Dataset | LabelledArrays) -> Arrays:
 
 
 def _time_share(run: xr.Dataset | LabelledArrays) -> np.ndarray:
-    """Fraction of the run that each contact is closed, from its located begins and ends."""
+    """Return the fraction of the run that each contact is closed, from its located begins and ends."""
     time, fraction, names = run["time"].values, np.zeros(run.sizes["contact"]), list(run["contact"].values)
     closings = of_kind(run, "closing")
     begun, lasted = run["event_time"].values[closings], run["event_duration"].values[closings]
@@ -138,7 +138,7 @@ def _time_share(run: xr.Dataset | LabelledArrays) -> np.ndarray:
 
 
 def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:
-    """Largest normal force: of the outputs and of the peaks that the solver tracked between them."""
+    """Return the largest normal force: of the outputs and of the peaks that the solver tracked between them."""
     peak: np.ndarray = run["contact_normal_force"].values.max(axis=0)
     for k, name in enumerate(run["contact"].values):
         tracked = run["event_peak_force"].values[run["event_contact"].values == name]
@@ -147,16 +147,16 @@ def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:
 
 
 def parameters(run: xr.Dataset | LabelledArrays) -> dict:
-    """The scene's parameters from the run's attributes; empty when they do not."""
+    """Return the scene's parameters from the run's attributes; empty where the run lacks them."""
     return json.loads(run.attrs.get("parameters", "{}"))
 
 
 def impacts(run: xr.Dataset | LabelledArrays) -> Arrays:
-    """Variables ``impact_*`` of the post artifact; empty for a run without contacts.
+    """Return variables ``impact_*`` of the post artifact; empty for a run without contacts.
 
-    Listed and counted are the closings with an approach speed above IMPACT; the separation speed is
-    that of the next opening of the same contact.  Of one that the run's end cuts short, separation
-    speed, duration, impulse and losses are NaN.
+    Impacts are the closings with an approach speed above IMPACT; the separation speed is that of the next opening of
+    the same contact.  Separation speed, duration, impulse and losses are NaN for an impact that the run's end cuts
+    short.
     """
     if "event_time" not in run or "contact" not in run.sizes:
         return {}
@@ -178,7 +178,7 @@ def impacts(run: xr.Dataset | LabelledArrays) -> Arrays:
     }
 
 
-#: what the run's ledger books of contacts, by the name that an impact's fraction of it has
+#: contact integrals of the run's energy ledger, by the variable of an impact's part of them
 BOOKS = {
     "impact_impulse": "contact_impulse",
     "impact_damping_loss": "contact_damping_loss",
@@ -187,7 +187,7 @@ BOOKS = {
 
 
 def _books(run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray) -> Arrays:
-    """Impulse and losses of each impact, NaN where it has not ended; there are rows at all events."""
+    """Return impulse and losses of each impact, NaN where it has not ended; the run has rows at all events."""
     time, booked = run["time"].values, Arrays()
     for name, book in BOOKS.items():
         if book in run:
@@ -200,25 +200,25 @@ def _books(run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndar
 
 
 def of_kind(run: xr.Dataset | LabelledArrays, name: str) -> np.ndarray:
-    """True for the events of a kind, e.g. those that close a gap, shape (event,)."""
+    """Return True for the events of a kind, e.g. those that close a gap, shape (event,)."""
     return np.asarray(run["event_kind"].values == name, dtype=bool)
 
 
 def _next_opening(i: int, contact: np.ndarray, openings: np.ndarray) -> int:
-    """Index of the first opening of the same contact after event i, or -1."""
+    """Return the index of the first opening of the same contact after event i, or -1."""
     later = np.flatnonzero((contact[i + 1 :] == contact[i]) & openings[i + 1 :])
     return int(i + 1 + later[0]) if later.size else -1
 
 
-#: steps of the way between two rows, each of which goes to one sector; bands of a sphere, of equal area
+#: steps of the path between two rows, each of which goes to one sector; bands of a sphere, of equal area
 PIECES, BANDS = 16, 18
 SURFACES = ("outer", "inner")
 
 
 def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Arrays:
-    """Variables ``wear_*`` of the post artifact; empty where nothing wears.
+    """Return variables ``wear_*`` of the post artifact; empty without wear.
 
-    joints: what the scene says of its joints.  Depths are those that a surface alone would have; both share the volume.
+    joints: parameters of the scene's joints.  Depths are those that a surface alone would have; both share the volume.
     """
     if "wear_load_path" not in run:
         return {}
@@ -253,7 +253,7 @@ def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Arrays:
 
 
 def _area(joint: dict[str, Any], side: str) -> float:
-    """Area of a surface [m^2]; half a sphere is not distinguished from a whole one."""
+    """Return the area of a surface [m^2]; half a sphere is not distinguished from a whole one."""
     widened = float(joint["clearance"]) if side == "outer" else 0.0
     if "ball_radius" in joint:
         return float(4.0 * np.pi * (joint["ball_radius"] + widened) ** 2)
@@ -261,7 +261,7 @@ def _area(joint: dict[str, Any], side: str) -> float:
 
 
 def spread_over_surface(direction: np.ndarray, totals: np.ndarray, sectors: int, bands: int) -> np.ndarray:
-    """Increments of totals (time, what) in the sectors that a direction (time, 3) passes, (band, sector, what).
+    """Distribute increments of totals (time, what) over sectors passed by a direction (time, 3), (band, sector, what).
 
     Sector s holds angles about z from x on, s to s + 1 times 2 pi/sectors; band b z-components from -1 on.
     """
@@ -283,12 +283,12 @@ def spread_over_surface(direction: np.ndarray, totals: np.ndarray, sectors: int,
     return distributed
 
 
-#: fractions of the members below the recorded quantiles: of so few, the middle and the bulk
+#: fractions of the members below the recorded quantiles: few, the middle and the bulk
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 def spread(velocity: np.ndarray) -> np.ndarray:
-    """Largest distance of a member's velocity from the mean [m/s], over members and bodies, shape (time,).
+    """Return the largest distance of a member's velocity from the mean [m/s], over members and bodies, shape (time,).
 
     velocity: shape (member, time, body, axis) [m/s].
     """
@@ -296,10 +296,10 @@ def spread(velocity: np.ndarray) -> np.ndarray:
 
 
 def horizon(time: np.ndarray, velocity: np.ndarray) -> float:
-    """Time from which on members are separated, by `spread` over the largest speed; the last time if none are [s].
+    """Return the time from which members are separated, by `spread` over the largest speed; else the last time [s].
 
-    Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a
-    pointwise value is one draw out of many.
+    Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a pointwise value is one
+    draw out of many.
     """
     peak = float(np.linalg.norm(velocity, axis=-1).max())
     first = separated_from(time, spread(velocity) / (peak or 1.0), float(time[-1] - time[0]))
@@ -307,7 +307,7 @@ def horizon(time: np.ndarray, velocity: np.ndarray) -> float:
 
 
 def sentence(horizon: float, end: float, members: float | None = None) -> str:
-    """Statement on a run's predictability horizon [s]; end: of the run [s].
+    """Return a statement on a run's predictability horizon [s]; end: of the run [s].
 
     members: horizon of its ensemble [s], which may start further from the run than the perturbed run does.
     """
@@ -324,7 +324,7 @@ def sentence(horizon: float, end: float, members: float | None = None) -> str:
 
 
 def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Arrays:
-    """Mean, standard deviation (``ddof = 1``) and QUANTILES over the members, on the ensemble's own times.
+    """Return mean, standard deviation (``ddof = 1``) and QUANTILES over the members, on the ensemble's own times.
 
     Quantiles are interpolated between members (numpy's default); of an angle, a vector's components, a contact.
     """

@@ -1,1 +1,1 @@
-"""Recipe, mesh and beam matrices. The only package, with modes, that knows of nodes and elements."""
+"""Recipes, meshes and matrices of flexible bodies; only this package and `modes` know nodes and elements."""

@@ -1,4 +1,4 @@
-r"""Spatial beams of two nodes: stiffness and mass of a rod of any section, in any theory and position.
+r"""Two-node spatial beam elements: stiffness and mass of a rod of any section, theory and position.
 
 .. math:: 2U = \int EA\,u'^2 + GJ\,\varphi'^2 + E(I_z \psi_v'^2 + I_y \psi_w'^2 + 2I_{yz}\psi_v'\psi_w')
                + \kappa_y GA\gamma_y^2 + \kappa_z GA\gamma_z^2 ,\qquad
@@ -6,7 +6,7 @@ r"""Spatial beams of two nodes: stiffness and mass of a rod of any section, in a
                + \rho (I_z \dot\psi_v^2 + I_y \dot\psi_w^2 + 2I_{yz}\dot\psi_v\dot\psi_w)
 
 Without shear deformation (Euler-Bernoulli, Rayleigh) the section's slope is that of the axis, :math:`\psi = v'`,
-and deflections are Hermite cubics; `kinematics` has the choices. Extension and twist are linear or quadratic in a
+and deflections are Hermite cubics (see `kinematics`). Extension and twist are linear or quadratic in a
 cell. Sections that change along a cell are integrated at its Gauss points.
 Source: Wang & Wang (2019), sec. 3.2 (12-dof spatial beam elements); Przemieniecki (1968), ch. 5 and 11.
 
@@ -30,19 +30,19 @@ from flexclear.pipeline.structure.fe.section import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
 N_DOFS = len(DOFS)
-#: degree of the extension and of the twist in a cell by the recipe's word
+#: degree of extension and twist in a cell, by the recipe's word
 DEGREE = {"linear": 1, "quadratic": 2}
 
 
 @dataclass(frozen=True)
 class Beam:
-    """Stiffness and mass of a free beam, shape (ndof, ndof), and what field evaluation needs."""
+    """Stiffness and mass of a free beam, shape (ndof, ndof), with the data that field evaluation needs."""
 
     stiffness: sp.csr_array
     mass: sp.csr_array
     kinematics: Kinematics
     basis: Basis
-    to_fields: sp.csr_array  #: vector to scikit-fem's order, rod axes and slopes, shape (ndof, ndof)
+    to_fields: sp.csr_array  #: from a vector to scikit-fem's order, rod axes and slopes, shape (ndof, ndof)
     node_position: np.ndarray  #: [m], mesh frame, shape (nodes, 3)
     axes: np.ndarray  #: R_MR, rod axes (x along the rod) to mesh frame, shape (3, 3)
     component: np.ndarray  #: index in DOFS of each unknown, in rod axes, shape (ndof,)
@@ -60,7 +60,7 @@ class Beam:
 
 
 def assemble(mesh: xr.Dataset) -> Beam:
-    """Matrices of a beam mesh (schema MESH)."""
+    """Assemble the matrices of a beam mesh (schema MESH)."""
     kinematics = THEORIES[mesh.attrs["theory"]]
     basis = _basis(mesh, kinematics)
     axes = mesh["rod_rotation"].values
@@ -73,10 +73,10 @@ def assemble(mesh: xr.Dataset) -> Beam:
 
 
 def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_array:
-    r"""Stiffness that a tension N gives to the deflections, :math:`\int N (v'^2 + w'^2)\,dx`, shape (ndof, ndof).
+    r"""Return the stiffness of deflections under a tension N, :math:`\int N (v'^2 + w'^2)\,dx`, shape (ndof, ndof).
 
     axial_force: N [N], tension positive, of each cell, shape (cells,), or at its Gauss points, shape (cells, points).
-    The axis alone is counted: no term of the twist (Wagner) and none of masses off the axis.
+    Only the axis counts: terms of the twist (Wagner) and of masses off the axis are neglected.
     Source: Przemieniecki (1968), ch. 15.
     """
     beam = assemble(mesh)
@@ -87,7 +87,7 @@ def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_arr
 
 
 def rigid_vectors(beam: Beam, about: np.ndarray | None = None) -> np.ndarray:
-    """Three translations and three rotations about a point, by default the mesh origin, shape (ndof, 6)."""
+    """Return three translations and three rotations about a point, by default the mesh origin, shape (ndof, 6)."""
     inside = beam.size - beam.nodal_size
     positions = np.concatenate([np.repeat(beam.node_position, N_DOFS, axis=0), np.zeros((inside, 3))])
     component = np.append(np.tile(np.arange(N_DOFS), len(beam.node_position)), np.full(inside, N_DOFS))
@@ -95,17 +95,17 @@ def rigid_vectors(beam: Beam, about: np.ndarray | None = None) -> np.ndarray:
 
 
 def node_dofs(nodes: np.ndarray) -> np.ndarray:
-    """Indices of all degrees of freedom of the nodes, in their order."""
+    """Return the indices of all degrees of freedom of the nodes, in the order of the nodes."""
     return (N_DOFS * np.asarray(nodes)[:, None] + np.arange(N_DOFS)).ravel()
 
 
 def in_rod_axes(beam: Beam, vectors: Any) -> Any:
-    """Vectors, dense or sparse of shape (ndof, n), with the nodes' components turned to rod axes."""
+    """Return vectors, dense or sparse of shape (ndof, n), with the nodes' components turned to rod axes."""
     return _to_rod_axes(beam.axes, len(beam.node_position), beam.size) @ vectors
 
 
 def at_points(mesh: xr.Dataset, name: str) -> np.ndarray:
-    """A section constant at the Gauss points, shape (cells, points) or (cells, points, 3)."""
+    """Return a section constant at the Gauss points, shape (cells, points) or (cells, points, 3)."""
     values = mesh[name].values[:, None]
     profile = f"{name}_profile"
     if profile in mesh:
@@ -114,7 +114,7 @@ def at_points(mesh: xr.Dataset, name: str) -> np.ndarray:
 
 
 def per_point(mesh: xr.Dataset, name: str) -> np.ndarray:
-    """A constant of the cells (zero where the mesh has none), shape (cells, points)."""
+    """Return a cell constant at the Gauss points, shape (cells, points); zero where the mesh has no such constant."""
     if name not in mesh:
         return np.zeros((mesh.sizes["cell"], len(POINTS)))
     return np.repeat(mesh[name].values[:, None], len(POINTS), axis=1)
@@ -148,7 +148,7 @@ def _inertia(mesh: xr.Dataset) -> dict[str, np.ndarray]:
 
 
 def _form(kinematics: Kinematics, density: Any) -> BilinearForm:
-    """The form of an energy density of trial and test fields."""
+    """Return the bilinear form of an energy density of trial and test fields."""
     n = len(kinematics.component)
     return BilinearForm(lambda *a: density(kinematics, a[:n], a[n : 2 * n], a[2 * n]))
 
@@ -172,7 +172,7 @@ def _work_of_tension(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> A
 
 
 def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
-    # along the rod from its own start: far from the mesh origin lengths of cells would lose digits
+    # measured from the rod's own start: far from the mesh origin cell lengths would lose digits
     line = MeshLine(mesh["abscissa"].values[None, :].copy(), mesh["cell_node"].values.T.copy())
     extension, twist = (DEGREE[mesh.attrs[name]] for name in ("extension", "torsion"))
     element = ElementComposite(*kinematics.elements(extension, twist))
@@ -180,7 +180,7 @@ def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
 
 
 def _unknowns(mesh: xr.Dataset, basis: Basis, kinematics: Kinematics) -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
-    """Component and position of each unknown, and the signed permutation from vectors to scikit-fem's order."""
+    """Return component and position of each unknown, and the signed permutation from vectors to scikit-fem's order."""
     x, cells = mesh["abscissa"].values, mesh["cell_node"].values
     by_node = np.argsort(NODE_COMPONENT)
     nodal = basis.nodal_dofs[by_node].T.ravel()
@@ -200,7 +200,7 @@ def _to_rod_axes(axes: np.ndarray, nodes: int, size: int) -> sp.csr_array:
 
 
 def _lumped(mesh: xr.Dataset, size: int) -> sp.csr_array:
-    """Masses tied rigidly to nodes: with the offset r of the centre of mass, v = u + theta x r."""
+    """Return the mass matrix of lumped masses: with the offset r of the centre of mass, v = u + theta x r."""
     if "lump_node" not in mesh:
         return sp.csr_array((size, size))
     motion, m = carried(mesh["lump_offset"].values), mesh["lump_mass"].values

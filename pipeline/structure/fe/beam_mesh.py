@@ -1,4 +1,4 @@
-"""Nodes, two-node cells, section constants, lumped masses and named frames of a beam recipe."""
+"""Meshes of beam recipes: nodes, two-node cells, section constants, lumped masses and named frames."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from flexclear.pipeline.structure.fe.beam_recipe import SAME_PLACE, BeamRecipe, 
 from flexclear.pipeline.structure.fe.section import POINTS
 from flexclear.pipeline.structure.fe.vtu import vtu
 
-#: constants that a taper changes, each with a profile
+#: section constants that a taper changes, each with a profile along the cell
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
 
 
 def build(recipe: BeamRecipe, folder: Path, where: str) -> xr.Dataset:
-    """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest)."""
+    """Build the mesh dataset (schema MESH); raise InputError for frames or masses that lie on no node."""
     parts = segments(recipe)
     x = _nodes(parts)
     R_MR = quaternion_to_matrix(recipe.pose.as_quaternion())
@@ -44,13 +44,13 @@ def build(recipe: BeamRecipe, folder: Path, where: str) -> xr.Dataset:
 
 
 def _nodes(parts: tuple[Segment, ...]) -> np.ndarray:
-    """Places of the nodes along the rod [m]."""
+    """Return the positions of the nodes along the rod [m]."""
     pieces = [np.linspace(s.start, s.end, s.elements + 1) for s in parts]
     return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
 
 
 def _constants(recipe: BeamRecipe, parts: tuple[Segment, ...]) -> dict[str, Any]:
-    """Material and section constants of the cells; at the middle of a tapered one, with profiles about it."""
+    """Return material and section constants of the cells; those of tapered cells at mid-cell, with profiles."""
     tapers = any(part.end_section is not None for part in parts)
     pieces = [_segment_constants(recipe, part, tapers) for part in parts]
     joined = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
@@ -76,7 +76,7 @@ def _segment_constants(recipe: BeamRecipe, part: Segment, tapers: bool) -> dict[
         for name in TAPERED:
             at_points = points[name].reshape(n, len(POINTS), *points[name].shape[1:])
             at_middle = middle[name][:, None]
-            # without rotary inertia the middle is zero, and so is every point
+            # without rotary inertia the value at mid-cell is zero, and so is the value at every Gauss point
             values[f"{name}_profile"] = np.divide(
                 at_points, at_middle, out=np.ones_like(at_points), where=at_middle != 0.0
             )
@@ -84,7 +84,7 @@ def _segment_constants(recipe: BeamRecipe, part: Segment, tapers: bool) -> dict[
 
 
 def _section(recipe: BeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.ndarray]:
-    """Section constants at the shares s of a segment, each of shape (s,) or (s, 3)."""
+    """Return the section constants at the fractions s of a segment, each of shape (s,) or (s, 3)."""
     stiffness = section_recipe.constants(part.section, part.end_section, s)
     polar, about_y, about_z, product = section_recipe.inertia(part.section, part.end_section, part.inertia_section, s)
     if recipe.theory == "euler-bernoulli":
@@ -137,7 +137,7 @@ def _types(types: Any) -> str:
 
 
 def _node_at(x: np.ndarray, position: float, where: str) -> int:
-    """Index of the node at `position` [m]; what lies between nodes would need interpolated constraints."""
+    """Return the index of the node at `position` [m]; raise InputError for a position between nodes."""
     nearest = int(np.argmin(np.abs(x - position)))
     if abs(x[nearest] - position) <= SAME_PLACE * x[-1]:
         return nearest
@@ -150,7 +150,7 @@ def _node_at(x: np.ndarray, position: float, where: str) -> int:
 
 
 def as_vtu(mesh: xr.Dataset) -> bytes:
-    """Lines with section data in the cells, for ParaView."""
+    """Return the beam's lines with section data in the cells as a VTU file, for ParaView."""
     names = ("area", "youngs_modulus", "shear_modulus", "density", "second_moment", "inertia_moment")
     data = {name: mesh[name].values for name in names}
     return vtu(mesh["node_position"].values, "line", mesh["cell_node"].values, of_cells=data)

@@ -1,4 +1,4 @@
-"""Recipes of beams: straight rods, uniform, tapered or stepped, with masses on them, anywhere in space."""
+"""Recipes of beams: straight rods (uniform, tapered or stepped), with lumped masses, in any pose."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, 
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
-#: positions along a rod that differ by less than this fraction of its length are the same; they come from decimal text
+#: positions along a rod that differ by less than this fraction of its length are equal; they come from decimal text
 SAME_PLACE = 1e-9
 
 
@@ -22,7 +22,7 @@ class StraightBeam(Part):
 
     type: Literal["straight-beam"]
     length: Annotated[Length, Positive]
-    """of the rod"""
+    """length of the rod"""
 
 
 class Piece(Part):
@@ -31,11 +31,11 @@ class Piece(Part):
     elements: Elements
     """number of elements"""
     section: StiffnessSection
-    """gives area and stiffness"""
+    """cross section that gives area and stiffness"""
     end_section: StiffnessSection | None = None
-    """the one at the far end when it tapers linearly from `section`, of the same type"""
+    """section at the far end, when the rod tapers linearly from `section`; of the same type"""
     inertia_section: InertiaSection | None = None
-    """gives the second moments of the mass; default: `section`"""
+    """cross section that gives the second moments of the mass; default: `section`"""
 
     @model_validator(mode="after")
     def _can_taper(self) -> Piece:
@@ -55,11 +55,11 @@ class Segment(Piece):
     """A piece of a stepped rod, cut into equal elements."""
 
     start: Length
-    """positions along the rod"""
+    """position of its start and of its end along the rod"""
     end: Length
-    """positions along the rod"""
+    """position of its start and of its end along the rod"""
     material: Isotropic | None = None
-    """where it differs from the recipe's"""
+    """its material, where it differs from the recipe's"""
 
     @model_validator(mode="after")
     def _has_a_length(self) -> Segment:
@@ -73,9 +73,9 @@ class SegmentedBeam(Part):
 
     type: Literal["segmented-beam"]
     length: Annotated[Length, Positive]
-    """of the rod"""
+    """length of the rod"""
     segments: tuple[Segment, ...]
-    """pieces in their order"""
+    """segments in their order along the rod"""
 
     @model_validator(mode="after")
     def _covered(self) -> SegmentedBeam:
@@ -93,18 +93,18 @@ class SegmentedBeam(Part):
 
 
 class LumpedMass(Part):
-    """A body tied rigidly to the node at `x` (a ball, a stem)."""
+    """A rigid mass attached to the node at `x` (a ball, a stem)."""
 
     x: Length
     """position along the rod"""
     mass: Annotated[Mass, Positive]
     """its mass"""
     com: Position = (0.0, 0.0, 0.0)
-    """its centre of mass seen from the node, inertia: about that centre; both in axes of the rod frame"""
+    """its centre of mass relative to the node; `inertia`: about that centre [x, y, z]; both in axes of the rod frame"""
     inertia: Inertia = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-#: columns: x, y, z of a named frame in rod axes, unless it says others; z runs along the beam
+#: columns: x, y, z of a named frame in rod axes, unless the recipe gives others; z runs along the beam
 FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
@@ -114,26 +114,26 @@ class NodeFrame(TurnedFrame):
     x: Length
     """position along the rod, at a node"""
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
-    """as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod. A pin
-    across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``"""
+    """axes as in a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod. A
+    joint turns about z, so a pin across the beam needs other axes: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``"""
     axis: Direction | None = None
-    """as of a pose, the direction of z alone: ``axis = [0, 0, 1]``"""
+    """direction of z alone, as in a pose: ``axis = [0, 0, 1]``"""
     default: ClassVar[np.ndarray] = FRAME_ROTATION
 
 
 class BeamRecipe(BodyRecipe):
-    """What all beams have."""
+    """Keys of every beam recipe."""
 
     material: Isotropic
     """elastic constants and density"""
     theory: Literal["euler-bernoulli", "rayleigh", "timoshenko"] = "rayleigh"
-    """of bending; Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko has shear too"""
+    """theory of bending: Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko adds shear deformation"""
     torsion: Literal["linear", "quadratic"] = "linear"
     """degree of the twist and of the axial displacement in an element"""
     extension: Literal["linear", "quadratic"] = "linear"
     """degree of the twist and of the axial displacement in an element"""
     pose: Pose = Pose()
-    """of the rod frame in the mesh frame"""
+    """pose of the rod frame in the mesh frame"""
     masses: dict[str, LumpedMass] = Field(default_factory=dict)
     """lumped masses by name"""
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
@@ -167,7 +167,7 @@ class SegmentedBeamRecipe(BeamRecipe):
 
 
 def segments(recipe: BeamRecipe) -> tuple[Segment, ...]:
-    """The recipe's segments, one for a straight beam."""
+    """Return the recipe's segments; a straight beam has one."""
     if isinstance(recipe, SegmentedBeamRecipe):
         return recipe.shape.segments
     assert isinstance(recipe, StraightBeamRecipe)

@@ -1,14 +1,14 @@
-r"""How a cross section moves: the fields of a cell, their strains, and the motion of the section.
+r"""Kinematics of cross sections: the fields of a cell, their strains, and the motion of the section.
 
 Bernoulli (Euler-Bernoulli and Rayleigh beams): sections stay normal to the axis; deflections are Hermite cubics.
 Timoshenko: sections turn by :math:`\psi` on their own, shear strain :math:`\gamma = v' - \psi`. Deflections are
 cubic and rotations quadratic, so that :math:`v'` and :math:`\psi` span the same polynomials: slender cells do not lock
-(where :math:`\gamma\to 0` the Hermite cubics are left), and frequencies converge with the fourth power of the cell
+(as :math:`\gamma\to 0` the Hermite cubics remain), and frequencies converge with the fourth power of the cell
 length.
 Without the unknowns inside, condensed statically as in the elements with interdependent interpolation, the shear strain
 of a cell is constant, and frequencies converge with the second power only.
 
-Both have the same unknowns at a node: u, twist, v, slope of v, w, slope of w. What is inside a cell comes on top.
+Both have the same unknowns at a node: u, twist, v, slope of v, w, slope of w. Unknowns inside a cell are extra.
 Source: Reddy (1997), Comput. Methods Appl. Mech. Eng. 149, 113-132 (interdependent interpolation, consistency of
 degrees); Przemieniecki (1968), ch. 5 and 11.
 """
@@ -35,11 +35,11 @@ HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0
 
 
 class LocalHermite(Element):
-    """Cubic: deflection and slope at both ends; nodal unknowns u and du/dx, evaluated in the cell's own coordinate.
+    """Cubic Hermite element with nodal unknowns u and du/dx, evaluated in the cell's own coordinate.
 
     scikit-fem's `ElementLineHermite` inverts a Vandermonde matrix in global coordinates: the stiffness is wrong by
     3e-11 (12 cells), 5e-9 (64) and 5e-7 (256) relative on a rod that starts at the origin, and a second mesh silently
-    reuses the first one's inverse. This one is exact to rounding and keeps nothing.
+    reuses the first one's inverse. This element is exact to rounding and stores nothing between calls.
     """
 
     nodal_dofs = 2
@@ -49,8 +49,8 @@ class LocalHermite(Element):
     refdom = RefLine
 
     def gbasis(self, mapping: Any, X: np.ndarray, i: int, tind: np.ndarray | None = None) -> tuple[DiscreteField]:
-        """Basis function i with first and second derivative at local points X, shape (1, points)."""
-        h = mapping.detDF(X, tind)  # (cells, points): the length of each cell, signed
+        """Return basis function i with its first and second derivative at local points X, shape (1, points)."""
+        h = mapping.detDF(X, tind)  # (cells, points): the signed length of each cell
         scale = np.ones_like(h) if i % 2 == 0 else h
         s = np.broadcast_to(X[0], h.shape)
         value, slope, curvature = (_at(HERMITE[i], s, order) for order in range(3))
@@ -63,7 +63,7 @@ class LocalHermite(Element):
         )
 
 
-#: ascending power coefficients on [0, 1]: both nodal functions, then the bubbles 4 s (1-s) and 8 s (1-s) (2s-1)
+#: ascending power coefficients on [0, 1]: the two nodal functions, then the bubbles 4 s (1-s) and 8 s (1-s) (2s-1)
 BUBBLES = (
     np.array([1.0, -1.0]),
     np.array([0.0, 1.0]),
@@ -73,10 +73,10 @@ BUBBLES = (
 
 
 class Hierarchical(ElementH1):
-    """Continuous, of degree one to three: values at both ends and, inside, `degree` - 1 bubbles that vanish there.
+    """Continuous element of degree one to three: nodal values, and `degree` - 1 bubbles that vanish at both ends.
 
-    With bubbles, a field that is linear along the rod, as in every rigid motion, is given by its nodal values alone.
-    scikit-fem's own hierarchical element keeps the values of its last call; this one keeps nothing.
+    A field that is linear along the rod, as in every rigid motion, then depends on its nodal values alone.
+    scikit-fem's own hierarchical element stores the values of its last call; this one stores nothing.
     """
 
     nodal_dofs = 1
@@ -89,7 +89,7 @@ class Hierarchical(ElementH1):
         self.doflocs = np.array([[0.0], [1.0]] + [[np.nan]] * (degree - 1))
 
     def lbasis(self, X: np.ndarray, i: int) -> tuple[Any, Any]:
-        """Function i and its derivative at local points X, shape (1, points)."""
+        """Return function i and its derivative at local points X, shape (1, points)."""
         return _at(BUBBLES[i], X[0]), _at(BUBBLES[i], X[0], 1)[None]
 
 
@@ -99,11 +99,11 @@ def _at(coefficients: np.ndarray, s: np.ndarray, order: int = 0) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """One theory of the section's motion.
+    """Kinematics of one beam theory.
 
-    elements: of the fields, for degrees of the extension and of the twist.
-    component: index among ux uy uz rx ry rz of each field.
-    strains: of the fields, by name.  section: (u, v, w), (twist, slope of v, slope of w) of the fields.
+    elements: elements of the fields, from the degrees of extension and twist.
+    component: index of each field among ux uy uz rx ry rz.
+    strains: strains by name, from the fields.  section: (u, v, w) and (twist, slope of v, slope of w), from the fields.
     """
 
     elements: Callable[[int, int], list[Element]]
@@ -132,5 +132,5 @@ def _strains(u: Any, t: Any, bend_v: Any, bend_w: Any) -> dict[str, Any]:
     return {"stretch": u.grad[0], "twist": t.grad[0], "bend_v": bend_v, "bend_w": bend_w}
 
 
-#: by the recipe's name of the theory; Euler-Bernoulli and Rayleigh differ in the mass alone
+#: kinematics by the recipe's name of the theory; Euler-Bernoulli and Rayleigh differ in the mass alone
 THEORIES = {"euler-bernoulli": BERNOULLI, "rayleigh": BERNOULLI, "timoshenko": TIMOSHENKO}

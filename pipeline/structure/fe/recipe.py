@@ -1,4 +1,4 @@
-"""Mesh recipes: what a file under meshes/ may say, of bodies that another finite element code has assembled too."""
+"""Mesh recipes: the schema of files under meshes/, including bodies that another finite element code assembled."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from flexclear.pipeline.structure.fe.solid.recipe import SolidRecipe
 
 
 class Matrices(Part):
-    """Stiffness and mass of a free body, and a table of what their rows are.
+    """Stiffness and mass of a free body, with a table of their rows.
 
-    Either `file`, an npz as `exchange.files.write_npz` makes it, or `stiffness` and `mass` (MatrixMarket) and
+    Either `file`, an npz that `exchange.files.write_npz` wrote, or `stiffness` and `mass` (MatrixMarket) and
     `unknowns` (CSV with the columns node, x, y, z, component, one line per row of the matrices).
     """
 
     type: Literal["matrices"]
     units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms"]
-    """the consistent system of all numbers in the files; a file does not say. Paths are relative to the recipe"""
+    """consistent units of all numbers in the files, which do not state them. Paths are relative to the recipe"""
     file: str | None = None
-    """npz with everything"""
+    """npz file with matrices, table and integrals"""
     stiffness: str | None = None
     """MatrixMarket files"""
     mass: str | None = None
@@ -70,7 +70,7 @@ class MatricesRecipe(BodyRecipe):
     """named frames and their nodes"""
 
 
-#: every kind of recipe; `Recipe` is any of them
+#: union of all kinds of recipes
 Recipe = StraightBeamRecipe | SegmentedBeamRecipe | SolidRecipe | MatricesRecipe
 #: recipe model by `shape.type`
 MODELS: dict[str, type[Recipe]] = {
@@ -84,14 +84,14 @@ MODELS: dict[str, type[Recipe]] = {
 
 
 def read_recipe(path: str | Path) -> dict[str, Any]:
-    """The recipe in a TOML file as a plain table in SI units; InputError names every mistake in it."""
+    """Return the recipe of a TOML file as a plain table in SI units; raise InputError that lists all its errors."""
     table = read_toml(Path(path))
     require_kind(table, Path(path), RECIPE)
     return parse(table, str(path)).model_dump(mode="json", exclude_none=True)
 
 
 def parse(table: Mapping[str, Any], where: str) -> Any:
-    """The recipe that a table holds, one of MODELS; `where` opens every message of an InputError."""
+    """Return the recipe that a table holds, one of MODELS; `where` begins every message of an InputError."""
     model = _model(table, where)
     try:
         return model.model_validate(dict(table))
@@ -110,11 +110,11 @@ def _model(table: Mapping[str, Any], where: str) -> type[Recipe]:
 
 
 def recipe_schema() -> dict[str, Any]:
-    """The schema of a recipe file: which keys there are depends on `shape.type`."""
+    """Return the JSON schema of a recipe file; the allowed keys depend on `shape.type`."""
     adapter: TypeAdapter[Any] = TypeAdapter(Recipe)
     schema = adapter.json_schema(mode="validation")
     del schema["anyOf"]
-    # a choice by the shape, so that an editor reports what is wrong with this kind and not with all others
+    # selected by the shape, so that an editor reports errors of this kind of recipe only
     chosen = [
         {
             "if": {"properties": {"shape": {"properties": {"type": {"const": kind}}, "required": ["type"]}}},

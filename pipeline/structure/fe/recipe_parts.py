@@ -1,4 +1,4 @@
-"""What recipes of several kinds of bodies share: material, frames with axes of their own, the list of interfaces."""
+"""Parts of recipes of several kinds of bodies: material, frames with their own axes, the list of interfaces."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class Isotropic(Part):
 
     @property
     def shear_modulus(self) -> float:
-        """E / (2 (1 + nu)) [Pa]."""
+        """Shear modulus E / (2 (1 + nu)) [Pa]."""
         return self.youngs_modulus / (2.0 * (1.0 + self.poisson))
 
 
 class TurnedFrame(Part):
-    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's."""
+    """A named frame with its own axes, as in a pose (`axes`, or `axis` for z alone); default: the axes of the mesh."""
 
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
-    """as of a pose"""
+    """axes, as in a pose"""
     axis: Direction | None = None
-    """as of a pose, the direction of z alone"""
+    """direction of z alone, as in a pose"""
     default: ClassVar[np.ndarray] = np.eye(3)
 
     @model_validator(mode="after")
@@ -44,17 +44,17 @@ class TurnedFrame(Part):
         return self
 
     def orientation(self) -> np.ndarray:
-        """Columns: x, y, z of the frame in those of the mesh."""
+        """Return the rotation of the frame; columns: its x, y, z in axes of the mesh."""
         if self.axis is not None:
             return axis_to_matrix(self.axis)
         return self.default if self.axes is None else axes_to_matrix(self.axes)
 
 
 class BodyRecipe(Part):
-    """What recipes of all bodies say."""
+    """Keys of every recipe."""
 
     title: str = ""
-    """what the body is, in words"""
+    """description of the body"""
     frames: Annotated[dict[str, Any], Field(min_length=1)]
     """named frames"""
     interfaces: tuple[str, ...] = ()

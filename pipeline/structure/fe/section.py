@@ -1,6 +1,6 @@
-"""Cross sections: the numbers that a beam element needs of them.
+"""Cross sections: section constants and shear coefficients for beam elements.
 
-Every function takes floats, or arrays of one shape for a section that changes along the rod.
+Functions take floats, or arrays of one shape for a section that changes along the rod.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from scipy.special import zeta
 
 Value = float | np.ndarray
 
-#: Gauss points of a beam cell, where its sections are evaluated; exact to degree nine: cubic times cubic deflections on
-#: an area that tapers linearly in both directions have degree eight, as have second moments times quadratic slopes
+#: Gauss points of a beam cell, at which its sections are evaluated; exact to degree nine. Cubic times cubic deflections
+#: on an area that tapers linearly in both directions have degree eight, as have second moments times quadratic slopes
 _GAUSS = np.polynomial.legendre.leggauss(5)
 #: points on [0, 1] and weights, shape (points,)
 POINTS = 0.5 * (1.0 + _GAUSS[0])
 WEIGHTS = 0.5 * _GAUSS[1]
-#: a section is of a type when its second moments are those of the type
+#: relative difference below which second moments equal those of a type of section
 SAME = 1e-6
 
 
@@ -28,7 +28,7 @@ SAME = 1e-6
 class Section:
     """Section constants about the centroid, axes y and z of the rod.
 
-    `torsion` is St. Venant's constant, not the polar moment; the two agree for circles and tubes only.
+    `torsion` is St. Venant's constant; it equals the polar moment for circles and tubes only.
     """
 
     area: Value  #: A [m^2]
@@ -44,30 +44,30 @@ class Section:
 
 
 def circle(radius: Value) -> Section:
-    """Full circle; radius [m]."""
+    """Return the constants of a full circle; radius [m]."""
     return tube(radius, 0.0)
 
 
 def tube(radius: Value, inner_radius: Value) -> Section:
-    """Circular tube; outer and inner radius [m]."""
+    """Return the constants of a circular tube; outer and inner radius [m]."""
     area = math.pi * (radius**2 - inner_radius**2)
     second = math.pi * (radius**4 - inner_radius**4) / 4.0
     return Section(area, 2.0 * second, second, second)
 
 
 def rectangle(width: Value, height: Value) -> Section:
-    """Full rectangle; width along y, height along z [m]."""
+    """Return the constants of a full rectangle; width along y, height along z [m]."""
     area = width * height
     return Section(area, rectangle_torsion(width, height), area * height**2 / 12.0, area * width**2 / 12.0)
 
 
 def square(side: Value) -> Section:
-    """Full square; side [m]."""
+    """Return the constants of a full square; side [m]."""
     return rectangle(side, side)
 
 
 def rectangle_torsion(width: Value, height: Value) -> Value:
-    """St. Venant's constant J [m^4] of a rectangle.
+    """Return St. Venant's constant J [m^4] of a rectangle.
 
     With b the longer side and a the shorter one,
     ``J = b a^3 [1/3 - 64 a/(pi^5 b) sum tanh(k pi b / 2a) / k^5]`` over odd k.
@@ -75,8 +75,8 @@ def rectangle_torsion(width: Value, height: Value) -> Value:
     """
     long, short = np.maximum(width, height), np.minimum(width, height)
     slope = math.pi * long / (2.0 * short)
-    # sum of 1/k^5 over odd k, less what tanh falls short of one; 1 - tanh x = 2 / (exp(2x) + 1) dies out at once:
-    # 2 exp(-k pi) is below rounding from k = 13 on, even for the square
+    # the sum of 1/k^5 over odd k, less the shortfall of tanh from one; 1 - tanh x = 2 / (exp(2x) + 1) decays fast: 2
+    # exp(-k pi) is below rounding from k = 13 on, even for the square
     short_of_one = sum(2.0 / (np.exp(np.minimum(2.0 * k * slope, 700.0)) + 1.0) / k**5 for k in range(1, 15, 2))
     series = 31.0 / 32.0 * zeta(5) - short_of_one
     torsion = long * short**3 * (1.0 / 3.0 - 64.0 / math.pi**5 * short / long * series)
@@ -84,7 +84,7 @@ def rectangle_torsion(width: Value, height: Value) -> Value:
 
 
 def shape(types: tuple[str, ...], given: Section) -> tuple[str, tuple[float, ...]]:
-    """Which of `types` a section with these constants is, and its lengths as this type takes them; empty for none."""
+    """Return which of `types` a section with these constants has, and the lengths of that type; empty for none."""
     for name in types:
         lengths = SHAPES[name].lengths(given) if name in SHAPES else ()
         if lengths and (len(types) == 1 or _is(SHAPES[name].constants(*lengths), given)):
@@ -112,13 +112,13 @@ def _rectangle_lengths(given: Section) -> tuple[float, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A type of section. constants: from its lengths.  lengths: from constants; empty where there are none."""
+    """A type of section. constants: from its lengths.  lengths: from constants; empty where none fit."""
 
     constants: Callable[..., Section]
     lengths: Callable[[Section], tuple[float, ...]]
 
 
-#: by the type that a recipe gives; a general section has none
+#: types of section by the recipe's name; the general section is not in the table
 SHAPES = {
     "circle": Shape(circle, lambda given: (math.sqrt(given.area / math.pi),)),
     "tube": Shape(tube, _tube_lengths),
@@ -127,7 +127,7 @@ SHAPES = {
 
 
 def tube_shear_coefficient(poisson: float, ratio: Value) -> Value:
-    """Shear coefficient of a tube with the inner over the outer radius m = `ratio`, which is 0 for a full circle.
+    """Return the shear coefficient of a tube; `ratio` m: inner over outer radius, 0 for a full circle.
 
     ``6 (1 + nu) (1 + m^2)^2 / [(7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2]``.
     Source: Cowper (1966), J. Appl. Mech. 33, 335-340.
@@ -138,7 +138,7 @@ def tube_shear_coefficient(poisson: float, ratio: Value) -> Value:
 
 
 def rectangle_shear_coefficient(poisson: float) -> float:
-    """Shear coefficient of a rectangle, the same along both sides, ``10 (1 + nu) / (12 + 11 nu)``.
+    """Return the shear coefficient of a rectangle, ``10 (1 + nu) / (12 + 11 nu)``, equal along both sides.
 
     Source: Cowper (1966), J. Appl. Mech. 33, 335-340.
     """

@@ -1,4 +1,4 @@
-"""Cross sections as a recipe says them, and the constants that they give."""
+"""Cross sections of a recipe: their schema, and the section constants that follow."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexclear.pipeline.structure.fe.section import Section, Value
 
 
 def _pair(value: Any) -> Any:
-    """One number for both axes, or one along y and one along z."""
+    """Return two numbers, along y and along z; one number counts for both."""
     return value if isinstance(value, (list, tuple)) else (value, value)
 
 
@@ -35,9 +35,9 @@ class CircleSection(Part):
 
     type: Literal["circle"]
     radius: Annotated[Length, Positive]
-    """of the circle"""
+    """radius of the circle"""
     shear_coefficient: ShearCoefficient | None = None
-    """kappa instead of Cowper's (1966)"""
+    """shear coefficient kappa, instead of Cowper's (1966)"""
 
 
 class TubeSection(Part):
@@ -45,11 +45,11 @@ class TubeSection(Part):
 
     type: Literal["tube"]
     radius: Annotated[Length, Positive]
-    """of the outer circle and of the hole"""
+    """radius of the outer circle and of the hole"""
     inner_radius: Annotated[Length, Positive]
-    """of the outer circle and of the hole"""
+    """radius of the outer circle and of the hole"""
     shear_coefficient: ShearCoefficient | None = None
-    """kappa instead of Cowper's (1966)"""
+    """shear coefficient kappa, instead of Cowper's (1966)"""
 
     @model_validator(mode="after")
     def _has_a_wall(self) -> TubeSection:
@@ -65,21 +65,21 @@ class RectangleSection(Part):
 
     type: Literal["rectangle"]
     width: Annotated[Length, Positive]
-    """along y and along z of the rod"""
+    """side along y and along z of the rod"""
     height: Annotated[Length, Positive]
-    """along y and along z of the rod"""
+    """side along y and along z of the rod"""
     shear_coefficient: ShearCoefficient | None = None
     """kappa instead of Cowper's (1966)"""
 
 
 class GeneralSection(Part):
-    """Any section by its constants about the centroid, which is its shear centre too."""
+    """Any section, given by its constants about the centroid, which is also its shear centre."""
 
     type: Literal["general"]
     area: Annotated[Area, Positive]
-    """of the section"""
+    """area of the section"""
     torsion: Annotated[SecondMoment, Positive]
-    """St. Venant's J"""
+    """St. Venant's torsion constant J"""
     second_y: Annotated[SecondMoment, Positive]
     """int z^2 dA"""
     second_z: Annotated[SecondMoment, Positive]
@@ -87,9 +87,9 @@ class GeneralSection(Part):
     product: SecondMoment = 0.0
     """int y z dA"""
     inertia: tuple[Annotated[SecondMoment, Positive], SecondMoment, SecondMoment] | None = None
-    """polar and bending second moments of the mass [about x, y, z], where they are not those of the area"""
+    """second moments of the mass about x (polar), y and z, where they differ from those of the area"""
     shear_coefficient: ShearCoefficient | None = None
-    """kappa, one number or [along y, along z]; needed by Timoshenko beams only"""
+    """shear coefficient kappa, one number or [along y, along z]; needed by Timoshenko beams only"""
 
     @model_validator(mode="after")
     def _moments_are_of_an_area(self) -> GeneralSection:
@@ -104,7 +104,7 @@ class GeneralSection(Part):
 
 
 class EqualAreaSquare(Part):
-    """The square with the area of the stiffness section; lends its second moments to the mass only."""
+    """The square with the area of the stiffness section; gives second moments to the mass only."""
 
     type: Literal["equal-area-square"]
 
@@ -113,7 +113,7 @@ AnySection = CircleSection | TubeSection | RectangleSection | GeneralSection
 StiffnessSection = Annotated[AnySection, Field(discriminator="type")]
 InertiaSection = Annotated[AnySection | EqualAreaSquare, Field(discriminator="type")]
 
-#: lengths that a linear taper changes
+#: lengths of a section that a linear taper changes
 DIMENSIONS: dict[str, tuple[str, ...]] = {
     "circle": ("radius",),
     "tube": ("radius", "inner_radius"),
@@ -122,17 +122,17 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
 
 
 def constants(start: Any, end: Any | None, s: Value) -> Section:
-    """Section constants at the fraction s of a span from the section `start` to the section `end` (None: no taper)."""
+    """Return the section constants at the fraction s of a span from section `start` to `end` (None: no taper)."""
     if start.type == "general":
         return Section(start.area, start.torsion, start.second_y, start.second_z, start.product)
     return sections.SHAPES[start.type].constants(*_dimensions(start, end, s))
 
 
 def inertia(start: Any, end: Any | None, given: Any | None, s: Value) -> tuple[Value, Value, Value, Value]:
-    """Second moments of the mass: polar, about y, about z, product [m^4].
+    """Return the second moments of the mass: polar, about y, about z, product [m^4].
 
-    given: the inertia section where it is not the one of the stiffness; it does not taper, but the square
-    of equal area does with its area.
+    given: the inertia section where it differs from that of the stiffness. It does not taper, but the square
+    of equal area does, with the area.
     """
     if given is not None and given.type == "equal-area-square":
         values = sections.square(constants(start, end, s).area ** 0.5)
@@ -141,13 +141,13 @@ def inertia(start: Any, end: Any | None, given: Any | None, s: Value) -> tuple[V
     else:
         values = constants(start, end, s)
     if start.type == "general" and start.inertia is not None and given is None:
-        # given apart, about the axes of the section
+        # given separately, about the axes of the section
         return (*start.inertia, 0.0)
     return values.polar, values.second_y, values.second_z, values.product
 
 
 def shear_coefficient(start: Any, end: Any | None, s: Value, poisson: float) -> tuple[Value, Value] | None:
-    """Kappa along y and z, None where nobody says it."""
+    """Return kappa along y and z; None where the recipe of a general section gives none."""
     if start.shear_coefficient is not None or start.type == "general":
         return start.shear_coefficient
     if start.type == "rectangle":

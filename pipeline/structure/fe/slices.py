@@ -1,4 +1,4 @@
-r"""A beam as slices of mass that move with its sections: what integrals over the volume need.
+r"""Slices of mass that move with a beam's sections: the form in which volume integrals are evaluated.
 
 A point of a slice at :math:`X + r` moves by :math:`s + \theta\times r`. With the slice's mass :math:`m`, centre
 :math:`X` (so :math:`\int\rho\,r = 0`) and spread :math:`D = \int\rho\,r r^T`, every integral that is linear in
@@ -11,8 +11,8 @@ A lumped mass is a slice of its own.
 
 The spread follows from the rotary inertia J that the theory gives to the section,
 :math:`D = \tfrac12 \mathrm{tr}(J) 1 - J`. For a plane section this is the true spread. Without rotary inertia in
-bending (Euler-Bernoulli) it is the formal one that leaves the section its spin about the axis only, in rigid as in
-elastic motion, so that the answer of a mechanism does not depend on how the body frame is tied to the rod.
+bending (Euler-Bernoulli) it is the formal one that gives the section spin about the axis only, in rigid as in
+elastic motion, so that the motion of a mechanism does not depend on how the body frame is tied to the rod.
 
 Source: the invariants of Wang & Wang (2019), eqs. (9)-(15); Shabana, *Dynamics of Multibody Systems*, ch. 5.
 """
@@ -33,22 +33,22 @@ VALUES = ("mass", "position", "spread")
 
 @dataclass(frozen=True)
 class Slices:
-    """p slices and how a vector moves them; axes of the mesh frame."""
+    """p slices and their motion under a model's vector, in axes of the mesh frame."""
 
     mass: np.ndarray  #: [kg], shape (p,)
     position: np.ndarray  #: X of the centre of mass [m], shape (p, 3)
     spread: np.ndarray  #: D [kg m^2], shape (p, 3, 3)
-    motion: sp.csr_array  #: vector to x y z of the centre of mass, then rx ry rz, of each in turn, shape (6 p, ndof)
+    motion: sp.csr_array  #: vector to x y z of each centre of mass, then rx ry rz, slice by slice, shape (6 p, ndof)
 
 
 def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
-    """All invariants for vectors of shape (ndof, n); exact but for rounding."""
+    """Return all invariants for vectors of shape (ndof, n); exact but for rounding."""
     m, X, D = body.mass, body.position.T, body.spread
     moved = (body.motion @ vectors).reshape(len(m), 6, vectors.shape[1]).transpose(1, 0, 2)
     s, theta = np.ascontiguousarray(moved[:3]), np.ascontiguousarray(moved[3:])
     mode_mode = _mode_mode(m, s)
     position_mode = np.einsum("p,kp,lpj->klj", m, X, s)
-    # principal directions of each slice: three weighted motions instead of the nine products of axes
+    # principal directions of each slice: three weighted motions, instead of nine products of axes
     weights, directions = np.linalg.eigh(D)
     for weight, d in zip(weights.T, directions.transpose(2, 1, 0), strict=True):
         turned = np.cross(theta, d[:, :, None], axis=0)
@@ -69,7 +69,7 @@ def _mode_mode(weight: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def slices(mesh: xr.Dataset, beam: Beam) -> Slices:
-    """Slices at the Gauss points of all cells, then the lumped masses.
+    """Return slices at the Gauss points of all cells, then the lumped masses.
 
     Sums over them integrate products of two shapes exactly.
     """
@@ -94,13 +94,13 @@ def _rod(mesh: xr.Dataset, beam: Beam) -> Slices:
 
 
 def spread(inertia: np.ndarray) -> np.ndarray:
-    """D of bodies with these inertias about their centres, both of shape (p, 3, 3)."""
+    """Return D of bodies with these inertias about their centres of mass, both of shape (p, 3, 3)."""
     result: np.ndarray = 0.5 * np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia
     return result
 
 
 def _motion(beam: Beam) -> sp.csr_array:
-    """Motion of the section at all Gauss points, from the values of each cell's own functions there."""
+    """Return the motion of the section at all Gauss points, from the shape functions of each cell."""
     basis, shape = beam.basis, beam.basis.dx.shape
     first = 6 * np.arange(basis.dx.size).reshape(shape)
     entries = []
@@ -123,7 +123,7 @@ def _lumps(mesh: xr.Dataset, size: int) -> Slices:
 
 
 def at_centres(nodes: sp.csr_array, r: np.ndarray) -> sp.csr_array:
-    """Motion of nodes, shape (6 p, ndof), carried to centres next to them, s = u + theta x r; r: [m], (p, 3)."""
+    """Return the motion of centres at r [m], (p, 3), from the nodes, s = u + theta x r; motions: (6 p, ndof)."""
     lever = np.tile(np.eye(6), (len(r), 1, 1))
     lever[:, :3] = carried(r)
     return sp.csr_array(sp.block_diag(list(lever)) @ nodes)

@@ -1,4 +1,4 @@
-"""Meshes and mode shapes as VTU files, which ParaView and meshio open."""
+"""VTU files of meshes and mode shapes, for ParaView and meshio."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-#: meshio's name of a drawn cell by its number of corners
+#: meshio's name of a drawn cell, by its number of corners
 CELLS = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
 
 
@@ -20,8 +20,8 @@ def vtu(
     of_points: Mapping[str, np.ndarray] | None = None,
     of_cells: Mapping[str, np.ndarray] | None = None,
 ) -> bytes:
-    """Cells of one kind, named as meshio does, with values at the points [m] and in the cells."""
-    import meshio  # slow to import and needed by this function alone
+    """Return a VTU file of cells of one kind, by meshio's name, with values at the points [m] and in the cells."""
+    import meshio  # slow to import, and only this function needs it
 
     cell_data = {name: [values] for name, values in (of_cells or {}).items()}
     with tempfile.TemporaryDirectory() as folder:
@@ -32,7 +32,7 @@ def vtu(
 
 
 def of_modes(modes: xr.Dataset) -> bytes:
-    """What is drawn of the body, with each shape as a vector at the nodes: ``mode_001_1563.71_Hz``, largest one 1."""
+    """Return a VTU file of mode shapes, nodal vectors of largest length 1, named like ``mode_001_1563.71_Hz``."""
     points = {}
     shapes = modes["shape"].values.transpose(2, 0, 1)
     for k, (hertz, shape) in enumerate(zip(modes["frequency"].values, shapes, strict=True)):

@@ -1,4 +1,4 @@
-"""Kinds of flexible bodies by what their recipe describes; each turns recipes into meshes and meshes into models.
+"""Kinds of flexible bodies, by their recipe; each turns recipes into meshes and meshes into models.
 
 To add one: a module here with ``KIND: Kind``, and its shapes below.
 """
@@ -14,7 +14,7 @@ NAMES = {
     "solid": "solid:KIND",
     "matrices": "matrices:KIND",
 }
-#: kind of body by `shape.type` of its recipe; every other type is a beam's
+#: kind of body by `shape.type` of its recipe; every other type is a beam
 SHAPES = {
     "cylinder": "solid",
     "block": "solid",
@@ -24,6 +24,6 @@ SHAPES = {
 
 
 def name_of(recipe: Mapping[str, Any]) -> str:
-    """Name of the kind of body that a recipe's table describes."""
+    """Return the name of the kind of body that a recipe's table describes."""
     shape = recipe.get("shape")
     return SHAPES.get(str(shape.get("type")), "beam") if isinstance(shape, Mapping) else "beam"

@@ -15,12 +15,12 @@ from flexclear.pipeline.structure.fe.section import Section, shape
 from flexclear.pipeline.structure.fe.slices import integrate, slices
 from flexclear.pipeline.structure.kinds.kind import Kind
 
-#: components along the rod's axes by family, the one that decides the sign first
+#: components along the rod's axes by family; the first one decides the sign
 FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4), "torsion": (3,), "axial": (0,)}
 
 
 def assemble(mesh: xr.Dataset) -> Model:
-    """The model of a beam mesh (schema MESH)."""
+    """Build the model of a beam mesh (schema MESH)."""
     beam = beams.assemble(mesh)
     start = beam.node_position[0] - beam.along[0] * beam.axes[:, 0]
     return Model(
@@ -45,7 +45,7 @@ def _ends(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:
 
 
 def _node(beam: Beam, node: int) -> sp.csr_array:
-    """The six degrees of freedom of a node, shape (6, ndof)."""
+    """Return the functionals of a node's six degrees of freedom, shape (6, ndof)."""
     return selection(beams.node_dofs(np.array([node])), beam.size)
 
 
@@ -53,7 +53,7 @@ def _families(beam: Beam) -> Families:
     member = np.empty(beam.size, dtype=np.int64)
     for rank, components in enumerate(FAMILIES.values()):
         member[np.isin(beam.component, components)] = rank
-    # nodes alone decide a sign: they are what is drawn
+    # the sign follows from nodes only, because only they are drawn
     nodal = np.arange(beam.nodal_size).reshape(-1, N_DOFS)
     main = tuple(nodal[:, components[0]] for components in FAMILIES.values())
     along = (beam.along - beam.along.min()) / np.ptp(beam.along)
@@ -61,9 +61,9 @@ def _families(beam: Beam) -> Families:
     return Families(tuple(FAMILIES), local, member, main, along)
 
 
-#: points of a drawn outline, corners of a rectangle among them
+#: points of a drawn outline, including the corners of a rectangle
 AROUND = 24
-#: around the square with corners at (+-1, +-1), anticlockwise, the first point again last; and around the circle
+#: outlines of the square with corners at (+-1, +-1), anticlockwise and closed, and of the circle
 _SQUARE = np.column_stack(
     [np.interp(np.arange(AROUND + 1), AROUND // 4 * np.arange(5), x) for x in ((1, 1, -1, -1, 1), (-1, 1, 1, -1, -1))]
 )
@@ -78,8 +78,8 @@ def _drawn(mesh: xr.Dataset, beam: Beam) -> Drawn:
 
 
 def _sections(mesh: xr.Dataset, beam: Beam) -> tuple[np.ndarray, np.ndarray | None]:
-    """Radius of each cell, and outlines (cell, point, 3) where one is a rectangle: the section's own, as its constants
-    say; a general section as a circle of its area."""
+    """Return the radius of each cell, and outlines (cell, point, 3) where a section is a rectangle. A general section
+    is drawn as a circle of equal area."""
     types, area = tuple(mesh.attrs["section"].split()), mesh["area"].values
     shapes = [shape(types, Section(*row)) for row in np.column_stack([area, mesh["second_moment"].values]).tolist()]
     radius = np.sqrt(area / np.pi)

@@ -1,4 +1,4 @@
-"""What a kind of body has to offer to the stages."""
+"""Interface that each kind of body implements for the stages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flexclear.pipeline.structure.fe.recipe import parse
 from flexclear.pipeline.structure.kinds import name_of
 
 FAMILY = "flexclear.pipeline.structure.kinds"
-#: name of a recipe in messages, for callers that have no better one
+#: name of a recipe in messages, where the caller has no better one
 PLACE = "mesh recipe"
 
 
@@ -24,12 +24,12 @@ PLACE = "mesh recipe"
 class Kind:
     """Functions of one kind of body.
 
-    build: the recipe, the folder that files in it are relative to, and its name in messages, to the mesh dataset.
-    vtu: the mesh dataset as a file that ParaView opens.
-    assemble: the mesh dataset to matrices.
-    words: what each mode does, in a word, from its family and vectors of shape (ndof, n).
+    build: the mesh dataset, from the recipe, the folder that its paths are relative to, and its name in messages.
+    vtu: a VTU file of the mesh dataset, for ParaView.
+    assemble: the model of the mesh dataset.
+    words: one word for the motion of each mode, from its family and vectors of shape (ndof, n).
     exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
-        families and the interfaces' names; None where there are none.
+        families and the interfaces' names; None for kinds without any.
     """
 
     build: Callable[[Any, Path, str], xr.Dataset]
@@ -40,15 +40,15 @@ class Kind:
 
 
 def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLACE) -> xr.Dataset:
-    """The mesh dataset of a recipe's table; InputError for a wrong one, and for frames that lie nowhere on the body.
+    """Build the mesh dataset of a recipe's table; raise InputError for a wrong recipe or frames off the body.
 
-    folder: what files in the recipe are relative to.  where: name of the recipe in messages.
+    folder: base of relative paths in the recipe.  where: name of the recipe in messages.
     """
     kind: Kind = lookup(FAMILY, name_of(recipe), where="shape.type")
     return kind.build(parse(recipe, where), Path(folder), where)
 
 
 def of_mesh(mesh: xr.Dataset) -> Kind:
-    """The kind of body whose mesh dataset this is."""
+    """Return the kind of body of a mesh dataset."""
     kind: Kind = lookup(FAMILY, str(mesh.attrs.get("body_kind", "beam")), where="mesh")
     return kind

@@ -1,4 +1,4 @@
-"""Bodies given by the matrices of another code."""
+"""Bodies given by the matrices of another code, as a kind of body."""
 
 from __future__ import annotations
 

@@ -11,12 +11,12 @@ from flexclear.pipeline.structure.kinds.kind import Kind
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
-#: a mode is torsion where the swirl about the axis has this many times the energy of all else
+#: a mode is torsion where the swirl about the axis has this many times the energy of all other motion
 SWIRL = 4.0
 
 
 def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
-    """Of a rod: bending, torsion or axial, by the motion of its surface; of any other body: elastic."""
+    """Return bending, torsion or axial for each mode of a rod, by its surface motion; elastic for other bodies."""
     X = model.drawn.position - model.drawn.position.mean(axis=0)
     _, extent, axes = np.linalg.svd(X, full_matrices=False)
     if extent[1] > SLENDER * extent[0]:

@@ -1,6 +1,6 @@
-"""The shapes of a body under a reference condition: static ones, and as many normal modes as are requested.
+"""Shapes of a body under a reference condition: static shapes, and the requested number of normal modes.
 
-Of equal frequencies all modes are retained or none.
+A cluster of equal frequencies is retained as a whole or not at all.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from flexclear.pipeline.structure.modes.condition import Condition
 from flexclear.pipeline.structure.modes.normal import WHERE, Normal
 from flexclear.pipeline.structure.modes.statics import Flexibility, border
 
-#: normal modes tried first where a fraction decides how many are needed; then twice as many, and so on
+#: normal modes in the first attempt where a fraction decides how many are needed; each further attempt doubles them
 FIRST = 16
-#: modes to compute beyond those requested, to see where the last cluster ends
+#: modes computed beyond those requested, to see where the last cluster ends
 MARGIN = 8
 
 
 @dataclass(frozen=True, slots=True)
 class ModeRequest:
-    """What decides the number of coordinates; nothing at all means every one that the mesh has.
+    """Rule for the number of coordinates; without any entry, all coordinates of the mesh.
 
     count: elastic coordinates, static ones included.  up_to: highest normal retained frequency [Hz].
     compliance: least fraction of the static compliance between the interfaces, in each direction.
@@ -41,7 +41,7 @@ class ModeRequest:
 
 @dataclass(frozen=True)
 class Body:
-    """A model with its reference condition, the frames that it is joined at, and its statics on demand."""
+    """A model with its reference condition, its interface frames, and its static response on demand."""
 
     model: Model
     condition: Condition
@@ -50,20 +50,20 @@ class Body:
     progress: Progress
 
     def normal(self, count: int) -> Normal:
-        """The lowest normal modes."""
+        """Return the lowest normal modes."""
         return normal.lowest(self.model, self.condition.held, count, self.flexibility, self.progress)
 
 
 def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
-    """Static shapes and normal modes, rigid motion taken out where the condition says so.
+    """Return static shapes and normal modes; rigid motion is removed where the condition requires it.
 
     Independent shapes that respect the condition, in any combination and scale, (ndof, count); and frequencies [Hz] of
     rigid-body modes that were left out, ascending, maybe none.
 
-    Raises InputError for a count beyond the mesh or within a cluster, and for shares that no count reaches.
+    Raises InputError for a count beyond the mesh or within a cluster, and for fractions that no count reaches.
     """
     if requested == ModeRequest() and body.condition.loaded.shape[0]:
-        # all normal modes of a free body span what its attachment modes could add
+        # the normal modes of a free body span all that its attachment modes could add
         body = replace(body, condition=replace(body.condition, loaded=body.condition.loaded[:0]))
     static = _static(body)
     free = available(body.model, body.condition)
@@ -76,10 +76,10 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
     tried = FIRST
     while True:
         modes = body.normal(min(tried, free))
-        # static shapes alone are a basis, no shape at all is none
+        # static shapes alone are a basis; no shape at all is not
         ends = [0] * bool(static.shape[1]) + [stop for _, stop in eigen.clusters(modes.values)]
         _check_first(modes, static, requested)
-        # the last cluster may continue beyond what was computed
+        # the last cluster may continue beyond the computed modes
         for stop in ends if tried >= free else ends[:-1]:
             if _enough(body, static, modes, stop, requested):
                 return _joined(body, static, modes, stop), modes.rigid_frequency
@@ -89,9 +89,9 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
 
 
 def request(count: int | None, available: int, static: int = 0) -> int:
-    """How many normal modes, of `available` ones, a basis of `count` coordinates needs; None asks for all.
+    """Return how many of the `available` normal modes a basis of `count` coordinates needs; None selects all.
 
-    static: constraint modes that the count includes.  InputError for a count that the mesh cannot give.
+    static: constraint modes that the count includes.  Raises InputError for a count that the mesh cannot give.
     """
     if count is None:
         return available
@@ -107,10 +107,10 @@ def request(count: int | None, available: int, static: int = 0) -> int:
 
 
 def whole(values: np.ndarray, n: int, static: int = 0) -> int:
-    """The number n of retained modes, or InputError when it would keep a part of a cluster of equal frequencies.
+    """Return the number n of retained modes; raise InputError when n would cut a cluster of equal frequencies.
 
-    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless there are no more.
-    static: as of `request`.
+    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless all are.
+    static: see `request`.
     """
     for start, stop in eigen.clusters(values):
         if start < n < stop:
@@ -123,13 +123,13 @@ def whole(values: np.ndarray, n: int, static: int = 0) -> int:
 
 
 def available(model: Model, condition: Condition) -> int:
-    """Number of normal modes of a mesh under a reference condition."""
+    """Return the number of normal modes of a mesh under a reference condition."""
     held = condition.held.shape[0]
     return model.size - (held or 6) - (0 if held else condition.loaded.shape[0])
 
 
 def _static(body: Body) -> np.ndarray:
-    """Constraint modes of the moved functionals, or attachment modes of the loaded ones, shape (ndof, s)."""
+    """Return constraint modes of the moved functionals, or attachment modes of the loaded ones, shape (ndof, s)."""
     condition = body.condition
     if len(condition.moved):
         body.progress(None, "static shapes")
@@ -145,7 +145,7 @@ def _static(body: Body) -> np.ndarray:
 def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> np.ndarray:
     shapes = modes.shapes[:, :count]
     if body.condition.residual and static.size:
-        # what the retained modes answer of a load: phi phi^T f / omega^2, with f = K u
+        # response of the retained modes to a load: phi phi^T f / omega^2, with f = K u
         static = static - shapes @ (shapes.T @ (body.model.mass @ static))
     vectors = np.hstack([static, shapes])
     if body.condition.mean_axes and body.condition.held.shape[0]:
@@ -172,7 +172,7 @@ def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested
 
 
 def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
-    """Least fraction, over three directions, of the mass that moves with the basis when the body is translated."""
+    """Return the least fraction, over three directions, of the mass that moves with the basis in a translation."""
     momentum = model.mass @ model.rigid[:, :3]
     inner = vectors.T @ (model.mass @ vectors)
     taken = np.einsum("nd,nd->d", vectors.T @ momentum, np.linalg.solve(inner, vectors.T @ momentum))

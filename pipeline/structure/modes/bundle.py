@@ -1,5 +1,5 @@
-"""Stage 3: everything that the dynamics needs of a flexible body, and nothing of its finite elements; and next to it
-the rigid body that a mesh would be if nothing of it deformed."""
+"""Stage 3: reduced bundles, all that the dynamics needs of a flexible body without its finite elements; and the rigid
+body that a mesh would be without deformation."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from flexclear.pipeline.structure.kinds.kind import of_mesh
 
 
 def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None = None) -> xr.Dataset:
-    """The reduced bundle (schema BUNDLE) of a mesh and its modes.
+    """Build the reduced bundle (schema BUNDLE) of a mesh and its modes.
 
-    extra: further variables, as those of stress recovery.
+    extra: further variables, such as those of stress recovery.
 
-    The body frame is the mesh frame when nothing deforms; how it follows the deformation is what the
-    reference condition of the modes says.  Units per modal coordinate: q in m, for modal masses of 1 kg.
+    Without deformation the body frame is the mesh frame; how it follows the deformation is defined by the
+    reference condition of the modes.  Units per modal coordinate: q in m, for modal masses of 1 kg.
     """
     model = of_mesh(mesh).assemble(mesh)
     vectors = modes["vector"].values
@@ -45,17 +45,17 @@ def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None =
 
 
 def rigid(mesh: xr.Dataset) -> xr.Dataset:
-    """Mass [kg], centre of mass [m], inertia about it [kg m^2] and frames of a mesh (schema RIGID), in its frame."""
+    """Return mass [kg], centre of mass [m], inertia about it [kg m^2] and frames (schema RIGID), in the mesh frame."""
     return rigid_of(of_mesh(mesh).assemble(mesh), mesh.attrs["title"])
 
 
 def rigid_of(model: Model, title: str) -> xr.Dataset:
-    """The same of an assembled mesh with this title."""
+    """Return the rigid body (schema RIGID) of an assembled mesh with this title."""
     return conform(_dataset(model, _rigid(model)), RIGID, title=f"Rigid body made of the mesh: {title}")
 
 
 def drawn(mesh: xr.Dataset) -> xr.Dataset:
-    """The same with what is drawn of the body, and one mode in which nothing moves: to be shown without modes."""
+    """Return the rigid body with its drawn geometry and one mode at rest, for pictures without modes."""
     model = of_mesh(mesh).assemble(mesh)
     still = np.zeros((len(model.drawn.position), 3, 1))
     whole = _rigid(model)
@@ -69,7 +69,7 @@ def drawn(mesh: xr.Dataset) -> xr.Dataset:
 
 
 def _rigid(model: Model) -> dict[str, Any]:
-    """Values of the variables of schema RIGID."""
+    """Return the values of the variables of schema RIGID."""
     integrals = model.integrate(np.zeros((model.size, 0)))
     com = integrals.first_moment / integrals.mass
     second = integrals.second_moment - integrals.mass * np.outer(com, com)

@@ -1,4 +1,4 @@
-"""What a reference condition is: which motions are held, which static shapes belong to it, how rigid motion goes."""
+"""Reference conditions: the held motions, the static shapes that belong to them, and the removal of rigid motion."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ ONCE = "hold each motion once; interfaces that are tied to the same nodes move a
 
 @dataclass(frozen=True)
 class Given:
-    """What a scene says besides the condition's name.
+    """Data that a scene gives for a reference condition, besides its name.
 
-    interfaces: frames at which the body is joined, first the one that may carry the body frame.
+    interfaces: frames at which the body is joined; the first one may carry the body frame.
     held: single motions, ``frame.direction`` in axes of the frame.  of: another condition that this one is based on.
     """
 
@@ -32,11 +32,11 @@ class Condition:
     """A reference condition and the kind of shapes that it admits.
 
     held: functionals that vanish in every normal mode, shape (c, ndof).
-    moved: rows of `held`; each gives a constraint mode, in which it is one and the others are zero.
+    moved: rows of `held`; each gives a constraint mode, in which that functional is one and the others are zero.
     loaded: functionals whose unit loads give attachment modes, shape (s, ndof).
-    residual: whether the retained normal modes' part is taken out of the attachment modes.
-    mean_axes: whether rigid motion is taken out of every shape (Tisserand's condition: no momentum).
-    note: which rigid-body motion was removed, and how.
+    residual: True to remove the retained normal modes' part from the attachment modes.
+    mean_axes: True to remove rigid motion from every shape (Tisserand's condition: no momentum).
+    note: text on the removed rigid-body motion and the method.
     """
 
     held: sp.csr_array
@@ -48,15 +48,15 @@ class Condition:
 
 
 def joined(given: Given, count: int, needs: str) -> tuple[Interface, ...]:
-    """The interfaces, of which a condition needs so many; InputError where there are fewer.  needs: in words."""
+    """Return the interfaces; raise InputError when there are fewer than `count`.  needs: the requirement in words."""
     if len(given.interfaces) < count:
         raise InputError("modes.interfaces", needs, "name the recipe's frames")
     return given.interfaces
 
 
 def in_own_axes(frame: Interface) -> sp.csr_array:
-    """Motion of a frame in its own axes, shape (6, ndof)."""
-    # products with the zeros of a rotation would store them, and a single degree of freedom look like a mixture
+    """Return the motion of a frame in its own axes, shape (6, ndof)."""
+    # products with the zeros of a rotation would be stored, and a single degree of freedom would look like a mixture
     R = np.where(np.abs(frame.rotation) < 1e-15, 0.0, frame.rotation)
     turned = sp.csr_array(sp.block_diag([R.T, R.T])) @ frame.motion
     turned.eliminate_zeros()
@@ -64,7 +64,7 @@ def in_own_axes(frame: Interface) -> sp.csr_array:
 
 
 def different(frames: tuple[Interface, ...]) -> None:
-    """InputError when two frames move alike, so that a second one can add nothing."""
+    """Raise InputError when two frames move alike, so that the second one adds nothing."""
     for k, frame in enumerate(frames):
         for other in frames[:k]:
             if abs(frame.motion - other.motion).max() == 0.0:
@@ -73,7 +73,7 @@ def different(frames: tuple[Interface, ...]) -> None:
 
 
 def check(model: Model, condition: Condition) -> None:
-    """InputError unless the held motions are independent and leave the body no rigid motion (or all of it)."""
+    """Raise InputError unless the held motions are independent and leave no rigid motion (or are none at all)."""
     held = condition.held
     if held.shape[0] == 0:
         return

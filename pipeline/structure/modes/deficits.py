@@ -1,7 +1,7 @@
-r"""What a reduced body cannot do, measured against the full model.
+r"""Deficits of a reduced body, measured against the full model.
 
-*Compliance*: displacement of a frame under unit static loads while another frame is held (or nothing is, the load
-being balanced by the body's inertia), full model and fraction of the basis.
+*Compliance*: displacement of a frame under unit static loads while another frame is held (or none is, and the load
+is balanced by the body's inertia), for the full model, and the fraction of it that the basis reaches.
 
 *Error bound*: a force :math:`f e^{i\omega t}` at a frame moves the free body by u, and the reduced one (with its rigid
 motion) by :math:`\hat u`. With :math:`D = K - \omega^2 M` and the residual :math:`r = f - D\hat u`, which the basis and
@@ -39,16 +39,16 @@ from flexclear.pipeline.structure.modes import eigen, normal
 from flexclear.pipeline.structure.modes.condition import in_own_axes
 from flexclear.pipeline.structure.modes.statics import Flexibility
 
-#: frequencies of the error bound, as fractions of the free body's first one
+#: frequencies of the error bound, as fractions of the free body's first frequency
 BOUND_AT = (0.0, 0.25, 0.5)
-#: a frequency this close to the full model's is resolved
+#: a frequency is resolved when its relative difference from the full model's is at most this
 RESOLVED = 0.01
-#: full frequencies that are computed to compare with, at most; each costs a solution of the full model
+#: largest number of frequencies of the full model to compare with; each costs a solution of the full model
 COMPARED = 40
 
 
 def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables (schema BUNDLE, the deficits) and attributes of a basis of shape (ndof, n), mass-normalised modes."""
+    """Return deficits (schema BUNDLE) and attributes of a basis of mass-normalised modes, shape (ndof, n)."""
     model = flexibility.model
     names = [frame.name for frame in model.interfaces]
     progress(None, "compliance of the full model")
@@ -70,7 +70,7 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
 
 
 def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, first: float) -> np.ndarray:
-    """Error bounds [m/N, rad/(N m)] for unit loads at every frame, shape (p, 6, frequencies).
+    """Return error bounds [m/N, rad/(N m)] for unit loads at every frame, shape (p, 6, frequencies).
 
     hertz: frequencies of the load, below `first`, the free body's first one [Hz].
     """
@@ -82,7 +82,7 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
     for k, value in enumerate(hertz):
         square = (2.0 * np.pi * value) ** 2
         if square == 0.0:
-            # at rest the free body cannot be in balance; its inertia takes the load
+            # at rest an unbalanced load has no equilibrium; the inertia of the free body balances it
             residual = flexibility.balanced(loads)
             residual = residual - K[:, 6:] @ _solved(vectors.T @ K[:, 6:], vectors.T @ residual)
         else:
@@ -90,7 +90,7 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
             residual = loads - (K - square * M) @ _solved(inner, basis.T @ loads)
         energy = np.einsum("ij,ij->j", residual, flexibility.response(flexibility.balanced(residual)))
         result[:, k] = energy / (1.0 - (value / first) ** 2)
-    # rounding of a basis that misses nothing
+    # rounding may give negative values where a basis misses nothing
     return np.maximum(result, 0.0).reshape(len(model.interfaces), 6, len(hertz))
 
 
@@ -100,7 +100,7 @@ def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -> tuple[float, float]:
-    """The free body's first frequency, and the highest one that the basis resolves (zero: none) [Hz]."""
+    """Return the free body's first frequency, and the highest one that the basis resolves (zero: none) [Hz]."""
     model = flexibility.model
     count = min(vectors.shape[1], COMPARED, model.size - 6)
     none = sp.csr_array((0, model.size))
@@ -113,23 +113,23 @@ def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progre
 
 
 def _effective_mass(model: Model, vectors: np.ndarray) -> np.ndarray:
-    """Effective mass [kg, kg m^2], shape (6, n)."""
+    """Return the effective mass of each mode [kg, kg m^2], shape (6, n)."""
     momentum = model.mass @ model.rigid
     inertia = model.rigid.T @ momentum
-    # rigid rotation about the centre of mass: momentum-free translation is subtracted
+    # rigid rotation about the centre of mass: subtract the translation that cancels its momentum
     shift = np.eye(6)
     shift[:3, 3:] = -inertia[:3, 3:] / inertia[0, 0]
     return (shift.T @ (momentum.T @ vectors)) ** 2
 
 
 def frames(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Motion of p frames in their own axes: functionals, (6 p, ndof), and under the six rigid motions, (p, 6, 6)."""
+    """Return motions of p frames in their own axes: functionals (6 p, ndof), and their rigid motions (p, 6, 6)."""
     motion = np.vstack([in_own_axes(frame).toarray() for frame in interfaces])
     return motion, (motion @ flexibility.model.rigid).reshape(-1, 6, 6)
 
 
 def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndarray:
-    """Compliance [m/N, rad/(N m)] of each frame with each held (or, with itself, nothing), shape (p, p, 6)."""
+    """Return the compliance [m/N, rad/(N m)] of each frame with each other one held (itself: none), shape (p, p, 6)."""
     (motion, rigid), p = frames(flexibility, interfaces), len(interfaces)
     loads = np.hstack([motion.T, flexibility.momentum])
     gram = loads.T @ flexibility.response(loads)
@@ -148,7 +148,7 @@ def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndar
 
 
 def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> np.ndarray:
-    """Compliance that shapes of (ndof, n) can show, likewise; any combination and scale of them."""
+    """Return the compliance that shapes (ndof, n) represent, as in `full`; any combination and scale of them."""
     functionals, rigid = frames(flexibility, interfaces)
     K = vectors.T @ (flexibility.model.stiffness @ vectors)
     relief = np.linalg.solve(flexibility.inertia, flexibility.momentum.T @ vectors)
@@ -159,7 +159,7 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
 
 
 def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
-    """Smallest fraction of the compliance between the interfaces (of a single one: of the free body), and where."""
+    """Return the least compliance fraction between interfaces (of a single one: of the free body), and its location."""
     whole = full(flexibility, interfaces)
     each = fractions(of_basis(flexibility, interfaces, vectors), whole)
     if len(interfaces) > 1:

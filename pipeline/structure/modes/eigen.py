@@ -1,6 +1,6 @@
-"""The symmetric eigenproblem K x = lambda M x from its lower end, the same in every process.
+"""The symmetric eigenproblem K x = lambda M x from its lower end, with equal results in every process.
 
-Where it leaves axes and signs open, they are chosen here, and so is the family of each mode.
+This module also chooses axes and signs that the eigenproblem leaves open, and the family of each mode.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from flexclear.pipeline.core.numerics.rotations import first_largest
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.model import Model
 
-#: up to here the dense solver is as quick, finds every multiple root, and gives complete bases
+#: up to this size the dense solver is as fast, finds every multiple root, and gives complete bases
 DENSE_LIMIT = 900
-#: relative distance below which two frequencies count as one
+#: relative difference below which two frequencies are equal
 EQUAL = 1e-6
-#: modal masses further than this from one are computed again from the modes themselves
+#: modal masses that deviate from one by more are recomputed from the modes themselves
 ORTHONORMAL = 1e-12
 #: rigid eigenvalues are zero up to rounding; elastic ones lie at least this factor above them
 RIGID_GAP = 1e4
 
 
 def dense(stiffness: sp.csr_array, mass: sp.csr_array, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The `count` lowest eigenvalues [rad^2/s^2], ascending, and mass-normalised vectors, shape (n, count).
+    """Return the `count` lowest eigenvalues [rad^2/s^2], ascending, and mass-normalised vectors, shape (n, count).
 
     Raises InputError when the mass matrix is not positive definite.
     """
@@ -46,13 +46,13 @@ def inverted(
     inverse: Callable[[np.ndarray], np.ndarray],
     tolerance: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The `count` lowest eigenpairs by Lanczos steps with the inverse, which takes loads to displacements.
+    """Return the `count` lowest eigenpairs by Lanczos steps with the inverse, which maps loads to displacements.
 
     Eigenvalues [rad^2/s^2] ascending; vectors mass-normalised, shape (n, count).  tolerance: zero for all digits.
-    Raises SolverError when the solver does not deliver all of them.
+    Raises SolverError when the solver does not converge.
     """
     n = mass.shape[0]
-    # ARPACK starts from a random vector unless given one; in equal pairs that turns the shapes from run to run
+    # ARPACK starts from a random vector unless given one; in equal pairs this turns the shapes from run to run
     start = inverse(mass @ np.linspace(1.0, 2.0, n))
     operator = scipy.sparse.linalg.LinearOperator((n, n), matvec=inverse, dtype=float)
     try:
@@ -66,26 +66,26 @@ def inverted(
 
 
 def gap(values: np.ndarray) -> tuple[int, float] | None:
-    """How many eigenvalues lie below the last gap between unequal ones, and a value within it; None without gap."""
+    """Return how many eigenvalues lie below the last gap between unequal ones, and a value in the gap, or None."""
     last = clusters(values)[-1][0]
     return (last, float(0.5 * (values[last - 1] + values[last]))) if last else None
 
 
 def rediagonalise(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and mass-normalised combinations of the columns of `basis`, ascending.
+    """Return eigenvalues and mass-normalised combinations of the columns of `basis`, ascending.
 
-    basis: shape (ndof, n).  Raises SolverError when its columns depend on each other.
+    basis: shape (ndof, n).  Raises SolverError when its columns are linearly dependent.
     """
     values, vectors = _rayleigh_ritz(stiffness, mass, basis)
     spread = vectors.T @ (mass @ vectors)
     if np.abs(spread - np.eye(len(values))).max() > ORTHONORMAL:
-        # attachment modes of neighbouring frames are nearly parallel; the result is a well-conditioned start
+        # attachment modes of neighbouring frames are nearly parallel; the first result is a well-conditioned start
         values, vectors = _rayleigh_ritz(stiffness, mass, vectors)
     return values, vectors
 
 
 def _rayleigh_ritz(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # equal diagonals first: constraint modes and normal modes differ by orders in their norm
+    # first make the diagonals equal: norms of constraint modes and normal modes differ by orders of magnitude
     scaled = basis / np.sqrt(np.einsum("ij,ij->j", basis, mass @ basis))
     K, M = scaled.T @ (stiffness @ scaled), scaled.T @ (mass @ scaled)
     try:
@@ -96,12 +96,12 @@ def _rayleigh_ritz(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarra
 
 
 def frequency(values: np.ndarray) -> np.ndarray:
-    """Eigenvalues [rad^2/s^2] to Hz; the rounding noise of rigid modes may be negative and is shown by its size."""
+    """Convert eigenvalues [rad^2/s^2] to Hz; rigid modes may be negative by rounding, so the absolute value counts."""
     return np.sqrt(np.abs(values)) / (2.0 * np.pi)
 
 
 def clusters(values: np.ndarray) -> list[tuple[int, int]]:
-    """Ranges [start, stop) of equal eigenvalues; single ones are ranges of length one."""
+    """Return ranges [start, stop) of equal eigenvalues; a single eigenvalue is a range of length one."""
     hertz = frequency(values)
     breaks = np.flatnonzero(np.diff(hertz) > EQUAL * hertz[1:]) + 1
     edges = [0, *breaks.tolist(), len(values)]
@@ -109,9 +109,9 @@ def clusters(values: np.ndarray) -> list[tuple[int, int]]:
 
 
 def without_rigid(values: np.ndarray, rigid: int) -> None:
-    """Check that exactly the first `rigid` eigenvalues are rigid: a gap of RIGID_GAP above them.
+    """Raise SolverError unless exactly the first `rigid` eigenvalues are rigid, below a gap of RIGID_GAP.
 
-    Raises SolverError when the gap is not there (a mechanism inside the mesh, or rounding that hides it).
+    The gap is missing where the mesh contains a mechanism, or where rounding hides it.
     """
     if not values[rigid] > RIGID_GAP * np.abs(values[:rigid]).max():
         last, first = frequency(values[rigid - 1 : rigid + 1])
@@ -122,7 +122,7 @@ def without_rigid(values: np.ndarray, rigid: int) -> None:
 
 
 def orient(model: Model, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Vectors of equal eigenvalues turned to the body's axes: its families in their order.
+    """Turn vectors of equal eigenvalues to the body's axes, with families in their order.
 
     values: ascending, shape (n,).  vectors: mass-normalised, shape (ndof, n).
     """
@@ -138,24 +138,24 @@ def orient(model: Model, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _rank(model: Model) -> np.ndarray:
-    """A weight per local component that separates the families, and within one the positions along the body."""
+    """Return a weight per local component that separates the families, and positions along the body within one."""
     families = model.families
     return 0.25 * (1.0 - families.along) + (len(families.names) - 1 - families.member)
 
 
 def family(model: Model, vectors: np.ndarray) -> list[str]:
-    """For each vector the family with the largest fraction of its kinetic energy."""
+    """Return for each vector the family with the largest fraction of its kinetic energy."""
     families = model.families
     fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
     totals = np.stack([fraction[families.member == k].sum(axis=0) for k in range(len(families.names))])
-    # a solid's torsion has equal fractions along y and z
+    # torsion of a solid has equal fractions along y and z
     return [families.names[k] for k in first_largest(totals, axis=0)]
 
 
 def signed(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndarray:
-    """Each vector with its largest displacement positive (rotation, where it twists).
+    """Return each vector with its largest displacement (for torsion, rotation) positive.
 
-    Of components that are equally large, as those at the two ends of an antisymmetric shape, the first counts.
+    Of equally large components, as at the two ends of an antisymmetric shape, the first counts.
     """
     result = vectors.copy()
     main = dict(zip(model.families.names, model.families.main, strict=True))

@@ -1,6 +1,6 @@
-r"""Geometric stiffness of a straight beam, as forms in its modal coordinates.
+r"""Geometric stiffness of a straight beam, as quadratic forms in its modal coordinates.
 
-A bent axis that keeps its length draws the section at x towards the body frame, held at x0, by
+A bent axis of constant length moves the section at x towards the body frame, held at x0, by
 :math:`\tfrac12 q^T B(x) q` along x,
 
 .. math:: B_{ij}(x) = -\int_{x_0}^{x} (v_i' v_j' + w_i' w_j')\,ds .
@@ -8,7 +8,7 @@ A bent axis that keeps its length draws the section at x towards the body frame,
 An axial force N(s) does the work :math:`\tfrac12\int N (v'^2 + w'^2)\,ds` on it, so each load has its stiffness matrix:
 an axial acceleration a of the frame :math:`a\int\rho A B\,dx`, turning at omega
 :math:`-(\omega_y^2+\omega_z^2)\int\rho A\,x B\,dx`, a force N on the frame at x_k :math:`-N B(x_k)`. Turning about x
-loads the axis with nothing. The loads' own axial forces N(s), the mass and the first moment of what lies beyond s,
+does not load the axis. The loads' own axial forces N(s), the mass and first moment of the rod beyond s,
 turn the double integrals into single ones.
 
 Source: Wallrapp & Schwertassek (1991), International Journal for Numerical Methods in Engineering 32, 1833-1850.
@@ -27,9 +27,9 @@ from flexclear.pipeline.structure.fe.section import POINTS
 
 
 def variables(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:
-    """The bundle's optional variables on shortening, of a beam's mesh (schema MESH) and its modes (schema MODES).
+    """Return the bundle's optional shortening variables of a beam mesh (schema MESH) and its modes (schema MODES).
 
-    The body frame is held at the first of the modes' interfaces (x0); without any, at the lower end.
+    The body frame is held at the first of the modes' interfaces (x0); without interfaces, at the lower end.
     Raises InputError for a body whose shortening is not along x of its frame, or not given by its axis alone.
     """
     _require_plain_rod(mesh)
@@ -61,22 +61,22 @@ def _require_plain_rod(mesh: xr.Dataset) -> None:
 
 
 def _form(mesh: xr.Dataset, vectors: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Int weight (v'_i v'_j + w'_i w'_j) dx, exactly symmetric; weight: of cells or at their Gauss points."""
+    """Return int weight (v'_i v'_j + w'_i w'_j) dx, exactly symmetric; weight: per cell or per Gauss point."""
     result = vectors.T @ (beams.geometric_stiffness(mesh, weight) @ vectors)
     return 0.5 * (result + result.T)
 
 
 def _between(ends: np.ndarray, x0: float, x: float) -> np.ndarray:
-    """Sign of the way from x0 to x in each cell that lies between them, shape (cells, 1)."""
+    """Return the sign of the direction from x0 to x for cells between them, else zero, shape (cells, 1)."""
     middle = ends.mean(axis=1)
     inside = (middle > min(x0, x)) & (middle < max(x0, x))
     return (np.sign(x - x0) * inside)[:, None]
 
 
 def _beyond(ends: np.ndarray, s: np.ndarray, x0: float, line: np.ndarray, power: int) -> np.ndarray:
-    """Int rho A x^power dx over what lies beyond s, seen from x0; minus it where s lies before x0.
+    """Return int rho A x^power dx over the rod beyond s, seen from x0; negative where s lies before x0.
 
-    ends: ascending, (cells, 2).  s: positions in those cells, (cells, points).  line: rho A of each cell.
+    ends: of each cell, ascending, (cells, 2).  s: positions in the cells, (cells, points).  line: rho A of each cell.
     """
     k = power + 1
     whole = line * (ends[:, 1] ** k - ends[:, 0] ** k) / k

@@ -1,4 +1,4 @@
-"""Normal modes of a body with some motions held, or of the free body without its rigid modes."""
+"""Normal modes of a body with held motions, or of the free body without its rigid modes."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from flexclear.pipeline.structure.modes import eigen
 from flexclear.pipeline.structure.modes.statics import Flexibility, border
 from flexclear.pipeline.structure.sparse.multifrontal import negative_pivots
 
-#: largest dense eigenproblem; its three matrices take about a gigabyte
+#: size of the largest dense eigenproblem; its three matrices take about a gigabyte
 DENSE_MOST = 6000
 NOBODY = np.empty(0)
 WHERE = "modes.count"
-#: residual of a rough eigenvalue, relative; frequencies have an error of its square at most
+#: relative residual of a rough eigenvalue; the error of the frequency is at most its square
 ROUGH = 1e-6
 
 
 @dataclass(frozen=True)
 class Normal:
-    """Ascending eigenvalues [rad^2/s^2], mass-normalised shapes (ndof, n), and rigid frequencies [Hz] left out."""
+    """Ascending eigenvalues [rad^2/s^2], mass-normalised shapes (ndof, n), and removed rigid frequencies [Hz]."""
 
     values: np.ndarray
     shapes: np.ndarray
@@ -43,11 +43,11 @@ def lowest(
     *,
     rough: bool = False,
 ) -> Normal:
-    """The `count` lowest normal modes with the functionals `held`, shape (c, ndof), at zero.
+    """Return the `count` lowest normal modes with the functionals `held`, shape (c, ndof), at zero.
 
-    Without held functionals: of the free body, its six rigid modes identified by a gap and left out.
-    rough: frequencies of a large model to six digits only, and not checked to be all there.
-    Raises InputError when so many modes of so large a mesh are asked for, SolverError when some are missed.
+    Without held functionals: those of the free body, without its six rigid modes, which a gap identifies.
+    rough: frequencies of a large model to six digits only, without the check that none is missing.
+    Raises InputError for too many modes of a large mesh, SolverError when some are missed.
     """
     size = model.size - held.shape[0]
     if size <= eigen.DENSE_LIMIT or count > size // 4:
@@ -64,7 +64,7 @@ def _dense_free(model: Model, count: int) -> Normal:
     if len(values) > n:
         eigen.without_rigid(values, n)
     elastic = shapes[:, n : n + count]
-    # the solver leaves a trace of rigid motion; momentum is to vanish to rounding
+    # the solver leaves a trace of rigid motion; momentum must vanish to rounding
     momentum = model.mass @ model.rigid
     elastic = elastic - model.rigid @ np.linalg.solve(model.rigid.T @ momentum, momentum.T @ elastic)
     return Normal(values[n : n + count], elastic, np.sort(eigen.frequency(values[:n])))
@@ -98,7 +98,7 @@ def _sparse(
         return inverse(loads.reshape(-1, 1)).ravel()
 
     values, shapes = eigen.inverted(model.stiffness, model.mass, count, compliance, ROUGH if rough else 0.0)
-    # ARPACK leaves a trace of what is held in the shapes; one more step of the iteration takes it out
+    # ARPACK leaves a trace of the held motions in the shapes; one more step of the iteration removes it
     shapes = inverse(model.mass @ shapes) * values
     rigid = NOBODY
     if not held.shape[0]:
@@ -111,7 +111,7 @@ def _sparse(
 
 
 def _rigid_frequency(model: Model, first: float) -> np.ndarray:
-    """Frequencies [Hz] of the rigid motions, ascending; SolverError when they store energy."""
+    """Return the frequencies [Hz] of the rigid motions, ascending; raise SolverError when they store energy."""
     K, M = (model.rigid.T @ (matrix @ model.rigid) for matrix in (model.stiffness, model.mass))
     values = scipy.linalg.eigh(K, M, eigvals_only=True)
     eigen.without_rigid(np.append(values, first), len(values))
@@ -119,7 +119,7 @@ def _rigid_frequency(model: Model, first: float) -> np.ndarray:
 
 
 def _nothing_missed(model: Model, held: sp.csr_array, count: int, between: float) -> None:
-    """Sylvester's law of inertia: K - s M has as many negative pivots as there are eigenvalues below s."""
+    """Raise SolverError unless K - s M, s = `between`, has `count` negative pivots (Sylvester's law of inertia)."""
     shifted = sp.csr_array(model.stiffness - between * model.mass)
     dofs = own_dofs(held)
     extra, positions = 0, model.position
@@ -129,7 +129,7 @@ def _nothing_missed(model: Model, held: sp.csr_array, count: int, between: float
         free = np.setdiff1d(np.arange(model.size), dofs)
         shifted, positions = sp.csr_array(shifted[free][:, free]), positions[free]
     else:
-        # each held functional brings one eigenvalue of either sign (Gould 1985)
+        # each held functional adds one eigenvalue of either sign (Gould 1985)
         extra = held.shape[0]
         shifted = sp.csr_array(
             sp.vstack([sp.hstack([shifted, held.T]), sp.hstack([held, sp.csr_array((extra, extra))])])

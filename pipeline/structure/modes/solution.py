@@ -1,4 +1,4 @@
-"""Stage 2: modes of a mesh under a reference condition, as a dataset."""
+"""Stage 2: the dataset of modes of a mesh under a reference condition."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def solve(
     of: str | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Modes (schema MODES): mass-normalised, ascending, oriented and signed the same in every process.
+    """Compute modes (schema MODES): mass-normalised, ascending, oriented and signed the same in every process.
 
-    mesh: what a kind of body built.  reference: a name of `pipeline.structure.modes.reference`.
+    mesh: dataset of any kind of body.  reference: a name of `pipeline.structure.modes.reference`.
     count: number of elastic coordinates, static ones included; None for a complete basis.
-    requested: other ways to choose.
+    requested: other rules for the number of modes.
     interfaces: named frames; None for the recipe's own list.  held, of: see `condition.Given`.
     Raises InputError for an unknown reference or frame, a count beyond the mesh, or one that cuts a cluster
     of equal frequencies (with the two nearest whole counts).
@@ -79,7 +79,7 @@ def solve(
 def _held(
     model: Model, reference: str, names: Sequence[str], held: Sequence[str], of: str | None
 ) -> tuple[Given, Condition]:
-    """What a scene says of a reference condition, and the condition; InputError as of `solve`."""
+    """Return the scene's data of a reference condition, and the condition; raise InputError as `solve` does."""
     given = Given(tuple(_frame(model, name) for name in names), tuple(held), of)
     condition: Condition = lookup(REFERENCES, reference, where="modes.reference")(model, given)
     check(model, condition)
@@ -87,9 +87,9 @@ def _held(
 
 
 def require_possible(model: Model, modes: Modes, names: Sequence[str]) -> None:
-    """InputError for modes that `solve` would refuse before it computes one; nothing is factorised.
+    """Raise InputError for modes that `solve` would refuse, without a factorisation.
 
-    names: interfaces of the mesh, for modes that name none.
+    names: interfaces of the mesh, for modes without their own.
     """
     _, condition = _held(model, modes.reference, modes.interfaces or names, modes.held, modes.of)
     if isinstance(modes.count, int) and modes.count:

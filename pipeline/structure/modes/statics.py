@@ -1,8 +1,8 @@
 r"""Static response of a free body, from one factorisation.
 
-With six degrees of freedom held the stiffness is regular; its inverse G answers every load in equilibrium, up to a
-rigid motion. Inertia relief makes any load one, :math:`P^T f = f - M R (R^T M R)^{-1} R^T f`, and takes rigid motion
-out of any answer, :math:`P u = u - R (R^T M R)^{-1} R^T M u`. Held functionals C u = 0 join as a small dense border:
+With six degrees of freedom held the stiffness is regular; its inverse G gives the response to balanced loads up to a
+rigid motion. Inertia relief balances any load, :math:`P^T f = f - M R (R^T M R)^{-1} R^T f`, and removes rigid motion
+from any response, :math:`P u = u - R (R^T M R)^{-1} R^T M u`. Held functionals C u = 0 add a small dense border:
 
 .. math:: u = G f - G C^T \lambda + R c, \qquad C u = 0, \qquad R^T (f - C^T \lambda) = 0 .
 
@@ -22,7 +22,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.model import Model, own_dofs
 from flexclear.pipeline.structure.sparse.multifrontal import Factor, cholesky
 
-#: a pivot this small next to its diagonal entry is rounding: the body moves there without strain
+#: a pivot this small relative to its diagonal entry is rounding: the body moves there without strain
 PIVOT = 1e-14
 
 
@@ -37,22 +37,22 @@ class Flexibility:
     inertia: np.ndarray  #: R^T M R, shape (6, 6)
 
     def response(self, loads: np.ndarray) -> np.ndarray:
-        """G f, shape (ndof, m); right up to a rigid motion for loads in equilibrium."""
+        """Return G f, shape (ndof, m); for balanced loads correct up to a rigid motion."""
         result = np.zeros_like(loads, dtype=float)
         result[self.free] = self.factor.solve(loads[self.free])
         return result
 
     def balanced(self, loads: np.ndarray) -> np.ndarray:
-        """P^T f: loads and the inertia forces of the rigid motion that they cause."""
+        """Return P^T f: the loads with the inertia forces of the rigid motion that they cause."""
         return loads - self.momentum @ np.linalg.solve(self.inertia, self.model.rigid.T @ loads)
 
     def relieved(self, shapes: np.ndarray) -> np.ndarray:
-        """P u: shapes without momentum."""
+        """Return P u: shapes without momentum."""
         return shapes - self.model.rigid @ np.linalg.solve(self.inertia, self.momentum.T @ shapes)
 
 
 def support(model: Model, progress: Callable[[float], None]) -> Flexibility:
-    """Factorise a body on six supports; InputError when it is a mechanism."""
+    """Factorise a body on six supports; raise InputError when the body is a mechanism."""
     size = np.linalg.norm(model.rigid, axis=0)
     _, places = scipy.linalg.qr(model.rigid.T / size[:, None], pivoting=True, mode="r")
     free = np.setdiff1d(np.arange(model.size), places[:6])
@@ -77,23 +77,23 @@ def _mechanism() -> InputError:
 
 @dataclass(frozen=True)
 class Border:
-    """Held functionals of a body and what the small dense system needs of them."""
+    """Held functionals of a body, and their small dense system."""
 
     flexibility: Flexibility
     held: sp.csr_array
-    dofs: np.ndarray | None  #: where each functional is one degree of freedom
+    dofs: np.ndarray | None  #: the degree of freedom of each functional, where each selects one
     answer: np.ndarray  #: G C^T, shape (ndof, c)
     scale: np.ndarray  #: of the multipliers, shape (c,)
     system: tuple[np.ndarray, np.ndarray]  #: LU factors
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
-        """Displacement under loads of shape (ndof, m) with the functionals at zero."""
+        """Return the displacement under loads of shape (ndof, m) with the functionals at zero."""
         R = self.flexibility.model.rigid
         free = self.flexibility.response(loads)
         return self._finish(free, np.vstack([self.held @ free, R.T @ loads]), 0.0)
 
     def shapes(self, rows: np.ndarray) -> np.ndarray:
-        """Displacement with each of the functionals `rows` at one in turn, the others at zero, shape (ndof, rows)."""
+        """Return displacements with each functional of `rows` at one in turn, the others at zero, (ndof, rows)."""
         c = self.held.shape[0]
         values = np.eye(c)[:, rows]
         right = np.vstack([-values, np.zeros((6, len(rows)))])
@@ -105,13 +105,13 @@ class Border:
         solution = scipy.linalg.lu_solve(self.system, right)
         result = free - self.answer @ (self.scale[:, None] * solution[:c]) + self.flexibility.model.rigid @ solution[c:]
         if self.dofs is not None:
-            # what is held is held exactly, not to rounding
+            # held degrees of freedom are exact, not only to rounding
             result[self.dofs] = values
         return result
 
 
 def border(flexibility: Flexibility, held: sp.csr_array) -> Border:
-    """The small system of held functionals, shape (c, ndof), which must leave the body no rigid motion."""
+    """Build the small system of held functionals, shape (c, ndof), which must prevent all rigid motion."""
     answer = flexibility.response(held.T.toarray())
     compliance, rigid = held @ answer, np.asarray(held @ flexibility.model.rigid)
     diagonal = np.abs(np.diag(compliance))

@@ -1,4 +1,4 @@
 """Direct solution of large symmetric systems: nested dissection and a multifrontal factorisation.
 
-Used instead of SciPy's SuperLU: 1.5 s where that takes 8 s, and a third of the memory (23 040 unknowns of a block).
+For a block of 23 040 unknowns it takes 1.5 s and a third of the memory, where SciPy's SuperLU takes 8 s.
 """

@@ -1,6 +1,6 @@
 """Nested dissection: an elimination order that keeps the factors of three-dimensional meshes small.
 
-Nodes are halved along the longest side of their box, again and again; of each cut, the nodes of the side with fewer
+Nodes are halved recursively along the longest side of their box; of each cut, the nodes of the side with fewer
 neighbours across form the separator, which is eliminated after both halves.
 Source: George (1973), SIAM J. Numer. Anal. 10, 345-363.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-#: nodes that are not divided further; small dense blocks are quicker than deeper trees
+#: largest set of nodes that is not divided further; small dense blocks are faster than deeper trees
 LEAF = 32
 #: a node with this many times the usual number of neighbours is a hub (a rigid face) and is eliminated last
 HUB = 8
@@ -33,10 +33,10 @@ class Tree:
 
 
 def dissect(pattern: sp.csr_array, positions: np.ndarray, last: int = 0) -> Tree:
-    """Elimination tree of a symmetric matrix.
+    """Return the elimination tree of a symmetric matrix.
 
-    pattern: shape (n, n).  positions: where each row belongs [m], shape (n, 3); rows at one position stay together.
-    last: this many last rows come last in the order.
+    pattern: shape (n, n).  positions: position of each row [m], shape (n, 3); rows at one position stay together. last:
+    this many last rows come last in the order.
     """
     points, group = np.unique(positions[: len(positions) - last], axis=0, return_inverse=True)
     group = np.concatenate([group.ravel(), len(points) + np.arange(last)])
@@ -52,7 +52,7 @@ def dissect(pattern: sp.csr_array, positions: np.ndarray, last: int = 0) -> Tree
 
 
 def _quotient(pattern: sp.csr_array, group: np.ndarray, count: int) -> sp.csr_array:
-    """Which groups are coupled, shape (count, count)."""
+    """Return the coupling pattern of groups of rows, shape (count, count)."""
     ones = np.ones(len(group), dtype=np.int32)
     join = sp.csr_array((ones, (group, np.arange(len(group)))), shape=(count, len(group)))
     bare = sp.csr_array((np.ones(pattern.nnz, dtype=np.int32), pattern.indices, pattern.indptr), shape=pattern.shape)
@@ -62,12 +62,12 @@ def _quotient(pattern: sp.csr_array, group: np.ndarray, count: int) -> sp.csr_ar
 
 
 def _blocks(graph: sp.csr_array, points: np.ndarray, last: int) -> tuple[list[np.ndarray], np.ndarray]:
-    """Groups of each block and the parent of each block, children first."""
+    """Return the groups in each block and the parent of each block, children first."""
     degree = np.diff(graph.indptr)
     hub = degree > HUB * np.median(degree)
     hub[len(points) - last :] = True
     root, rest = np.flatnonzero(hub), np.flatnonzero(~hub)
-    # from the root downwards; turned round at the end
+    # from the root downwards; reversed at the end
     blocks: list[np.ndarray] = [root]
     above = [-1]
     waiting = [(rest, 0)]
@@ -81,19 +81,19 @@ def _blocks(graph: sp.csr_array, points: np.ndarray, last: int) -> tuple[list[np
         blocks.append(separator)
         above.append(parent)
         waiting += [(part, len(blocks) - 1) for part in parts if len(part)]
-    # depth first downwards is children first upwards; the root's parent becomes the number of blocks
+    # downwards depth first, reversed, has children first; the root's parent becomes the number of blocks
     return blocks[::-1], len(blocks) - 1 - np.array(above[::-1])
 
 
 def _halves(
     graph: sp.csr_array, points: np.ndarray, nodes: np.ndarray, side: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Two parts without a link between them, and the separator. `side` is scratch, all zero."""
+    """Return two uncoupled parts and their separator. `side` is scratch, all zero."""
     box = points[nodes]
     along = box[:, np.argmax(np.ptp(box, axis=0))]
     order = np.argsort(along, kind="stable")
     middle = len(nodes) // 2
-    # not through a plane of nodes
+    # avoid a cut through a plane of nodes
     middle = int(np.searchsorted(along[order], along[order[middle]] - 1e-9 * np.ptp(along)))
     if middle < len(nodes) // 4:
         middle = len(nodes) // 2

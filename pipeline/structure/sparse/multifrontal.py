@@ -1,7 +1,7 @@
 """Cholesky factors of a large sparse matrix by dense blocks along an elimination tree.
 
-Each block of the tree gathers its rows and what its children left over in one dense matrix, eliminates its own
-unknowns there with LAPACK, and hands the rest to its parent.
+Each block of the tree gathers its rows and the remainders of its children in one dense matrix, eliminates its own
+unknowns there with LAPACK, and passes its own remainder to its parent.
 Source: Duff & Reid (1983), ACM Trans. Math. Softw. 9, 302-325; Liu (1992), SIAM Review 34, 82-109.
 """
 
@@ -25,22 +25,22 @@ Progress = Callable[[float], None]
 class Front:
     """Dense matrix of one block: own unknowns [start, start + k) in elimination order, and the rows below them.
 
-    Stored by columns, for LAPACK to work in place. Of diagonal and rest only the lower triangle is filled.
+    Arrays are stored by columns, for LAPACK to work in place. `diagonal` and `rest` fill only their lower triangles.
     """
 
     start: int
     below: np.ndarray
     diagonal: np.ndarray  #: shape (k, k)
     under: np.ndarray  #: shape (len(below), k)
-    rest: np.ndarray  #: what is handed to the parent, shape (len(below), len(below))
+    rest: np.ndarray  #: remainder for the parent, shape (len(below), len(below))
 
     @property
     def own(self) -> slice:
-        """Its own unknowns in elimination order."""
+        """Range of the front's own unknowns in elimination order."""
         return slice(self.start, self.start + len(self.diagonal))
 
     def add(self, at: np.ndarray, theirs: np.ndarray) -> None:
-        """Add the lower triangle of a child's matrix; at: where its rows are here, ascending."""
+        """Add the lower triangle of a child's matrix; at: indices of its rows in this front, ascending."""
         k = len(self.diagonal)
         own = int(np.searchsorted(at, k))
         here, there = _runs(at[:own]), _runs(at[own:] - k)
@@ -53,18 +53,18 @@ class Front:
 
 @dataclass(frozen=True)
 class Factor:
-    """Cholesky factor of a symmetric positive definite matrix: fronts that hold it in place of the matrix."""
+    """Cholesky factor of a symmetric positive definite matrix, stored in fronts."""
 
     order: np.ndarray
     blocks: tuple[Front, ...]
 
     def smallest_pivot(self, diagonal: np.ndarray) -> float:
-        """Least pivot as a fraction of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
+        """Return the least pivot relative to the matrix' own `diagonal`, (n,); rounding for singular matrices."""
         pivots = np.concatenate([np.diag(block.diagonal) for block in self.blocks]) ** 2
         return float((pivots / diagonal[self.order]).min())
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solution for right-hand sides of shape (n,) or (n, m)."""
+        """Return the solution for right-hand sides of shape (n,) or (n, m)."""
         x = np.asfortranarray(right[self.order].reshape(len(self.order), -1), dtype=float)
         for block in self.blocks:
             own = blas.dtrsm(1.0, block.diagonal, x[block.own], lower=1)
@@ -85,7 +85,7 @@ Runs = list[tuple[slice, slice]]
 
 
 def _runs(at: np.ndarray) -> Runs:
-    """Consecutive indices, and which entries of `at` they are: to add slices is much quicker than to add by index."""
+    """Return runs of consecutive indices and their ranges in `at`: adding slices is much faster than by index."""
     if not len(at):
         return []
     ends = np.concatenate([[0], np.flatnonzero(np.diff(at) != 1) + 1, [len(at)]]).tolist()
@@ -99,9 +99,9 @@ def _add_lower(matrix: np.ndarray, runs: Runs, theirs: np.ndarray) -> None:
 
 
 def cholesky(matrix: sp.csr_array, positions: np.ndarray, progress: Progress = lambda fraction: None) -> Factor:
-    """Factor of a symmetric positive definite matrix, shape (n, n).
+    """Factorise a symmetric positive definite matrix, shape (n, n).
 
-    positions: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
+    positions: position of each row [m], shape (n, 3); they affect the order of elimination only.
     progress: receives the finished fraction.  Raises SolverError when the matrix is not positive definite.
     """
     tree = dissect(matrix, positions)
@@ -116,7 +116,7 @@ def cholesky(matrix: sp.csr_array, positions: np.ndarray, progress: Progress = l
 
 
 def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
-    """The factor's rows below the diagonal block's factor, taken from what is left, in place."""
+    """Return the factor's rows below the diagonal block; eliminate the own unknowns from the rest, in place."""
     if not len(front.below):
         return front.under
     under = blas.dtrsm(1.0, diagonal, front.under, side=1, lower=1, trans_a=1, overwrite_b=1)
@@ -125,16 +125,16 @@ def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
 
 
 def negative_pivots(matrix: sp.csr_array, positions: np.ndarray, last: int = 0) -> int:
-    """Number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia.
+    """Return the number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia.
 
-    last: this many last rows are eliminated last, since they have no diagonal entry of their own.
+    last: this many last rows are eliminated last, since they have no diagonal entry.
     """
     tree = dissect(matrix, positions, last)
     return sum(_eliminate(front) for front in _fronts(matrix, tree, lambda fraction: None))
 
 
 def _eliminate(front: Front) -> int:
-    """Eliminate the own unknowns in place and count their negative pivots."""
+    """Eliminate the own unknowns in place and return the number of negative pivots."""
     diagonal, info = lapack.dpotrf(front.diagonal, lower=1)
     if info == 0:
         _under(diagonal, front)
@@ -148,7 +148,7 @@ def _eliminate(front: Front) -> int:
 
 
 def _fronts(matrix: sp.csr_array, tree: Tree, progress: Progress) -> Iterator[Front]:
-    """Each dense block in turn; the caller eliminates in place."""
+    """Yield each dense block in turn; the caller eliminates in place."""
     n = len(tree.order)
     lower = sp.csc_array(sp.tril(sp.csr_array(matrix[tree.order][:, tree.order]), format="csc"))
     local = np.empty(n, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""What stress recovery needs of a body, by its kind; part of a bundle when a scene asks for it.
+"""Stress recovery by kind of body; its variables are part of a bundle when a scene requests stress.
 
 To add one: a module here with ``recover(mesh, modes, gauges) -> dict``, the variables STRESS of the contract, and a
 line below.

@@ -1,11 +1,11 @@
-r"""A rod's cross sections for stress recovery: what lies beyond each, and what its forces do to its fibres.
+r"""Cross sections of a rod for stress recovery: the mass beyond each section, and fibre stress per section force.
 
 A rod is an open chain, so its internal forces under given loads follow from equilibrium alone: the static response that
 the method of mode acceleration takes to interface and inertia loads needs no compliance here, and the two methods,
-mode acceleration and force summation, are one. What is needed of the rod is its mass as slices with their shapes, and
-for each section which slices and frames lie on its far side.
+mode acceleration and force summation, coincide. The recovery needs the rod's mass as slices with their shapes, and
+for each section the slices and frames on its far side.
 
-There is one section at either end of every cell, so that forces which act at a node show as a jump.
+Every cell has one section at either end, so that forces which act at a node show as a jump.
 Axial stress is :math:`\sigma = N/A + M_y z/I_y - M_z y/I_z`. Shear stress of circles and tubes is the exact solution of
 St. Venant (torsion and flexure); that of rectangles the exact one of torsion and the parabola of flexure, which leaves
 out Poisson's part of the variation across the width.
@@ -33,7 +33,7 @@ from flexclear.pipeline.structure.fe.section import POINTS, Section, Value
 from flexclear.pipeline.structure.fe.slices import slices
 
 CONSTANTS = ("area", "second_moment")
-#: fibres around a round section, a whole step of 5 deg; one of them lies in the plane of bending (`Outline.round`)
+#: fibres around a round section, in steps of 5 deg; one of them lies in the plane of bending (`Outline.round`)
 AROUND = 72
 #: fibres along each side of a rectangle, corners included
 ALONG = 9
@@ -45,8 +45,8 @@ TERMS = np.arange(1, 400, 2)
 class Outline:
     """Stress maps of one section.
 
-    stress: axial stress and shear along y and z [Pa] per N, Qy, Qz, T, My, Mz, shape (fibres, 3, 6).
-    round: the same about every axis, so that y may be turned into the plane of bending.
+    stress: axial stress and shear stress along y and z [Pa] per N, Qy, Qz, T, My, Mz, shape (fibres, 3, 6).
+    round: True when equal about every axis, so that y may be turned into the plane of bending.
     """
 
     stress: np.ndarray
@@ -54,9 +54,9 @@ class Outline:
 
 
 def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Any]) -> dict[str, Any]:
-    """Variables STRESS of a bundle; without `fibre_stress` where some section has no known outline.
+    """Return the variables STRESS of a bundle; without `fibre_stress` where a section has no known outline.
 
-    InputError for gauges, which are on solids.
+    Raises InputError for gauges, which exist on solids only.
     """
     for name in gauges:
         problem = f"'{gauges[name]['body']}' is a rod, which has sections and no surface of nodes"
@@ -85,7 +85,7 @@ def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray
     x, cells = mesh["abscissa"].values, mesh.sizes["cell"]
     positions, ending = x[nodes], np.tile([False, True], cells)
     lumps = x[mesh["lump_node"].values] if "lump_node" in mesh else np.empty(0)
-    first = np.arange(2 * cells) // 2 + ending  # the cell that begins at the section, or after it
+    first = np.arange(2 * cells) // 2 + ending  # the cell that begins at the section, or the one after the section
     inside = np.repeat(np.arange(cells), len(POINTS))[None, :] >= first[:, None]
     return {
         "slice_mass": (("slice",), body.mass),
@@ -102,7 +102,7 @@ def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray
 
 
 def _beyond(points: np.ndarray, positions: np.ndarray, ending: np.ndarray) -> np.ndarray:
-    """Whether what sits on nodes at `points` lies beyond each section; where a cell ends, its end node does."""
+    """Return True where nodes at `points` lie beyond each section; a cell's end node lies beyond its end section."""
     ahead = points[None, :] - positions[:, None]
     return (ahead > 0.0) | (ending[:, None] & (ahead == 0.0))
 
@@ -122,7 +122,7 @@ def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
                 return {}
             outlines.append(maps)
     most = max(len(maps.stress) for maps in outlines)
-    # sections of other types may have fewer fibres: their last one again
+    # sections of other types may have fewer fibres; their last fibre is repeated
     filled = [np.pad(m.stress, ((0, most - len(m.stress)), (0, 0), (0, 0)), mode="edge") for m in outlines]
     return {
         "fibre_stress": (("section", "fibre", "stress", "section_load"), np.stack(filled)),
@@ -131,18 +131,18 @@ def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
 
 
 def _at_ends(mesh: xr.Dataset, name: str) -> np.ndarray:
-    """A section constant at both ends of each cell, shape (cells, 2) or (cells, 2, 3)."""
+    """Return a section constant at both ends of each cell, shape (cells, 2) or (cells, 2, 3)."""
     values = beams.at_points(mesh, name)
     if f"{name}_profile" not in mesh:
         return values[:, :2]
-    # areas and second moments of linear tapers are polynomials of degree four at most, which five points know
+    # areas and second moments of linear tapers are polynomials of degree four at most, which five points determine
     powers = np.vander(POINTS, increasing=True)
     ends = np.vander([0.0, 1.0], len(POINTS), increasing=True) @ np.linalg.inv(powers)
     return np.einsum("ep,cp...->ce...", ends, values)
 
 
 def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline | None:
-    """The maps of a section with these constants that is of one of `types`; None where it has no known outline."""
+    """Return the stress maps of a section with these constants of one of `types`; None without a known outline."""
     name, lengths = sections.shape(types, given)
     if name not in OUTLINES:
         return None
@@ -156,7 +156,7 @@ def _round(made: Section, poisson: float, radius: float, inner: float = 0.0) -> 
     stress = _axial(made, y, z)
     stress[:, 1, 3], stress[:, 2, 3] = -z / made.torsion, y / made.torsion
     stress[:, 1, 1], stress[:, 2, 1] = _flexure(y, z, radius, inner, poisson, made.second_z)
-    # a force along z is one along y, seen a quarter turn on
+    # a force along z equals one along y in axes turned by a quarter
     stress[:, 2, 2], stress[:, 1, 2] = _flexure(z, y, radius, inner, poisson, made.second_y)
     return Outline(stress, True)
 
@@ -171,7 +171,7 @@ def _axial(made: Section, y: np.ndarray, z: np.ndarray) -> np.ndarray:
 def _flexure(
     y: np.ndarray, z: np.ndarray, radius: float, inner: float, poisson: float, second: Value
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shear stress along y and z per unit force along y."""
+    """Return the shear stress along y and z per unit force along y."""
     square, k = np.maximum(y**2 + z**2, 1e-12 * radius**2), 0.75 + 0.5 * poisson
     hole = (radius * inner) ** 2
     along = -k * (radius**2 + inner**2) - k * hole * (z**2 - y**2) / square**2 + 0.75 * (y**2 - z**2)
@@ -182,7 +182,7 @@ def _flexure(
 
 
 def _sides(made: Section, poisson: float, width: float, height: float) -> Outline:
-    """Of a rectangle; Poisson's ratio changes only what its flexure leaves out."""
+    """Return the stress maps of a rectangle; its flexure neglects the effect of Poisson's ratio."""
     s = np.linspace(-0.5, 0.5, ALONG)
     half = np.full(ALONG, 0.5)
     y = width * np.concatenate([s, s, half, -half, [0.0]])
@@ -194,12 +194,12 @@ def _sides(made: Section, poisson: float, width: float, height: float) -> Outlin
     return Outline(stress, False)
 
 
-#: by type of section; others have no known outline
+#: stress maps by type of section; other types have no known outline
 OUTLINES: dict[str, Callable[..., Outline]] = {"circle": _round, "tube": _round, "rectangle": _sides}
 
 
 def _torsion(y: np.ndarray, z: np.ndarray, width: float, height: float, J: Value) -> tuple[np.ndarray, np.ndarray]:
-    """Shear stress along y and z of a rectangle per unit torque."""
+    """Return the shear stress along y and z of a rectangle per unit torque."""
     a, b, n = 0.5 * width, 0.5 * height, TERMS
     sign = np.where(n % 4 == 1, 1.0, -1.0) / n**2
     wave = np.outer(y, n) * math.pi / (2.0 * a)

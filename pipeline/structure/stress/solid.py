@@ -1,7 +1,7 @@
-r"""Stress fields of a solid on its surface, by mode acceleration: what its stress is a linear combination of.
+r"""Surface stress fields of a solid by mode acceleration: the fields that its stress combines linearly.
 
 With shapes V of frequencies Omega, and G the response of the free body to balanced loads (`modes.statics`), a load g
-adds to what the shapes answer, :math:`V\Omega^{-2}V^T g`, the part that they lack:
+adds to the response of the shapes, :math:`V\Omega^{-2}V^T g`, the part that they lack:
 
 .. math:: u = V q + \sum_i \left(G - V\Omega^{-2}V^T\right) P^T g_i\,c_i .
 
@@ -9,8 +9,8 @@ The loads are unit forces and moments of the frames, the inertia of the body und
 :math:`a + B X` (translation, angular acceleration, centrifugal), and that of each shape. So interface loads and inertia
 of the rigid motion act in full, whatever the shapes are; of a Craig-Bampton basis the former lack nothing.
 
-In each cell stress is taken at the points where displacement elements have it best (Barlow), and continued to the
-nodes by the polynomial through them. A node has the mean of its cells; where materials meet, of those of the stiffer.
+In each cell stress is taken at the points where it is most accurate (Barlow), and extrapolated to the
+nodes by the polynomial through them. A node has the mean of its cells; at a material interface, of the stiffer ones.
 Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (mode acceleration); Barlow (1976), Int.
 J. Numer. Methods Eng. 10, 243-251; Hinton & Campbell (1974), Int. J. Numer. Methods Eng. 8, 461-480.
 """
@@ -36,9 +36,9 @@ from flexclear.pipeline.structure.modes.statics import support
 
 #: rows and columns of the six components of a symmetric tensor, in the order of the dimension `tensor`
 ROWS, COLUMNS = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
-#: a gauge's node is no farther from the given position than this fraction of the body's size
+#: largest distance of a gauge's node from the given position, as a fraction of the body's size
 ASTRAY = 0.1
-#: names, nodes and their owners in a mesh, by what a gauge may name
+#: mesh variables by the key of a gauge: names, nodes, and the index of the name of each node
 CHOSEN = {
     "frame": ("frame", "tie_node", "tie_frame"),
     "region": ("surface_region", "patch_node", "patch_region"),
@@ -46,9 +46,9 @@ CHOSEN = {
 
 
 def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Variables STRESS of a bundle.
+    """Return the variables STRESS of a bundle.
 
-    gauges: of this body by name, as `[output.gauges]` has them.  InputError for one that is nowhere on the surface.
+    gauges: those of this body by name, as in `[output.gauges]`.  Raises InputError for one that is not on the surface.
     """
     model, unknowns, solid = assemble(mesh), unknowns_of(mesh), solid_of(mesh)
     shown, doubtful = surface(mesh)[0], _doubtful(mesh)
@@ -77,7 +77,7 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
 
 
 def at_nodes(solid: Solid, nodes: np.ndarray, fields: np.ndarray) -> np.ndarray:
-    """Stress of displacement fields (3 n, f) at some nodes, shape (nodes, 6, f) [Pa per unit of the fields]."""
+    """Return the stress of displacement fields (3 n, f) at some nodes, shape (nodes, 6, f) [Pa per unit of field]."""
     at = sampled(solid.element, ELEMENTS[solid.element].stress_order)
     outward, f = from_stress_points(solid.element), fields.shape[1]
     moved = fields.reshape(-1, 3, f)
@@ -100,7 +100,7 @@ def at_nodes(solid: Solid, nodes: np.ndarray, fields: np.ndarray) -> np.ndarray:
 
 
 def _stress(slope: np.ndarray, lame: np.ndarray, shear: np.ndarray) -> np.ndarray:
-    """Components of stress (cell, point, 6, f) from displacement gradients (cell, point, 3, 3, f)."""
+    """Return stress components (cell, point, 6, f) of displacement gradients (cell, point, 3, 3, f)."""
     mu = shear[:, None, None, None]
     result = mu * (slope[:, :, ROWS, COLUMNS] + slope[:, :, COLUMNS, ROWS])
     result[:, :, :3] += lame[:, None, None, None] * np.einsum("cqiif->cqf", slope)[:, :, None]
@@ -108,7 +108,7 @@ def _stress(slope: np.ndarray, lame: np.ndarray, shear: np.ndarray) -> np.ndarra
 
 
 def _inertia(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array) -> np.ndarray:
-    """Loads of the body's inertia in the accelerations e_k, then e_k X_l with l running faster, shape (ndof, 12)."""
+    """Return inertia loads of the accelerations e_k, then e_k X_l with l running faster, shape (ndof, 12)."""
     weighted = line @ np.column_stack([np.ones(len(nodes)), nodes])
     forces = np.zeros((len(nodes), 3, 3, 4))
     for k in range(3):
@@ -118,14 +118,14 @@ def _inertia(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array) -> np.
 
 
 def _lacking(model: Model, vectors: np.ndarray, omega: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """What the shapes lack of the answer to each load, balanced by inertia, up to a rigid motion, (ndof, loads)."""
+    """Return the part of the response to each balanced load that the shapes lack, up to rigid motion, (ndof, loads)."""
     flexibility = support(model, lambda _: None)
     balanced = flexibility.balanced(loads)
     return flexibility.response(balanced) - vectors @ ((vectors.T @ balanced) / omega[:, None] ** 2)
 
 
 def _doubtful(mesh: xr.Dataset) -> np.ndarray:
-    """Whether a cell of the node has a rigidly tied node, shape (n,)."""
+    """Return True for nodes with a cell that touches a rigidly tied node, shape (n,)."""
     rigid = np.flatnonzero(mesh["frame_tie"].values == "rigid")
     tied = np.zeros(mesh.sizes["node"], dtype=bool)
     tied[mesh["tie_node"].values[np.isin(mesh["tie_frame"].values, rigid)]] = True
@@ -136,7 +136,7 @@ def _doubtful(mesh: xr.Dataset) -> np.ndarray:
 
 
 def _gauges(mesh: xr.Dataset, shown: np.ndarray, gauges: Mapping[str, Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Indices of each gauge's nodes among the shown ones."""
+    """Return the indices of each gauge's nodes among the shown ones."""
     found = {}
     for name, gauge in gauges.items():
         where = f"[output.gauges.{name}]"

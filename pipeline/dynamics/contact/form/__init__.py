@@ -1,6 +1,6 @@
-"""Forms of normal forces: what is compiled. Several laws share one and differ in numbers only.
+"""Compiled forms of normal forces; laws that share a form differ in numbers only.
 
-Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, damping)``, whose sum never pulls, and
+Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, damping)``, with a sum >= 0, and
 ``stored(depth, law)``; law has the fields of `contact.law.Numbers`.
 """
 

@@ -1,6 +1,6 @@
-r"""Damping in proportion to the elastic force: :math:`F_N = K\,\delta^n(1 + a\,\dot\delta/\dot\delta^{(-)})`.
+r"""Damping proportional to the elastic force: :math:`F_N = K\,\delta^n(1 + a\,\dot\delta/\dot\delta^{(-)})`.
 
-The force is never negative: where the surfaces part faster than the impact rate over a, it is zero.
+The force is never negative: it is zero where the surfaces separate faster than the impact rate over a.
 Source: Hunt & Crossley (1975), J. Applied Mechanics 42, 440-445.
 """
 
@@ -14,7 +14,7 @@ __all__ = ["force", "stored"]
 
 @kernel
 def force(depth, rate, impact_rate, law):
-    """Elastic and damping force [N], together >= 0; impact_rate: `rate` when this contact began [m/s], > 0.
+    """Return elastic and damping force [N], sum >= 0; impact_rate: `rate` at the start of this contact [m/s], > 0.
 
     The law's damping is a.
     """

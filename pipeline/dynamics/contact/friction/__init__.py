@@ -1,5 +1,5 @@
-"""Friction laws. To add one: a module here that is called like the law, with a `LAW` (see `law.Friction`), its
-parameters in core/scene/clearance, and a case in tests/properties/test_dynamics_friction and test_dynamics_clearance.
+"""Friction laws. To add one: a module here named like the law, with a `LAW` (see `law.Friction`), its parameters in
+core/scene/clearance, and a case in tests/properties/test_dynamics_friction and test_dynamics_clearance.
 
 A joint without friction names none.
 """

@@ -2,7 +2,7 @@ r"""Coulomb friction with a ramp: none below v_0, a linear rise, the full coeffi
 
 .. math:: F_t = -\mu_d\,c\,F_n\,v_t/|v_t|, \quad c = \min(1, \max(0, (|v_t| - v_0)/(v_1 - v_0)))
 
-It does not know sticking: a body on a slope creeps at a speed between v_0 and v_1.
+The law has no sticking: a body on a slope creeps at a speed between v_0 and v_1.
 Source: Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO ASI 103, 57-81; Flores et al.
 (2008), Kinematics and Dynamics of Multibody Systems with Imperfect Joints, sec. 3.4.
 """
@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def coefficient(speed, p):
-    """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_d, v_0, v_1, -, -, -)."""
+    """Return mu [-] at the sliding speed [m/s] >= 0; p = (mu_d, v_0, v_1, -, -, -)."""
     return p[0] * min(1.0, max(0.0, (speed - p[1]) / (p[2] - p[1])))
 
 

@@ -1,4 +1,4 @@
-"""What a friction law consists of; laws that depend on the present sliding speed alone."""
+"""Structure of a friction law; kernels of laws that depend on the present sliding speed alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot, scale
 
-#: speed [m/s] below which the coefficient rises in a straight line: at rest there is no force, but a slope
+#: speed [m/s] below which the coefficient rises linearly: at rest there is no force, but a slope
 SLOWEST = 1e-290
 
 
@@ -20,12 +20,11 @@ class Friction:
     """A friction law; the functions take its parameters in a scene.
 
     traction: kernel (z, slip, f_n, p) -> (force, loss, stored, z_rate): force [N] on the ball against the sliding
-    velocity `slip` [m/s] (vector in the tangent plane), what it takes [W] >= 0, what it holds [J], and the rate of its
-    bristles z [m] in the axes of slip (zeros for a law without memory).
+    velocity `slip` [m/s] (vector in the tangent plane), lost power [W] >= 0, stored energy [J], and the rate of the
+    bristle deflection z [m] in the axes of slip (zeros for a law without memory).
     constants: its numbers in p, six at most.
-    stick_speed: sliding speed below which it sticks [m/s], 0 where the law has no such regime.
-    kinks: two sliding speeds [m/s] at which the slope or curvature of the coefficient jumps, 0 for none: steps end
-    there.
+    stick_speed: sliding speed below which the law sticks [m/s], 0 for laws without sticking.
+    kinks: two sliding speeds [m/s] at which slope or curvature of the coefficient jumps, 0 for none; steps end there.
     bristle: the size of z [m], or None for a law without memory.
     """
 
@@ -36,12 +35,12 @@ class Friction:
     bristle: Callable[[Any], float | None] = lambda law: None
 
     def parameters(self, law: Any) -> tuple[float, ...]:
-        """The six numbers p."""
+        """Return the six numbers p."""
         return (*self.constants(law), *(0.0,) * 6)[:6]
 
 
 def sliding(coefficient: Callable) -> Callable:
-    """The kernel `traction` of a law whose coefficient(speed, p) >= 0 times the normal force is its force."""
+    """Build `traction` of a law whose force is the normal force times coefficient(speed, p) >= 0."""
 
     @kernel
     def traction(z, slip, f_n, p):

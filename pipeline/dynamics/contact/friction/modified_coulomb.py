@@ -2,8 +2,8 @@ r"""Coulomb friction made continuous: a cubic rise to mu_s at v_s, a cubic fall 
 
 .. math:: F_t = -\mu(|v_t|)\,F_n\,v_t/|v_t|
 
-Eqs. (27) and (28) of the paper both carry a minus sign. Read together, they make friction drive the
-sliding; read as eq. (28) alone being the signed coefficient, they make it dissipate. The reading
+Eqs. (27) and (28) of the paper both have a minus sign. With both signs friction would drive the
+sliding; with eq. (28) alone as the signed coefficient, friction dissipates. The reading
 that dissipates is used here. Below v_s the coefficient is :math:`\tfrac12\mu_s(3y - y^3)`,
 y = v/v_s; between v_s and v_d eq. (28) names its steps from the higher speed to the lower, which
 is the same cubic. Below v_s is the regime that represents sticking.
@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def coefficient(speed, p):
-    """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d, -, -).
+    """Return mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d, -, -).
 
     Source: Wang & Wang (2019), eqs. (27), (28), (29).
     """

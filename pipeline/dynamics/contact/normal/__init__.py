@@ -1,8 +1,7 @@
 """Normal contact laws. To add one: a module here, a line below, and a case in tests/properties/test_dynamics_laws.
 
 Each is a module, or the `LAW` in it, with its own ``exponent`` and with ``resolve(law, stiffness, mass) -> Resolved``
-(see `contact.law`): the numbers for one of the compiled forms in `contact.form`, and the
-restitution that a free impact gets.
+(see `contact.law`): the numbers for one of the compiled forms in `contact.form`, and the restitution of a free impact.
 """
 
 KIND = "normal law"

@@ -2,8 +2,8 @@ r"""Hertzian contact whose damping is a rational fit of the exact restitution.
 
 .. math:: F_N = K\,\delta^n\left[1 + a\,\dot\delta/\dot\delta^{(-)}\right], \quad a = \frac{3(1-c_r)(11-c_r)}{2(1+9c_r)}
 
-For nearly the whole range: asked for 0.9, 0.7 or 0.5 it delivers that to three digits, for 0.1 0.129, and never less
-than 0.060; within 0.05 of what is asked from 0.03 up.
+Valid for nearly the whole range: for 0.9, 0.7 and 0.5 it delivers that to three digits, for 0.1 0.129, and at least
+0.060. From 0.03 up, the deviation is below 0.05.
 Source: Carvalho & Martins (2019), Mech. Mach. Theory 139, 185-194.
 """
 

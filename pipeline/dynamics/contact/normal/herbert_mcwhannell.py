@@ -2,7 +2,7 @@ r"""Hertzian contact with a damping fitted to the energy lost in one impact.
 
 .. math:: F_N = K\,\delta^n\left[1 + a\,\dot\delta/\dot\delta^{(-)}\right], \quad a = \frac{6(1-c_r)}{(2c_r-1)^2+3}
 
-Asked for 0.8 it delivers 0.807, for 0.5 0.594, and never less than 0.487; within 0.05 of what is asked from 0.61 up.
+For 0.8 it delivers 0.807, for 0.5 0.594, and at least 0.487. From 0.61 up, the deviation is below 0.05.
 Source: Herbert & McWhannell (1977), J. Engineering for Industry 99, 792-798; Machado et al.
 (2012), Mech. Mach. Theory 53, 99-121.
 """

@@ -3,7 +3,7 @@ r"""Elastic contact without loss.
 .. math:: F_N = K\,\delta^n
 
 Valid while the contact area is small against the radii and nothing yields; a free impact rebounds
-with the speed of its approach.
+with its approach speed.
 Source: Hertz (1882), J. reine angew. Math. 92, 156-171; Wang & Wang (2019), eq. (25) with c_r = 1.
 """
 
@@ -12,12 +12,12 @@ from __future__ import annotations
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact.law import RESTITUTION_ERROR, Numbers, Resolved, refuse_linear
 
-#: where the scene gives none
+#: default exponent
 exponent = 1.5
 
 
 def resolve(law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
-    """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+    """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
     refuse_linear("hertz", law)
     if law.delivered_restitution not in (None, 1.0):
         raise ValueError(

@@ -2,7 +2,7 @@ r"""Hertzian contact with a damping from the energy lost, of compression and res
 
 .. math:: F_N = K\,\delta^n\left[1 + a\,\dot\delta/\dot\delta^{(-)}\right], \quad a = \frac{3(1-c_r)}{2c_r}
 
-For the whole range except 0: asked for 0.5 it delivers 0.488, for 0.9 0.900; at most 0.035 off (at 0.2).
+Valid for the whole range except 0: for 0.5 it delivers 0.488, for 0.9 0.900; largest deviation 0.035 (at 0.2).
 Source: Hu & Guo (2015), Nonlinear Dynamics 82, 1617-1634.
 """
 

@@ -1,9 +1,9 @@
-r"""Hertzian contact whose damping comes from a restitution that falls with the speed, near 1.
+r"""Hertzian contact whose damping comes from a restitution near 1 that decreases with the speed.
 
 .. math:: F_N = K\,\delta^n\left[1 + a\,\dot\delta/\dot\delta^{(-)}\right], \quad a = \tfrac32(1-c_r)
 
-Derived for c_r near 1 (1 - alpha v): asked for 0.8 it delivers 0.833, for 0.5 0.663, and never less than 0.487;
-within 0.05 of what is asked from 0.75 up.
+Derived for c_r near 1 (1 - alpha v): for 0.8 it delivers 0.833, for 0.5 0.663, and at least 0.487.
+From 0.75 up, the deviation is below 0.05.
 Source: Hunt & Crossley (1975), J. Applied Mechanics 42, 440-445; form with c_r: Machado
 et al. (2012), Mech. Mach. Theory 53, 99-121.
 """

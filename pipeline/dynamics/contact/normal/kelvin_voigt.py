@@ -1,11 +1,11 @@
-r"""A linear spring and a linear damper side by side.
+r"""A linear spring and a linear damper in parallel.
 
 .. math:: F_N = \max(0,\; K\,\delta + C\,\dot\delta), \quad C = 2\zeta\sqrt{K m}
 
-Linear: the exponent is 1. C is given as `damping`, or follows from the restitution that a free
-impact of the effective mass m is to have; the closed form is exact, so that this law delivers what
-it is asked for. The force does not pull: the contact ends where K d + C d' = 0, before the
-surfaces part (no adhesion). It jumps where the contact begins, which no real surface does; valid
+The exponent is 1. C is given as `damping`, or follows from the restitution that a free
+impact of the effective mass m must have; the closed form is exact, so that this law delivers
+the requested restitution. The force does not pull: the contact ends where K d + C d' = 0, before the
+surfaces separate (no adhesion). It jumps where the contact begins, unlike that of real surfaces; valid
 for soft layers and as the usual linear comparison.
 Source: Goldsmith (1960), Impact, ch. 1; restitution without adhesion: Schwager & Poeschel (2007),
 Granular Matter 9, 465-469.
@@ -19,12 +19,12 @@ from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution
 from flexclear.pipeline.dynamics.contact.law import Numbers, Resolved
 
-#: where the scene gives none
+#: default exponent
 exponent = 1.0
 
 
 def resolve(law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
-    """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+    """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
     if law.exponent not in (None, 1.0):
         raise ValueError(f"the law 'kelvin-voigt' is linear; its exponent is 1, not {law.exponent:g}")
     mass = mass if law.effective_mass is None else law.effective_mass

@@ -1,4 +1,4 @@
-"""Surfaces of clearance joints. To add one: a module here that is called like the joint's type, its parameters in
+"""Surfaces of clearance joints. To add one: a module here named like the joint's type, its parameters in
 core/scene/clearance, and a case in tests/properties/test_dynamics_clearance.
 
 Each module has the kernel ``separation`` (see `clearance_spherical`), ``stiffness(joint, exponent)`` and

@@ -1,4 +1,4 @@
-"""Ball above a plane, which is that of x and y of the outer frame; z points out of the ground towards the ball.
+"""Ball above a plane, the xy plane of the outer frame; z points out of the ground towards the ball.
 
 Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
 """
@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.vectors import ZERO, axis, dot, scale
 
 @kernel
 def separation(axes, numbers, p, v):
-    """As `clearance_spherical.separation`; the normal points into the plane."""
+    """Return the same as `clearance_spherical.separation`; the normal points into the plane."""
     z = axis(axes, 2)
     height = dot(z, p)
     return height - numbers.radius, -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
@@ -25,5 +25,5 @@ stiffness = published({1.5: plane_stiffness})
 
 
 def contact_size(joint: BallOnPlane, depth: float, force: float) -> float:
-    """Radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
+    """Return the radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
     return math.sqrt(joint.radius * depth)

@@ -1,6 +1,6 @@
 """Pin in a journal with clearance: a circle in a circle, in the plane normal to the journal's axis.
 
-The axial motion and the tilt are held as a planar joint holds them (`joints.HELD`), by a force along the
+Axial motion and tilt are constrained as by a planar joint (`joints.HELD`), with a force along the
 axis and moments across it at the pin's frame. The contact (`contact.forces`) acts in the middle of
 the bearing, where the two frames are; over-long bearings, which tilting pins touch at both rims, are
 not modelled.
@@ -29,7 +29,7 @@ from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
 
 @kernel
 def separation(axes, numbers, p, v):
-    """As `clearance_spherical.separation`, of the parts of p and v normal to the journal's axis."""
+    """Return the same as `clearance_spherical.separation`, for the components of p and v across the journal's axis."""
     z = axis(axes, 2)
     distance, rate, normal, turning = radial(sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z)))
     return numbers.clearance - distance, rate, normal, turning, p
@@ -39,5 +39,5 @@ stiffness = published({1.0: cylinder_stiffness, 1.5: sphere_stiffness})
 
 
 def contact_size(joint: ClearanceRevolute, depth: float, force: float) -> float:
-    """Half-width of the contact [m] under a force [N]."""
+    """Return the half-width of the contact [m] under a force [N]."""
     return half_width(joint, relative_radius(joint), depth, force)

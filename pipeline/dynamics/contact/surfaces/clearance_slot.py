@@ -1,9 +1,9 @@
 """Pin in a straight slot with clearance: two walls along x of the slot's frame, and a half circle at each end.
 
-The pin's centre is led by the straight part of the slot's centre line; between its ends the gap is measured across it,
-beyond them from the end. Axial motion and tilt are held as a planar joint holds them (`joints.HELD`).
+The straight part of the slot's centre line guides the pin's centre. Between its ends the gap is measured across it,
+beyond them from the end. Axial motion and tilt are constrained as by a planar joint (`joints.HELD`).
 
-The walls are planes; the round ends are given their stiffness. Exponent 1.5: K of a sphere on a plane, as is usual for
+The walls are planes; the round ends have the same stiffness. Exponent 1.5: K of a sphere on a plane, as is usual for
 revolute joints (see `clearance_revolute`). Exponent 1: a cylinder on a plane.
 Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
 """
@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
 
 @kernel
 def separation(axes, numbers, p, v):
-    """As `clearance_spherical.separation`; shape: half the length of the straight part [m]."""
+    """Return the same as `clearance_spherical.separation`; shape[0]: half the length of the straight part [m]."""
     x, z, half = axis(axes, 0), axis(axes, 2), numbers.shape[0]
     across, across_rate = sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z))
     along = dot(x, p)
@@ -36,5 +36,5 @@ stiffness = published({1.0: cylinder_stiffness, 1.5: plane_stiffness})
 
 
 def contact_size(joint: ClearanceSlot, depth: float, force: float) -> float:
-    """Half-width of the contact [m] under a force [N]."""
+    """Return the half-width of the contact [m] under a force [N]."""
     return half_width(joint, joint.radius, depth, force)

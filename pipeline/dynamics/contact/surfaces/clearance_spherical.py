@@ -1,6 +1,6 @@
-"""Ball in a socket with clearance: the surfaces part along the line of centres, in space.
+"""Ball in a socket with clearance: the surfaces separate along the line of centres, in space.
 
-Nothing but the contact (`contact.forces`) joins the bodies.
+Only the contact (`contact.forces`) connects the bodies.
 Source: Wang & Wang (2019), eq. (26).
 """
 
@@ -16,9 +16,9 @@ from flexclear.pipeline.dynamics.vectors import radial
 
 @kernel
 def separation(axes, numbers, p, v):
-    """Gap [m], rate of penetration, normal towards the socket, its rate, and the offset that closes the gap.
+    """Return gap [m], rate of penetration, normal towards the socket, its rate, and the offset that closes the gap.
 
-    p, v: offset of the ball's centre from the socket's, its rate as seen from the socket, world axes.
+    p, v: offset of the ball's centre from the socket's, and its rate as seen from the socket, world axes.
     axes: of the socket, world axes.  numbers: of the contact (CONTACT_NUMBERS).
     Source: Wang & Wang (2019), eqs. (19), (20), (21), (22).
     """
@@ -30,5 +30,5 @@ stiffness = published({1.5: sphere_stiffness})
 
 
 def contact_size(joint: ClearanceSpherical, depth: float, force: float) -> float:
-    """Radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
+    """Return the radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
     return math.sqrt(relative_radius(joint) * depth)

@@ -1,1 +1,1 @@
-"""Bushings: rotation vectors beyond half a turn, and how far they give."""
+"""Bushings: rotation vectors beyond half a turn, and recorded displacements."""

@@ -1,4 +1,4 @@
-r"""Elastic mount between two frames F and G: stiffness and damping on six displacements.
+r"""Elastic mount between two frames F and G: stiffness and damping for six displacements.
 
 .. math:: s = (x, \theta), \quad x = R_{WF}^T(p_G - p_F), \quad R_{FG} = \exp\tilde\theta, \quad
           U = \tfrac12 s^TKs, \quad P_{lost} = \dot s^TC\dot s
@@ -6,9 +6,9 @@ r"""Elastic mount between two frames F and G: stiffness and damping on six displ
 The force on G is -(K s + C ds/dt) along x; the torque along theta becomes one about the axes of F by the inverse
 tangent, :math:`T^{-T} = 1 + \tfrac12\tilde\theta + e\,\tilde\theta\tilde\theta`,
 :math:`e = (1 - \tfrac\theta2\cot\tfrac\theta2)/\theta^2`, so that power and energy agree for finite rotations. They act
-at the origin of G. The rotation vector is the shortest one at the start and continuous from there, its last value an
+at the origin of G. The rotation vector is the shortest one at the start and continuous from there; its last value is an
 internal state; at a full turn it has no direction, and the right-hand side is not a number, which ends the run. A
-bushing without stiffness and damping against rotation has no such state and may turn for ever.
+bushing without stiffness and damping against rotation has no such state and may turn without limit.
 
 Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 13.3 (rotation vector and tangent).
 """
@@ -37,17 +37,17 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_back,
 )
 
-#: angle^2 below which e is taken from its series; the next term is 1e-13 there
+#: angle^2 below which e comes from its series; the next term is 1e-13 there
 SERIES_BELOW = 1e-3
-#: square of the angle [rad] from which on there is no torque; 6.2 of 2 pi
+#: square of the angle [rad] from which on the torque is undefined; 6.2 of 2 pi
 FULL = 6.2**2
-#: where the damping matrix begins among the numbers, and the blocks of a 6x6 matrix
+#: offset of the damping matrix among the numbers, and offsets of the blocks of a 6x6 matrix
 DAMPING, MIXED, SECOND = 36, 3, 18
 
 
 @kernel
 def rotation_vector(R):
-    """The shortest rotation vector [rad] of a rotation matrix, by its quaternion."""
+    """Return the shortest rotation vector [rad] of a rotation matrix, from its quaternion."""
     q = to_quaternion(R)
     axis = (q[1], q[2], q[3]) if q[0] >= 0.0 else (-q[1], -q[2], -q[3])
     size, cosine = np.sqrt(dot(axis, axis)), abs(q[0])
@@ -56,7 +56,7 @@ def rotation_vector(R):
 
 @kernel
 def continued(v, before):
-    """Of the two rotation vectors below a full turn that are the same rotation as v the one closer to `before`."""
+    """Return that rotation vector below a full turn with the same rotation as v which is closer to `before`."""
     size = np.sqrt(dot(v, v))
     if size == 0.0:
         return v
@@ -65,13 +65,13 @@ def continued(v, before):
     if dot(left, left) <= dot(right, right):
         return v
     beyond = dot(other, other) - FULL
-    # no number where neither is below a full turn: the run is then refused
+    # not a number where neither is below a full turn: this ends the run
     return other if beyond < 0.0 else scale(np.sqrt(-1.0 - beyond), other)
 
 
 @kernel
 def tangent_part(v):
-    """Factor e of the inverse tangent."""
+    """Return the factor e of the inverse tangent."""
     s = dot(v, v)
     if s < SERIES_BELOW:
         return (1.0 + s / 60.0 * (1.0 + s / 42.0 * (1.0 + s / 40.0))) / 12.0
@@ -81,7 +81,7 @@ def tangent_part(v):
 
 @kernel
 def times(d, k, first, v):
-    """A 3x3 block of a matrix of load k, its first entry at `first`, times v."""
+    """Return v times a 3x3 block of a matrix of load k, whose first entry is at `first`."""
     return (
         number(d, k, first) * v[0] + number(d, k, first + 1) * v[1] + number(d, k, first + 2) * v[2],
         number(d, k, first + 6) * v[0] + number(d, k, first + 7) * v[1] + number(d, k, first + 8) * v[2],
@@ -91,7 +91,7 @@ def times(d, k, first, v):
 
 @kernel
 def product6(d, k, first, x, v):
-    """Both halves of a 6x6 matrix of load k times (x, v)."""
+    """Return both halves of a 6x6 matrix of load k times (x, v)."""
     upper = add(times(d, k, first, x), times(d, k, first + MIXED, v))
     lower = add(times(d, k, first + SECOND, x), times(d, k, first + SECOND + MIXED, v))
     return upper, lower
@@ -99,7 +99,7 @@ def product6(d, k, first, x, v):
 
 @kernel
 def apply(d, k):
-    """Apply load k."""
+    """Apply the force of load k."""
     load = d.loads[k]
     a, b = d.site_frames[load.a], d.site_frames[load.b]
     F, G, p = a.axes, b.axes, b.origin
@@ -126,7 +126,7 @@ def apply(d, k):
 
 
 def row(load: Bushing, path: str) -> Row:
-    """Stiffness, then damping, row by row [SI]; three states where it resists rotation."""
+    """Return the load's row: stiffness, then damping, row by row [SI]; three states where it resists rotation."""
     numbers = [entry for matrix in (load.stiffness, load.damping) for row in matrix for entry in row]
     resists = any(entry for matrix in (load.stiffness, load.damping) for row in matrix[3:] for entry in row)
     return Row(frames=load.between, numbers=tuple(numbers), states=3 if resists else 0)

@@ -1,4 +1,4 @@
-"""The declaration of bushings, whose force is a load."""
+"""Declaration of bushings, whose force is a load."""
 
 from __future__ import annotations
 

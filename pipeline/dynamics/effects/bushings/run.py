@@ -1,4 +1,4 @@
-"""Rotation vectors of bushings, followed continuously beyond half a turn, which end a run at a full one."""
+"""Rotation vectors of bushings, continuous beyond half a turn; a full turn ends the run."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ LARGEST_ANGLE = 6.2
 
 
 def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
-    """Rotation vector [rad], shape (3,), of every bushing that resists rotation, by its first internal state.
+    """Return the rotation vector [rad] (3,) of every bushing that resists rotation, by its first internal state.
 
-    sites: frames of all sites, rows of SITE_FRAMES with named fields.  internal: states that the vectors continue.
+    sites: frames of all sites, rows of SITE_FRAMES with named fields.  internal: previous states, which they continue.
     """
     vectors = {}
     for row in model.rows_of(Bushing).values():
@@ -30,7 +30,7 @@ def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int
 
 
 def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Of the two rotation vectors [rad] below a full turn of a matrix R the one closer to another, shape (3,)."""
+    """Return the rotation vector [rad] below a full turn of a matrix R which is closer to another one, shape (3,)."""
     q = matrix_to_quaternion(R)
     q, half = (q if q[0] >= 0.0 else -q), float(np.linalg.norm(q[1:]))
     shortest = q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)
@@ -41,7 +41,7 @@ def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
 
 
 def explanation(engine: Engine) -> str | None:
-    """What to say where a bushing has come to a full turn in the engine's state, else None."""
+    """Return an explanation when a bushing is near a full turn in the engine's state, else None."""
     model, y = engine.model, engine.view(m.Y)
     first = model.ny - model.arrays.size(m.N_INTERNAL)
     for name, row in model.rows_of(Bushing).items():
@@ -57,7 +57,7 @@ def explanation(engine: Engine) -> str | None:
 
 
 def give(model: Model, seen: Observed) -> Series:
-    """Displacement [m] and rotation vector [rad] of each second frame in the first one's axes, and their coordinate."""
+    """Return displacement [m] and rotation vector [rad] of each second frame in the first one's axes; coordinates."""
     rows = model.rows_of(Bushing)
     displacement, rotation = (np.zeros((len(seen.state), len(rows), 3)) for _ in range(2))
     for k, row in enumerate(rows.values()):
@@ -66,7 +66,7 @@ def give(model: Model, seen: Observed) -> Series:
         displacement[:, k] = np.einsum("tij,tj->ti", to_first, b["origin"] - a["origin"])
         first = int(row["internal0"])
         at = model.ny - model.arrays.size(m.N_INTERNAL) + first
-        # without resistance to rotation nothing follows it
+        # without resistance to rotation no state follows the rotation
         before = seen.state[:, at : at + 3] if first >= 0 else np.zeros((len(seen.state), 3))
         rotation[:, k] = [nearest(R, v) for R, v in zip(to_first @ b["axes"], before, strict=True)]
     dims = ("time", "bushing", "axis")

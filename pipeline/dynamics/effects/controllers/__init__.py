@@ -1,1 +1,1 @@
-"""Controllers along joint coordinates: samples, divergence, and what they do."""
+"""Controllers of joint coordinates: samples, divergence checks, and recorded forces."""

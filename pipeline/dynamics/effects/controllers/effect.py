@@ -1,4 +1,4 @@
-"""The declaration of controllers, whose forces are loads."""
+"""Declaration of controllers, whose forces are loads."""
 
 from __future__ import annotations
 

@@ -20,10 +20,10 @@ from flexclear.pipeline.dynamics.loads.fields import act, law, law_rate, measure
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import scale
 
-#: represents a limit that is not there
+#: represents a missing limit
 UNLIMITED = 1e300
-#: what gains multiply: (whether the force is a torque, whether the measured coordinate is an angle) -> dimensions of
-#: proportional, integral and derivative gain
+#: dimensions of proportional, integral and derivative gain, by (True when the force is a torque, True when the measured
+#: coordinate is an angle)
 GAINS = {
     (False, False): ("stiffness", "stiffness per time", "damping"),
     (True, True): ("torsional stiffness", "torsional stiffness per time", "torsional damping"),
@@ -34,7 +34,7 @@ GAINS = {
 
 @kernel
 def apply(d, k):
-    """Apply load k."""
+    """Apply the force of load k."""
     value, rate, _, _ = counted(d, d.loads[k].measured)
     _, speed, moment, force = measure(d, k)
     state = d.loads[k].internal0
@@ -46,7 +46,7 @@ def apply(d, k):
 
 
 def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[float, ...]:
-    """Three gains, least and largest force, 1/tracking time [SI]; ValueError, in words, for what cannot be."""
+    """Return three gains, least and largest force, 1/tracking time [SI]; raise ValueError, in words, for bad values."""
     names = ("proportional", "integral", "derivative")
     dimensions = GAINS[coordinate.turning, measured.turning]
     gains = [quantity(getattr(load, name), dimension) for name, dimension in zip(names, dimensions, strict=True)]
@@ -66,6 +66,6 @@ def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[fl
 
 
 def row(load: Pid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
-    """Six numbers (`numbers`), the reference, and the integral part as state."""
+    """Return the load's row: six numbers (`numbers`), the reference, and the integral part as state."""
     reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
     return Row(joint=load.joint, laws=(reference,), numbers=numbers(load, coordinate, measured), states=1)

@@ -1,4 +1,4 @@
-"""Forces and integral parts of controllers, for the run dataset."""
+"""Recorded forces and integral parts of controllers, for the run dataset."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_
 
 
 def controllers(model: Model, seen: Observed) -> Series:
-    """Force along the coordinate that a controller pushes, and its integral part [N or N m]."""
+    """Return each controller's force along its coordinate, and its integral part [N or N m]."""
     rows, first = model.rows_of(Pid, SampledPid), model.ny - model.arrays.size(m.N_INTERNAL)
     places = [
         first + int(row["internal0"]) + (INTEGRAL if isinstance(model.scene.load[name], SampledPid) else 0)

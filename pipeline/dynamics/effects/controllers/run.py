@@ -1,4 +1,4 @@
-"""Controllers that sample: their internal states after breaks of the run that are samples; and that none diverges."""
+"""Sampling controllers: their internal states after samples of the run; and a check of all against divergence."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.ledger import REMEDY
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
-#: a break is a sample when it is off by no more than this fraction of the period
+#: a break is a sample when it deviates by no more than this fraction of the period
 AT_A_SAMPLE = 1e-6
-#: a coordinate is out of control at so many times the largest of its reference, its start, a turn or the mechanism
+#: a coordinate diverges at this multiple of the largest of its reference, its start, a turn or the mechanism
 LOST = 100.0
 
 
 def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
-    """The function sample(y, t): state after the samples that are due at time t, from that before; shape (NY,)."""
+    """Build sample(y, t): the state after the samples that are due at time t, from the state before; shape (NY,)."""
     model, gauges, numbers = engine.model, *(engine.model.arrays.table(one) for one in (m.GAUGES, m.LOAD_NUMBERS))
     periods = {name: load.period for name, load in model.scene.load.items() if isinstance(load, SampledPid)}
     sampled = model.rows_of(SampledPid)
@@ -49,12 +49,12 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 
 
 def _is_due(period: float, elapsed: float) -> bool:
-    """Whether a controller samples so long [s] after the start."""
+    """Return True when a controller samples at this time [s] after the start."""
     return abs(elapsed - period * round(elapsed / period)) <= AT_A_SAMPLE * period
 
 
 def require_controlled(model: Model, trajectory: Trajectory, seen: Observed) -> None:
-    """SolverError for a controlled coordinate beyond all that its reference and the mechanism have of size."""
+    """Raise SolverError for a controlled coordinate far beyond the size of its reference and the mechanism."""
     wiring, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
     for k, (name, _) in enumerate(model.loads):
         load = model.scene.load.get(name)

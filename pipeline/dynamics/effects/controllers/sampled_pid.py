@@ -1,4 +1,4 @@
-r"""PID controller that samples: at t_k it looks at the error, and holds its force until t_(k+1) = t_k + T.
+r"""Sampling PID controller: it reads the error at t_k and holds its force until t_(k+1) = t_k + T.
 
 .. math:: u_k = K_p e_k + z_k + K_d (e_k - e_{k-1})/T, \quad F_k = \min(\max(u_k, F_-), F_+), \quad
           z_{k+1} = z_k + T\,[K_i e_k + (F_k - u_k)/T_t]
@@ -27,7 +27,7 @@ FORCE, INTEGRAL, ERROR = range(3)
 
 @kernel
 def apply(d, k):
-    """Apply load k."""
+    """Apply the force of load k."""
     value, rate, _, _ = counted(d, d.loads[k].measured)
     _, speed, moment, force = measure(d, k)
     size = d.internal[d.loads[k].internal0]
@@ -35,14 +35,14 @@ def apply(d, k):
 
 
 def row(load: SampledPid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
-    """Six numbers (`pid.numbers`) and the period [s], the reference, three states."""
+    """Return the load's row: six numbers (`pid.numbers`) and the period [s], the reference, three states."""
     reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
     gains = (*numbers(load, coordinate, measured), load.period)
     return Row(joint=load.joint, laws=(reference,), numbers=gains, states=3)
 
 
 def sample(gains: np.ndarray, held: np.ndarray, error: float, *, first: bool) -> np.ndarray:
-    """Internal states after a sample, from those before it and the error there; shape (3,)."""
+    """Return the internal states after a sample, from those before the sample and the error; shape (3,)."""
     proportional, integral, derivative, low, high, tracking, period = gains
     change = 0.0 if first else (error - held[ERROR]) / period
     asked = proportional * error + held[INTEGRAL] + derivative * change

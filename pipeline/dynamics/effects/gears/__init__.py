@@ -1,1 +1,1 @@
-"""Gears and racks: joint coordinates that follow each other."""
+"""Gears and racks: constraints between two joint coordinates."""

@@ -1,4 +1,4 @@
-"""The declaration of gears."""
+"""Declaration of gears."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from flexclear.pipeline.dynamics.effects.effect import Effect
 GEARS = Effect(
     "gears",
     lambda scene: () if scene.gear else None,
-    wiring={"couplings": "first second"},  # gauges of two joint coordinates, of which the second follows the first
+    wiring={"couplings": "first second"},  # gauges of two joint coordinates; the second follows the first
     numbers={"coupling_numbers": "ratio offset"},  # second coordinate = ratio * first + offset
     compose={
         "closures": {"closures": "<equations.make_coupled_closing>({file.tree})"},

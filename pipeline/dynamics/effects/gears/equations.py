@@ -1,9 +1,9 @@
-r"""Closures among which are couplings: a joint coordinate that follows another one, as gears and racks make it.
+r"""Closure constraints including couplings: one joint coordinate follows another, as with gears and racks.
 
 .. math:: q_2 = r\,q_1 + c
 
 A coupling is one row whose wrench on the second joint is that of a unit force along q_2, and on the first one that of
--r along q_1. Its multiplier is the force along q_2. All else is as in `closures`.
+-r along q_1. Its multiplier is the force along q_2. All other terms are as in `closures`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.vectors import add_wrench, dot_wrench, scale
 
 @kernel
 def row(d, c):
-    """Wrenches, residual, its rate, and acceleration bias of coupling c."""
+    """Store wrenches, residual, its rate, and acceleration bias of coupling c."""
     closure = d.closures[c]
     coupling, numbers, k = d.couplings[closure.coupling], d.coupling_numbers[closure.coupling], closure.row0
     ratio, (on_second, on_first) = numbers.ratio, (d.rows[wrench_row(d, c, 0)], d.rows[wrench_row(d, c, 1)])
@@ -34,7 +34,7 @@ def row(d, c):
 
 @kernel
 def jacobian(d, c):
-    """J^T of coupling c on its support, if it is solved for."""
+    """Store J^T of coupling c on its support, if the coupling is solved for."""
     closure = d.closures[c]
     start = closure.jacobian0
     if closure.n_kept == 0:
@@ -49,7 +49,7 @@ def jacobian(d, c):
 
 @kernel
 def locate(d):
-    """Rows and Jacobians of all closures."""
+    """Store rows and Jacobians of all closures."""
     for c in range(d.n_closures):
         if d.closures[c].coupling < 0:
             closures.rows(d, c)
@@ -61,7 +61,7 @@ def locate(d):
 
 @kernel
 def take_off_first_joints(d):
-    """Take what couplings do to their first joints off the links that they act on."""
+    """Subtract the wrenches of couplings on their first joints from the links that they act on."""
     for c in range(d.n_closures):
         closure = d.closures[c]
         if closure.coupling >= 0 and closure.n_kept > 0:
@@ -73,5 +73,5 @@ def take_off_first_joints(d):
 
 
 def make_coupled_closing(tree: Any) -> closures.Closing:
-    """Return the kernels of all closures, couplings among them; see `closures.make_closing`."""
+    """Build the kernels of all closures including couplings; see `closures.make_closing`."""
     return closures.make_closing(tree, locate)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two coordinates of a coupling: of which joint, and the sites of its first and second frame."""
+    """One of the two coordinates of a coupling: its joint, and the sites of the joint's first and second frame."""
 
     joint: str
     coordinate: Coordinate
@@ -29,7 +29,7 @@ class Side:
     b: Site
 
     def value(self, poses: Sequence[Placement]) -> float:
-        """The coordinate [rad in (-pi, pi], or m] at poses of the links."""
+        """Return the coordinate [rad in (-pi, pi], or m] at poses of the links."""
         F, G = (poses[site.link].of(site.place) for site in (self.a, self.b))
         if self.coordinate.turning:
             R = F.R.T @ G.R
@@ -37,7 +37,7 @@ class Side:
         return float(self.along(poses) @ (G.p - F.p))
 
     def along(self, poses: Sequence[Placement]) -> np.ndarray:
-        """Its axis, shape (3,)."""
+        """Return the axis of the coordinate, shape (3,)."""
         site = self.b if self.coordinate.side else self.a
         axis: np.ndarray = poses[site.link].of(site.place).R[:, self.coordinate.axis]
         return axis
@@ -45,7 +45,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A gear of the scene: second = ratio * first + offset, the offset being that of the start."""
+    """A gear of the scene: second = ratio * first + offset; the offset is that of the start pose."""
 
     gear: str
     ratio: float
@@ -54,31 +54,31 @@ class Coupling:
 
     @property
     def name(self) -> str:
-        """What it is called among joints that close loops."""
+        """Name of the coupling among the joints that close loops."""
         return f"gear {self.gear}"
 
     @property
     def ends(self) -> list[tuple[Site, Site]]:
-        """Pairs of sites between which it acts: of its second joint, of its first one."""
+        """Pairs of sites on which the coupling acts: those of its second joint, then of its first one."""
         return [(side.a, side.b) for side, _ in self.parts]
 
     @property
     def rows(self) -> list[tuple[int, int, int]]:
-        """Its row of the table CLOSURE_ROWS, of which only the kind counts."""
+        """Row of the coupling in table CLOSURE_ROWS; only its kind counts."""
         return [(int(self.second.coordinate.turning), 0, 0)]
 
     @property
     def parts(self) -> tuple[tuple[Side, float], tuple[Side, float]]:
-        """Both sides and how much of them is in the row that the coupling is: second - ratio * first."""
+        """Both sides with their factors in the constraint: second - ratio * first."""
         return (self.second, 1.0), (self.first, -self.ratio)
 
     def offset(self, poses: Sequence[Placement]) -> float:
-        """Of the row, at poses of the links."""
+        """Return the offset of the constraint at poses of the links."""
         return sum(factor * side.value(poses) for side, factor in self.parts)
 
 
 def couplings(mechanism: Mechanism) -> list[Coupling]:
-    """All gears of a scene; InputError for what cannot be."""
+    """Return the couplings of all gears of a scene; raise InputError for impossible ones."""
     return [_coupling(mechanism, name) for name in mechanism.scene.gear]
 
 
@@ -104,7 +104,7 @@ def _side(mechanism: Mechanism, text: str, path: str) -> Side:
 
 
 def fill(filling: Filling) -> dict[str, Any]:
-    """The tables of the couplings, whose offsets are those of the start."""
+    """Tabulate the couplings; their offsets are those of the start pose."""
     numbering, mechanism = filling.numbering, filling.numbering.mechanism
     coupled, poses = couplings(mechanism), [link.start for link in mechanism.links]
 

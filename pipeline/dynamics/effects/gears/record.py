@@ -1,4 +1,4 @@
-"""What gears do: force along their second coordinates, and wrenches on the frames of both joints."""
+"""Recorded forces of gears along their second coordinates, and their wrenches on the frames of both joints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 
 
 def gear_series(model: Model, seen: Observed) -> Series:
-    """Force [N] or torque [N m] of every gear along its second coordinate, on the joint's second body."""
+    """Return the force [N] or torque [N m] of every gear along its second coordinate, on the joint's second body."""
     series = {coupling.gear: _force(model, seen, c, coupling) for c, coupling in _couplings(model)}
     turns = {coupling.gear: coupling.second.coordinate.turning for _, coupling in _couplings(model)}
     names = list(model.scene.gear)
@@ -22,7 +22,7 @@ def gear_series(model: Model, seen: Observed) -> Series:
 
 
 def on_geared_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Every gear on the frames of both joints: frame, moment about the kernels' origin, force; (time, 3) each."""
+    """Return all gears' wrenches on frames: frame, moment about the kernels' origin, force; (time, 3) each."""
     acting = []
     for c, coupling in _couplings(model):
         size = _force(model, seen, c, coupling)
@@ -38,7 +38,7 @@ def _couplings(model: Model) -> list[tuple[int, Coupling]]:
 
 
 def _sites(model: Model, seen: Observed, side: Side) -> tuple[np.ndarray, np.ndarray]:
-    """Frames of both sites of a coordinate, shape (time,)."""
+    """Return the frames of both sites of a coordinate, shape (time,)."""
     return seen.sites[:, model.numbering.site(side.a)], seen.sites[:, model.numbering.site(side.b)]
 
 

@@ -1,1 +1,1 @@
-"""Friction of ideal joints that follows their reactions; that of given strength is a load (`loads.joint_friction`)."""
+"""Friction of ideal joints from their reactions; friction of given strength is a load (`loads.joint_friction`)."""

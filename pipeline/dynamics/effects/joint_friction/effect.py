@@ -1,4 +1,4 @@
-"""The declaration of friction of ideal joints."""
+"""Declaration of friction of ideal joints."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ JOINT_FRICTION = Effect(
     "contact.friction",
     _named,
     wiring={
-        # site_a, site_b: of its frames; link: whose inboard joint it is, or -1; reversed: whether that link is on the
-        # side of the first frame; closure: that it is, or -1
+        # site_a, site_b: of its frames; link: the link whose inboard joint it is, or -1; reversed: 1 when that link is
+        # on the side of the first frame; closure: its closure, or -1
         "rubbing": "site_a site_b link reversed closure entry0 n_entries momentum0 n_momenta column0 n_columns loop0 "
         "n_loops bearing0 n_bearings",
-        # where such a joint rubs. kind: see `equations`; side, axis: of its frame; bristle: as of CONTACTS
+        # bearings of these joints. kind: see `equations`; side, axis: of the frame; bristle: see CONTACTS
         "bearings": "joint kind law side axis bristle",
-        "rubbing_entries": "coordinate column sign",  # what moves it; prescribed coordinates after the free ones
-        "reaction_terms": "coordinate column",  # free coordinates whose acceleration the joint of a link feels
+        "rubbing_entries": "coordinate column sign",  # coordinates that move it; prescribed ones after the free ones
+        "reaction_terms": "coordinate column",  # free coordinates whose acceleration enters the joint's reaction
         "reaction_loops": "closure sign part",  # closures that act beyond it
     },
     # radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per
-    # force along the axis and per moment about it; preload: normal force that is always there
+    # force along the axis and per moment about it; preload: constant normal force
     numbers={"bearing_numbers": "radius lever axial torsion preload law:6"},
     work={
         # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
-        # what it takes per normal force [m/s]
+        # lost power per normal force [m/s]
         "bearing": ("n_bearings", "load slip loss unit_moment:3 unit_force:3"),
-        # the search for the loads: part of the friction that is there, turns, last change, whether in strides
+        # search for the loads: fraction of the friction, iterations, last change, flag for gradual increase
         "search": ("1", "share turns change strides"),
-        # what bends its friction where it reverses: sliding velocity, force along the axis, moment about it and forces
-        # at both ends as they press
+        # quantities with kinks of the friction where they reverse: sliding velocity, normal forces of the force along
+        # the axis and of the moment about it, forces at both ends
         "bends": ("n_bearings", "sliding:3 along about one_end:2 other_end:2"),
-        # of the joints: without friction, then per normal force of each bearing; about the second frame's origin
+        # joint reactions: without friction, then per normal force of each bearing; about the second frame's origin
         "reactions": ("n_rubbing+n_rubbing*n_bearings", "moment:3 force:3"),
     },
-    # of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
+    # slopes and residuals of the equations of the bearings' loads; multipliers of the closures without friction
     stretches=(
         "bearing_slopes:n_bearings*n_bearings",
         "bearing_residuals:n_bearings",

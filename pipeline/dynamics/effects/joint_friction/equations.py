@@ -1,6 +1,6 @@
-r"""Friction of ideal joints that follows their reactions.
+r"""Friction of ideal joints from their reactions.
 
-What a bearing carries makes friction, and friction changes what it carries. At a given state every reaction is affine
+The load of a bearing causes friction, and friction changes the load. At a given state every reaction is affine
 in the normal forces N of all bearings, since sliding velocities, and hence friction per normal force, are known:
 
 .. math:: R_j = R_{j0} + \sum_k N_k R_{jk}, \qquad N_e = g_e(R_{j(e)})
@@ -8,17 +8,17 @@ in the normal forces N of all bearings, since sliding velocities, and hence fric
 R_j0 comes from the solution without friction, R_jk from one more solution per bearing with the same factors. The loads
 g_e are sums of magnitudes of forces, so Newton's method on these few equations ends after some steps, exactly. Where
 the determinant of their slopes is positive, the solution is the one that grows out of that without friction; where it
-has become zero on the way there is none, or more than one: friction jams the mechanism (Painleve's paradox), and the
-evaluation says so.
+has become zero on the way, none or several exist: friction jams the mechanism (Painleve's paradox), and the
+evaluation returns this status.
 
 A bearing is a pin, a slider, both (kinds 0, 1, 2), or a ball (3). With the axis n, the force F and the moment M about
-the second frame's origin that the joint carries, and its length L,
+the second frame's origin that the joint transmits, and its length L,
 
 .. math:: N = |F_\perp/2 - n\times M/L| + |F_\perp/2 + n\times M/L| + a|n\cdot F| + b|n\cdot M| + N_0
 
 for the first three, and N = |F| + N_0 for a ball: two ends of a pin or slider, a collar (a: its radius over that of the
-pin), pads that hold moments about the axis (b: one over their arm), and what presses always. Friction of a ball acts
-against its turning, whatever the direction of the load. What the joint carries counts as pressed, friction included,
+pin), pads that hold moments about the axis (b: one over their arm), and a preload. Friction of a ball acts
+against its rotation, for any direction of the load. The whole wrench of the joint, with its friction, counts as load,
 as is usual (a friction circle of radius mu r instead of r sin(atan mu)).
 
 Source: Haug, Wu & Yang (1986), Mechanism and Machine Theory 21, 401-425 (friction in joints, and that it depends on the
@@ -53,19 +53,19 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_back,
 )
 
-#: Newton's iterations for the loads; the change of a load, as a fraction of the largest, at which they end, and below
-#: which they end when it shrinks no more, near a jam, where rounding grows; in how many strides friction is turned on
-#: where they do not
+#: largest number of Newton iterations for the loads; their change, as a fraction of the largest load, at which they
+#: end; the change below which they end when it stops shrinking, near a jam, where rounding grows; the number of strides
+#: in which friction is increased where they do not converge
 ITERATIONS, CONVERGED, ROUNDED, STRIDES = 30, 1e-13, 1e-9, 32
-#: what a turn of the search for the loads has come to
+#: outcome of one iteration for the loads
 GOES_ON, FOUND, FAILED = 0, 1, 2
-#: below this fraction of their diagonal pivots of the slopes count as zero
+#: pivots of the slopes count as zero below this fraction of their diagonal
 SINGULAR_SLOPES = 1e-12
 
 
 @kernel
 def bearing_frame(d, e):
-    """Frame that carries the axis of bearing e."""
+    """Return the frame that carries the axis of bearing e."""
     bearing = d.bearings[e]
     joint = d.rubbing[bearing.joint]
     return d.site_frames[joint.site_a if bearing.side == 0 else joint.site_b]
@@ -73,12 +73,12 @@ def bearing_frame(d, e):
 
 @kernel
 def bearing_axis(d, e):
-    """Unit vector along bearing e, world axes."""
+    """Return the unit vector along bearing e, world axes."""
     return axis(bearing_frame(d, e).axes, d.bearings[e].axis)
 
 
 def make_unit_wrench(traction: Callable) -> Callable:
-    """The kernel unit_wrench(d, e) that writes BEARING: friction of bearing e per normal force."""
+    """Build the kernel unit_wrench(d, e) that writes BEARING: friction of bearing e per normal force."""
 
     @kernel
     def unit_wrench(d, e):
@@ -113,7 +113,7 @@ def make_unit_wrench(traction: Callable) -> Callable:
 
 @kernel
 def keep_closed(d):
-    """Let loops stay closed: complete FORCE, which holds L^-1 f, by multipliers."""
+    """Keep loops closed: complete FORCE, which holds L^-1 f, by multipliers."""
     for k in range(d.n_kept_rows):
         d.multiplier[k] = 0.0
     respond(d)
@@ -121,7 +121,7 @@ def keep_closed(d):
 
 @kernel
 def unit_power(bearing, column):
-    """Friction of a bearing (BEARING) per normal force, along a column."""
+    """Return the friction of a bearing (BEARING) per normal force, along a column."""
     return dot(bearing.unit_moment, column.angular) + dot(bearing.unit_force, column.linear)
 
 
@@ -137,10 +137,10 @@ def load_coordinates(d, e, size):
 
 
 def make_reaction(demand: Callable) -> Callable:
-    """The kernel reaction(d, j, acceleration, bearing) that writes the reaction of joint j to REACTIONS.
+    """Build the kernel reaction(d, j, acceleration, bearing) that writes the reaction of joint j to REACTIONS.
 
-    At the accelerations in w from index `acceleration` and the present multipliers.  bearing: -1 for all but friction,
-    else the friction alone of that bearing, of unit normal force.  demand: of what factors the mass matrix.
+    It takes the accelerations in w from index `acceleration` and the present multipliers.  bearing: -1 for the reaction
+    without friction, else the friction of that bearing alone, at unit normal force.  demand: of the mass matrix module.
     """
 
     @kernel
@@ -171,14 +171,14 @@ def make_reaction(demand: Callable) -> Callable:
 
 @kernel
 def _sized(v):
-    """Magnitude of v, and the unit vector along it, zero where v is."""
+    """Return the magnitude of v and the unit vector along v, zero where v is zero."""
     size = np.sqrt(dot(v, v))
     return size, scale(1.0 / size if size > 0.0 else 0.0, v)
 
 
 @kernel
 def note_bends(d, e, along, about, one_end, other_end):
-    """Write what bearing e carries to BENDS; forces at its ends by their components across the axis."""
+    """Store the load components of bearing e in BENDS; the forces at its ends by their components across the axis."""
     bends, axes, k = d.bends[e], bearing_frame(d, e).axes, d.bearings[e].axis
     one, other = axis(axes, (k + 1) % 3), axis(axes, (k + 2) % 3)
     bends.along, bends.about = along, about
@@ -188,7 +188,7 @@ def note_bends(d, e, along, about, one_end, other_end):
 
 @kernel
 def load(d, e, M, F):
-    """Normal force of bearing e for what its joint carries, and its gradients by M and F."""
+    """Return the normal force of bearing e for the wrench of its joint, and its gradients by M and F."""
     numbers = d.bearing_numbers[e]
     if d.bearings[e].kind == BALL:
         size, along_F = _sized(F)
@@ -202,14 +202,14 @@ def load(d, e, M, F):
     size = near + far + axial * abs(along) + torsion * abs(about) + numbers.preload
     by_M = scale(lever, cross(sub(at_far, at_near), n))
     by_M = add(by_M, scale(torsion if about >= 0.0 else -torsion, n))
-    # both ends' forces lie across the axis
+    # the forces at both ends are across the axis
     by_F = add(scale(0.5, add(at_near, at_far)), scale(axial if along >= 0.0 else -axial, n))
     return size, by_M, by_F
 
 
 @kernel
 def balance(d, share):
-    """Residuals of the bearings' loads, and their slopes, with part of the friction's influence on the reactions."""
+    """Store residuals and slopes of the bearings' loads, for a fraction of the friction's effect on the reactions."""
     bearings = d.n_bearings
     for e in range(bearings):
         first = d.bearings[e].joint * (1 + bearings)
@@ -228,7 +228,7 @@ def balance(d, share):
 
 @kernel
 def pivot_up(A, b, k, i, size):
-    """Exchange rows k and i of A x = b where the pivot of row i is larger; the sign of what that does to det A."""
+    """Exchange rows k and i of A x = b if the pivot of row i is larger; return the factor, 1 or -1, of det A."""
     if not abs(A[size * i + k]) > abs(A[size * k + k]):
         return 1.0
     for j in range(k, size):
@@ -239,7 +239,7 @@ def pivot_up(A, b, k, i, size):
 
 @kernel
 def sign_of(pivot):
-    """Sign of a pivot, 0 where it counts as zero."""
+    """Return the sign of a pivot, 0 where the pivot counts as zero."""
     if not abs(pivot) > SINGULAR_SLOPES:
         return 0.0
     return 1.0 if pivot > 0.0 else -1.0
@@ -247,7 +247,7 @@ def sign_of(pivot):
 
 @kernel
 def eliminate(A, b, size):
-    """Solve A x = b in place (Gauss, partial pivoting); the sign of det A, 0 (and no solution) where it is singular."""
+    """Solve A x = b in place (Gauss, partial pivoting); return the sign of det A, 0 (no solution) for a singular A."""
     sign = 1.0
     for k in range(size):
         for i in range(k + 1, size):
@@ -268,7 +268,7 @@ def eliminate(A, b, size):
 
 @kernel
 def verdict(sign, change, largest, before, turns):
-    """What a turn of Newton's method has come to: `GOES_ON`, `FOUND`, or `FAILED`."""
+    """Return the outcome of a Newton iteration: `GOES_ON`, `FOUND`, or `FAILED`."""
     if sign == 0.0 or not largest < np.inf:
         return FAILED
     if change <= CONVERGED * largest or (change <= ROUNDED * largest and change > 0.5 * before):
@@ -278,7 +278,7 @@ def verdict(sign, change, largest, before, turns):
 
 @kernel
 def correct(d):
-    """A turn of Newton's method for the loads from those that are there, and what it has come to."""
+    """Do one Newton iteration for the loads from their present values, and return its outcome."""
     size, search = d.n_bearings, d.search[0]
     balance(d, search.share)
     sign = eliminate(d.bearing_slopes, d.bearing_residuals, size)
@@ -295,15 +295,15 @@ def correct(d):
 
 @kernel
 def begin(d, share):
-    """Begin to search for the loads with part of the friction."""
+    """Start the search for the loads with a fraction of the friction."""
     search = d.search[0]
     search.share, search.turns, search.change = share, 0.0, np.inf
 
 
 @kernel
 def pursue(d):
-    """A turn of the search for the loads; whether there is another: where friction is not all there at once, it is
-    turned on in strides."""
+    """Do one iteration of the search for the loads; return True while another one is needed. Where the search fails
+    with full friction, it increases friction in strides."""
     made, search = correct(d), d.search[0]
     if made == GOES_ON:
         return True
@@ -321,7 +321,7 @@ def pursue(d):
 
 @kernel
 def without_feedback(d):
-    """Loads of the bearings from the reactions without friction."""
+    """Store the loads of the bearings from the reactions without friction."""
     for e in range(d.n_bearings):
         bearing, smooth = d.bearing[e], d.reactions[d.bearings[e].joint * (1 + d.n_bearings)]
         bearing.load, _, _ = load(d, e, smooth.moment, smooth.force)
@@ -329,7 +329,7 @@ def without_feedback(d):
 
 @kernel
 def find_loads(d):
-    """Loads of all bearings; `JAMMED` where friction jams the joints."""
+    """Find the loads of all bearings; set `JAMMED` where friction jams the joints."""
     without_feedback(d)
     d.search[0].strides = 0.0
     begin(d, 1.0)
@@ -337,11 +337,11 @@ def find_loads(d):
 
 
 def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Callable:
-    """The kernel joint_friction(d): accelerations, multipliers and ledger, completed by friction in joints.
+    """Build joint_friction(d): it completes accelerations, multipliers and ledger by friction in joints.
 
-    To be called when accelerations and multipliers are there, before the drives' forces are.  laws: modules of the laws
-    present (`contact.friction`).  closed: whether there are closures.  tree: what factors the mass matrix, the
-    module `equations.articulated` or `equations.composite`.
+    It runs after accelerations and multipliers and before the drives' forces.  laws: modules of the laws present
+    (`contact.friction`).  closed: True with closures.  tree: the module that factors the mass matrix,
+    `equations.articulated` or `equations.composite`.
     """
     unit_wrench = make_unit_wrench(choose(tuple(law.traction for law in laws)))
     forward, backward = tree.forward, tree.backward
@@ -349,14 +349,14 @@ def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Calla
 
     @kernel
     def solve(d):
-        """Accelerations in FORCE from the generalised forces there, and their multipliers."""
+        """Store accelerations in FORCE from the generalised forces there, with their multipliers."""
         forward(d, d.at_force)
         close(d)
         backward(d, d.at_force)
 
     @kernel
     def influences(d):
-        """Reactions of all joints: of the present accelerations, then of the friction of each bearing alone."""
+        """Store reactions of all joints: of the present accelerations, then of the friction of each bearing alone."""
         transmit(d, d.at_du, 1.0)
         for j in range(d.n_rubbing):
             reaction(d, j, d.at_du, -1)
@@ -398,7 +398,7 @@ def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Calla
 
 @kernel
 def load_drives(d):
-    """Take friction out of the forces that the drives must supply: they work against it."""
+    """Subtract friction from the forces that the drives must supply: they work against it."""
     for j in range(d.n_rubbing):
         joint = d.rubbing[j]
         for k in range(joint.entry0, joint.entry0 + joint.n_entries):
@@ -413,7 +413,7 @@ def load_drives(d):
 
 @kernel
 def take_off_closures(d):
-    """Add friction of joints that close loops to the wrenches of these; take it off their links."""
+    """Add friction of joints that close loops to their wrenches; subtract it from their links."""
     for e in range(d.n_bearings):
         joint, bearing = d.rubbing[d.bearings[e].joint], d.bearing[e]
         if joint.closure < 0:

@@ -1,4 +1,4 @@
-"""The tables of ideal joints with friction: their bearings, what moves them, and what their reactions consist of."""
+"""Tables of ideal joints with friction: bearings, coordinates that move them, and terms of their reactions."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 Rows = list[tuple[int, ...]]
 BENDS = m.NAMED["bends"]
-#: what presses a bearing, by its field of BENDS, and how many components it has
+#: load components of a bearing, by its field of BENDS, with the number of their components
 PRESSES = {"along": 1, "about": 1, "one_end": 2, "other_end": 2}
 
 
 def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Group]:
-    """First the loss of each joint [J], then the bristles [m] of each bearing."""
+    """Return the ledger groups: first the loss of each joint [J], then the bristles [m] of each bearing."""
     losses, bristles = list[Group](), list[Group]()
     for name, joint in mechanism.scene.rubbing().items():
         part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), bristle(name, joint)
@@ -34,7 +34,7 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Grou
 
 
 def guards(mechanism: Mechanism) -> Iterator[Guard]:
-    """Of each bearing: speeds, sliding that reverses under a law with bristles, and what presses that reverses."""
+    """Yield the guards of each bearing: speeds, reversals of sliding for laws with bristles, reversals of loads."""
     bearing = 0
     for name, joint in mechanism.scene.rubbing().items():
         law = friction_law(name, joint)
@@ -50,9 +50,9 @@ def guards(mechanism: Mechanism) -> Iterator[Guard]:
 
 
 def fill(filling: Filling) -> dict[str, Any]:
-    """The tables of joints with friction and their bearings.
+    """Tabulate the joints with friction and their bearings.
 
-    Articulated inertias find what a joint transmits without terms of reactions.
+    Articulated inertias give the wrench of a joint without terms of reactions.
     """
     numbering, closures, articulated = filling.numbering, filling.closures, filling.parts.articulated
     mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
@@ -85,13 +85,13 @@ def fill(filling: Filling) -> dict[str, Any]:
 
 
 def _added(table: Rows, rows: Sequence[tuple[int, ...]]) -> tuple[int, int]:
-    """Add rows to a table; where they begin there, and how many they are."""
+    """Append rows to a table; return the index of the first one and their number."""
     table += rows
     return len(table) - len(rows), len(rows)
 
 
 def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
-    """Row of the table BEARING_NUMBERS."""
+    """Return a row of the table BEARING_NUMBERS."""
     friction = joint.friction
     assert friction is not None
     radius = friction.radius or 0.0
@@ -102,7 +102,7 @@ def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
 
 
 def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
-    """The link whose inboard joint this is (of a chain its last one), and whether it is on the first frame's side."""
+    """Return the link whose inboard joint this is (last of a chain), and True if it is on the first frame's side."""
     bearings = [
         (i, link.branch.reverse)
         for i, link in enumerate(mechanism.links)
@@ -114,7 +114,7 @@ def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
 def _reaction(
     numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool
 ) -> tuple[Rows, Rows, Rows]:
-    """What the reaction of a link's joint consists of: terms of momenta and of columns, and closures beyond it.
+    """Return the terms of the reaction of a link's joint: momenta, columns, and closures beyond the joint.
 
     ends: (closure, part, first site, second site) of all closures; a coupling has two parts.
     """

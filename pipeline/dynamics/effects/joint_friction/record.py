@@ -1,4 +1,4 @@
-"""What ideal joints with friction do: loads of their bearings, sliding, and the wrench of friction."""
+"""Recorded bearing loads, sliding and friction wrenches of ideal joints with friction."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.run.run import Run
 
 
 def friction_series(model: Model, seen: Observed) -> Series:
-    """Load [N], largest sliding speed [m/s] and power [W] of the bearings of each joint, and the wrench of friction.
+    """Return load [N], largest sliding speed [m/s] and power [W] of each joint's bearings, and its friction wrench.
 
     The wrench is part of the joint's own; on its second body, about the second frame's origin.
     """
@@ -36,12 +36,12 @@ def _mine(row: np.ndarray) -> slice:
 
 
 def _summed(joints: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Sums over the bearings of each joint, (time, bearing, ...) to (time, joint, ...)."""
+    """Return sums over the bearings of each joint, (time, bearing, ...) to (time, joint, ...)."""
     return np.stack([values[:, _mine(row)].sum(axis=1) for row in joints], axis=1)
 
 
 def warnings(run: Run) -> list[str]:
-    """Sentences about friction that follows reactions which rigid bodies leave undetermined."""
+    """Return warnings about friction that depends on reactions which rigid bodies leave undetermined."""
     doubted = [name for name in run.scene.rubbing() if name in run.engine.mobility.redundant_joints]
     if not doubted:
         return []

@@ -1,4 +1,4 @@
-"""What friction of ideal joints loses, and in words why it may have no solution."""
+"""Losses of friction in ideal joints, and the explanation for states without a solution."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.ledger import Losses
 
-#: why a run stops, whether or not a trial jammed at last
+#: reasons of a stop that do not depend on a jam in the last trial
 OTHERWISE = (m.CAP_REACHED, m.NOT_A_NUMBER, m.STUCK_EVENT, m.STEPPED_OVER)
 
 
 def losses(model: Model) -> Losses:
-    """What each joint loses."""
+    """Return the loss variables of the joints (`run.ledger.Losses`)."""
     joints = model.scene.rubbing().items()
     sites = [(model.mechanism.site(joint.between[0]), model.mechanism.site(joint.between[1])) for _, joint in joints]
     return "joint_friction_loss", "rubbing", sites, [f"the friction of joint {name}" for name, _ in joints]
 
 
 def explanation(engine: Engine) -> str | None:
-    """Why the last evaluation has no loads of the bearings that friction could grow to; None where it has."""
+    """Return an explanation when the last evaluation jammed (no loads grow from those without friction), else None."""
     if engine.n[m.EVALUATION] != m.JAMMED or engine.n[m.STATUS] in OTHERWISE:
         return None
     names, gains = list(engine.model.scene.rubbing()), _gains(engine)
@@ -34,7 +34,7 @@ def explanation(engine: Engine) -> str | None:
 
 
 def _gains(engine: Engine) -> np.ndarray:
-    """How much friction of each joint adds to the normal forces of its own bearings, per normal force there."""
+    """Return the normal force that friction of each joint adds to its own bearings, per normal force there."""
     arrays, size = engine.model.arrays, engine.model.arrays.size(m.SIZES["n_bearings"])
     reactions = engine.table(m.NAMED["reactions"]).reshape(-1, 1 + size)
     levers = arrays.table(m.NAMED["bearing_numbers"])["lever"]

@@ -1,1 +1,1 @@
-"""Bending shortens beams, which stiffens them when they turn or are pulled."""
+"""Shortening of beams by bending, which stiffens them when they rotate or are pulled."""

@@ -1,10 +1,10 @@
-r"""Bending shortens a beam: the quadratic motion along x that stiffens it when it turns or is pulled.
+r"""Shortening of a beam by bending: the quadratic motion along x that stiffens a rotating or pulled beam.
 
 To second order a section of an inextensible axis moves along x of the body frame by
 
 .. math:: \tfrac12 q^T B(x)\, q, \qquad B(x) = -\int_{x_0}^{x} (v'^T v' + w'^T w')\, ds
 
-with the body frame held at x0. In the kinetic energy it is kept where it multiplies rigid motion alone, the only place
+with the body frame held at x0. The kinetic energy includes it where it multiplies rigid motion alone, the only place
 where it is of the order of the terms that linear shapes keep. The forces that follow are the geometric stiffness: an
 axial acceleration a gives :math:`a\int\rho B`, a turn :math:`-(\omega_y^2+\omega_z^2)\int\rho x B`, and a force N
 along x at a frame :math:`-N B`. They come from a Lagrangian, so power and energy agree to rounding.
@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def _form(numbers, o, n, vector, first):
-    """A row of a form, the n values of a table from row o on, times n entries of a stretch from `first` on."""
+    """Return a row of a form, the n values of a table from row o on, times n entries of an array from `first` on."""
     total = 0.0
     for i in range(n):
         total += numbers[o + i].value * vector[first + i]
@@ -29,7 +29,7 @@ def _form(numbers, o, n, vector, first):
 
 @kernel
 def first_moment(d, k, j, vector, first):
-    """Row j of int rho B of body k, times a stretch from `first` on."""
+    """Return row j of int rho B of body k, times an array from `first` on."""
     body = d.flexes[k]
     n = body.n_modes
     return _form(d.flex_data, body.data0 + (14 + n + j) * n, n, vector, first)
@@ -37,7 +37,7 @@ def first_moment(d, k, j, vector, first):
 
 @kernel
 def second_moment(d, k, j, vector, first):
-    """Row j of int rho x B of body k, times a stretch from `first` on."""
+    """Return row j of int rho x B of body k, times an array from `first` on."""
     body = d.flexes[k]
     n = body.n_modes
     return _form(d.flex_data, body.data0 + (14 + 2 * n + j) * n, n, vector, first)
@@ -45,7 +45,7 @@ def second_moment(d, k, j, vector, first):
 
 @kernel
 def at_port(d, p, j, vector, first):
-    """Row j of B at port p, times a stretch from `first` on."""
+    """Return row j of B at port p, times an array from `first` on."""
     port = d.ports[p]
     n = d.flexes[port.flex].n_modes
     return _form(d.port_data, port.shapes + (6 + j) * n, n, vector, first)

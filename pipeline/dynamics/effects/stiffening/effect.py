@@ -1,4 +1,4 @@
-"""The declaration of the stiffening of flexible bodies."""
+"""Declaration of the stiffening of flexible bodies."""
 
 from __future__ import annotations
 

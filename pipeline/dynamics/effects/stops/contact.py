@@ -1,4 +1,4 @@
-"""Stops: contacts at the ends of joint coordinates, along which their force, or torque, acts.
+"""Stops: contacts at the ends of joint coordinates; their force, or torque, acts along the coordinate.
 
 gap = sense (limit - coordinate), with full turns of angles counted; depth d = -gap; d' = sense times the rate. The
 normal force of the law pushes the joint's second body back along the coordinate, and the first one by the opposite.
@@ -17,12 +17,12 @@ from flexclear.pipeline.dynamics.vectors import ZERO, scale
 
 
 def make_stops(forms: tuple[Any, ...]) -> Callable:
-    """The kernel stops(d) that applies all stops; forms: of normal forces, with `force` and `stored`."""
+    """Build the kernel stops(d) that applies all stops; forms: normal forces, with `force` and `stored`."""
     normal_force = make_normal_force(forms)
 
     @kernel
     def stop(d, c):
-        """Gap and rate of contact c, which is an end of a coordinate, and its force, or torque, when it is closed."""
+        """Store gap and rate of contact c, an end of a coordinate, and apply its force, or torque, when closed."""
         contact, numbers, touch = d.contacts[c], d.contact_numbers[c], d.touch[c]
         value, rate, moment, force = counted(d, contact.surfaces)
         limit, sense = numbers.shape[0], numbers.shape[1]

@@ -1,4 +1,4 @@
-"""The declaration of stops."""
+"""Declaration of stops."""
 
 from __future__ import annotations
 

@@ -12,16 +12,16 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, measured
 
-#: type of a contact that is an end of a stop
+#: type of a contact at an end of a stop
 STOP = "stop"
 
 
 @dataclass(frozen=True)
 class End:
-    """One end of a stop, as contacts are asked.
+    """One end of a stop, with the attributes of a contact.
 
-    limit: coordinate where it begins [m or rad].  sense: 1 of an upper end, -1 of a lower one.
-    clearance: way to the other end, or what counts as far [m or rad].  floor, initial_approach_speed [m/s or rad/s].
+    limit: coordinate where it begins [m or rad].  sense: 1 for an upper end, -1 for a lower one.
+    clearance: distance to the other end, or a default [m or rad].  floor, initial_approach_speed [m/s or rad/s].
     """
 
     stop: str
@@ -39,12 +39,12 @@ class End:
 
 
 def ends_an_angle(joint: object) -> bool:
-    """Whether what a contact belongs to is an end of an angle, so that its gap is one and its force a torque."""
+    """Return True for a contact at the end of an angle: its gap is an angle and its force a torque."""
     return isinstance(joint, End) and joint.coordinate.turning
 
 
 def ends(scene: Scene, lengths: Mapping[str, float]) -> list[tuple[str, End]]:
-    """The ends of all stops by name, ``stop.lower`` and ``stop.upper``; InputError for what cannot be.
+    """Return the ends of all stops by name, ``stop.lower`` and ``stop.upper``; raise InputError for impossible ones.
 
     lengths: size of the mechanism that each stopped joint belongs to [m].
     """

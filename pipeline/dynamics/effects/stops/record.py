@@ -1,4 +1,4 @@
-"""What stops do to the two frames of their joints."""
+"""Recorded wrenches of stops on the two frames of their joints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 
 
 def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Every end of a stop on both frames: frame, moment about the kernels' origin, force; (time, 3) each."""
+    """Return all ends' wrenches on both frames: frame, moment about the kernels' origin, force; (time, 3) each."""
     acting, numbering = [], model.numbering
     for c, (_, end, outer, inner) in enumerate(model.contacts):
         if not isinstance(end, End):

@@ -1,1 +1,1 @@
-"""Wear of contacts: how far their surfaces slide on each other, and with what force."""
+"""Wear of contacts: the sliding distance of their surfaces, and the normal force over it."""

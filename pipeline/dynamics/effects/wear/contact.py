@@ -1,6 +1,6 @@
-"""What wears a contact: how far its surfaces slide on each other, and with what force.
+"""Wear of a contact: the sliding distance of its surfaces, and the normal force over it.
 
-The sliding velocity is that of the material points at the contact, spin included, so that rolling wears nothing; it
+The sliding velocity is that of the material points at the contact, spin included, so that rolling causes no wear; it
 needs no friction law.  Source: Archard (1953), Journal of Applied Physics 24, 981-988 (depth over force and way);
 Flores (2009), Mechanism and Machine Theory 44, 1211-1222 (in joints with clearance).
 """
@@ -16,16 +16,16 @@ from flexclear.pipeline.dynamics.contact.forces import point_velocity, tangentia
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot, scale, sub
 
-#: of each contact in the ledger: sliding distance [m], and time integral of normal force times sliding speed [N m]
+#: ledger variables of each contact: sliding distance [m], and time integral of normal force times sliding speed [N m]
 LEDGER = m.layout("sliding load_path")
 
 
 def wearing(contacts: Callable) -> Callable:
-    """The kernel of the contacts that also books sliding distance and load path of those that wear."""
+    """Build the kernel of the contacts that also accumulates sliding distance and load path of those with wear."""
 
     @kernel
     def wear(d, k):
-        """Rates of contact k among those that wear, which is closed: sliding speed, and normal force times it."""
+        """Store the rates of closed contact k of those with wear: sliding speed, and normal force times that speed."""
         c = d.worn[k].contact
         contact, touch = d.contacts[c], d.touch[c]
         outer, inner, point = d.site_frames[contact.outer], d.site_frames[contact.inner], touch.point

@@ -1,6 +1,6 @@
-"""The declaration of wear.
+"""Declaration of wear.
 
-Sliding distance and load path are part of the state, so that steps and impacts are as exact in them as in the motion.
+Sliding distance and load path are part of the state: steps and impacts are as exact for them as for the motion.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from flexclear.pipeline.dynamics.effects.effect import Effect
 WEAR = Effect(
     "wear",
     lambda scene: () if scene.worn() else None,
-    wiring={"worn": "contact"},  # contacts whose wear is counted
+    wiring={"worn": "contact"},  # contacts with wear
     compose={"forces": {"contacts": "<contact.wearing>({file.given[contacts]})"}},
     changeable=("joint.wear",),
     fill="model:fill",

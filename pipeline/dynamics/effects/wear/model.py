@@ -1,4 +1,4 @@
-"""The contacts that wear, and their variables in the ledger."""
+"""Contacts with wear, and their variables in the ledger."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def _worn(mechanism: Mechanism) -> list[int]:
 
 
 def fill(filling: Filling) -> dict[str, Any]:
-    """The table of the contacts that wear."""
+    """Tabulate the contacts with wear."""
     return {"worn": _worn(filling.numbering.mechanism)}
 
 
 def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Group]:
-    """Sliding distance and load path of each contact that wears."""
+    """Return the ledger groups, sliding distance and load path of each contact with wear."""
     parts = [part_of(mechanism, mechanism.contacts[k]) for k in _worn(mechanism)]
     return [(floor[part], 1, part) for part in parts for floor in (lengths, energies)]

@@ -1,4 +1,4 @@
-"""What wears contacts, for the run dataset: sliding, load path, and where on both surfaces the contact is."""
+"""Recorded wear of contacts: sliding distance, load path, and direction of the contact on both surfaces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 
 
 def wear_series(model: Model, seen: Observed) -> Series:
-    """Sliding distance [m] and load path [N m] since the start, and the direction of the contact in both surfaces.
+    """Return sliding distance [m] and load path [N m] since the start, and the contact's direction in both surfaces.
 
     A direction is a unit vector from the centre of a surface to the contact, in the axes of the surface's frame; zero
     while the centres coincide.

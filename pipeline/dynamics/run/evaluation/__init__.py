@@ -1,1 +1,1 @@
-"""From a model to an evaluation: the engine, the choice of closure rows, a consistent start, what is observed."""
+"""From a model to an evaluation: the engine, the selection of closure rows, a consistent start, observed outputs."""

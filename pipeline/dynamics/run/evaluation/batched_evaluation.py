@@ -1,9 +1,9 @@
-"""Engines that take their steps together in one thread, so that the rates of their attempts are evaluated at once.
+"""Engines that step together in one thread, so that one call evaluates the rates of all their attempts.
 
-Each engine's own thread asks for steps as ever (`run.trajectory`), and has them when its stepper has come back: paused,
-at the end of a segment, or with an error. Meanwhile one of these threads lets up to `lanes` steppers proceed
-(`compile.lanes`); the others wait, and one of them takes over when its own steps are done. What a stepper does depends
-on nothing but its own engine, so neither the number of groups nor who else is in one changes a bit of it.
+Each engine's own thread requests steps as usual (`run.trajectory`), and waits until its stepper returns: paused, at the
+end of a segment, or with an error. One of these threads leads: it advances up to `lanes` steppers (`compile.lanes`)
+while the others wait; when its own steps are done, another thread leads. A stepper depends on its own engine alone, so
+neither the number of groups nor their members change a bit of its result.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.compile import functions
 
 @dataclass(eq=False)
 class _Steps:
-    """Steps that are asked for. words: of their lane.  turn: set when they are done, or their thread is to lead."""
+    """Requested steps. words: of their lane.  turn: event that is set when they are done, or their thread must lead."""
 
     words: Sequence[int]
     turn: Event = field(default_factory=Event)
@@ -30,10 +30,10 @@ class _Steps:
 
 
 class LaneGroup:
-    """Lanes for the steppers of one wiring.
+    """Lanes for the steppers of one topology.
 
-    rows: closure rows that its code solves for.  address: of what lets steppers proceed.
-    numbers: how many a mechanism of this wiring has in f at most.
+    rows: closure rows that the code solves for.  address: of the function that advances steppers.
+    numbers: largest length of f for a mechanism of this topology.
     """
 
     def __init__(self, rows: bytes, address: int, numbers: int, width: int) -> None:
@@ -48,7 +48,7 @@ class LaneGroup:
         self._lock, self._led = Lock(), False
 
     def advance(self, function: int, arguments: Sequence[int]) -> None:
-        """Let a stepper proceed until it comes back."""
+        """Advance a stepper until it returns."""
         mine = _Steps((m.LANE_READY, function, *arguments))
         with self._lock:
             self._waiting.append(mine)
@@ -66,7 +66,7 @@ class LaneGroup:
             self._pass_on(mine)
 
     def _proceed(self) -> None:
-        """Give free lanes to who waits, let all proceed until one comes back, and give its lane back."""
+        """Assign free lanes to waiting steppers, advance all until one returns, and free its lane."""
         with self._lock:
             self._table[m.LANES_CALLED_BACK] = 0
             self._places[6 * len(self._words) :] = 0  # where arrays lie others may have lain before
@@ -84,7 +84,7 @@ class LaneGroup:
         steps.turn.set()
 
     def _pass_on(self, mine: _Steps) -> None:
-        """Let another thread lead, if there is one; also where this one has failed."""
+        """Let another waiting thread lead, also when this one has failed."""
         with self._lock:
             for lane in [lane for lane, steps in self._busy.items() if steps is mine]:
                 self._free(lane)
@@ -96,14 +96,14 @@ class LaneGroup:
 
 
 class Place:
-    """Where up to `width` engines may step together, of them those that evaluate alike."""
+    """Groups of up to `width` engines that step together when they evaluate with the same code."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         self._groups, self._making = dict[int, LaneGroup](), Lock()
 
     def group(self, rows: bytes, address: int, numbers: int) -> LaneGroup:
-        """That which evaluates with this code."""
+        """Return the group that evaluates with this code."""
         with self._making:
             if address not in self._groups:
                 self._groups[address] = LaneGroup(rows, address, numbers, self.width)
@@ -111,7 +111,7 @@ class Place:
 
 
 class Places:
-    """So many places of one width, for as many engines at a time as they have lanes: `seats`."""
+    """Several places of one width; `seats` engines can use them at a time."""
 
     def __init__(self, width: int, number: int) -> None:
         self.seats = width * number
@@ -119,7 +119,7 @@ class Places:
 
     @contextmanager
     def place(self) -> Iterator[Place]:
-        """One for an engine."""
+        """Return the next place for an engine."""
         mine = self._free.popleft()
         try:
             yield mine

@@ -1,4 +1,4 @@
-"""Closures close to singular poses: choice of the rows to solve for, condition numbers, refusals in words."""
+"""Closure rows near singular poses: selection of the rows to solve for, condition numbers, reasons of refusals."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import mass_factor
 
-#: length that makes rows and coordinates of the closures comparable in condition numbers [m]
+#: length that scales rows and coordinates of the closures in condition numbers [m]
 SCALE = 0.1
-#: a selection is checked again when its pivot ratio has fallen to this fraction of what it was, and replaced when
-#: another is this much better; or this much, where a singular pose seems ahead that may only be one of the selection
+#: a selection is checked again when its pivot ratio has fallen to this fraction of its first value, and replaced when
+#: another one is better by this factor; by the third factor when the pose ahead may be singular for this selection only
 WORN, BETTER, CLEARLY = 1e-2, 10.0, 4.0
 
 
 def evaluate(engine: Engine, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
-    """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
+    """Return f(t, y) with the contacts' present modes. Raise SolverError when the equations are singular."""
     if engine.attempt(y, t, repeat):
         return engine.slope.copy()
     why = engine.explained() or f"the equations are singular in this pose: {diagnosis(engine)}"
@@ -32,9 +32,10 @@ def evaluate(engine: Engine, y: np.ndarray, t: float, repeat: int = 1) -> np.nda
 
 
 def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
-    """Solve from now on for the closure rows that are best conditioned in the state y; their pivot ratio.
+    """Select the best conditioned closure rows in the state y, as many as the mechanism's rank; return their pivot
+    ratio.
 
-    As many as the rank of the mechanism.  Where no row is redundant there is nothing to choose.
+    Without redundant rows there is no choice.
     """
     everything = np.ones(len(engine.selected), dtype=bool)
     if not engine.mobility.redundant:
@@ -52,9 +53,9 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
 
 
 def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
-    """Select rows anew where the present ones have become nearly dependent; whether others are so much better.
+    """Select other rows when the present ones have become nearly dependent; return True when that was worthwhile.
 
-    The state in Y and its slope stay as they are: the motion does not depend on the selection.
+    The state in Y and its slope do not change: the motion does not depend on the selection.
     """
     row_scale = engine.view(m.ROW_SCALE)[: len(engine.selected)].copy()
     y, slope = engine.view(m.Y).copy(), engine.slope.copy()
@@ -75,23 +76,23 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
 
 
 def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Closure Jacobians (..., selected rows, nv), lengths in units of `SCALE`: their condition numbers are reported."""
+    """Return closure Jacobians (..., selected rows, nv), lengths in units of `SCALE`, for reported conditions."""
     return J * np.outer(1.0 / row_units(model, h, SCALE), coordinate_scales(model.numbering))
 
 
 def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """The same with lengths in units of the mechanism's size, and modes with the root of their body's mass besides."""
+    """Return closure Jacobians scaled by the mechanism's size, modes also by the root of their body's mass."""
     return J * np.outer(1.0 / row_units(model, h, model.length), model.speed_scales)
 
 
 def row_units(model: Model, h: np.ndarray, length: float) -> np.ndarray:
-    """Unit of each selected row: a length along an axis [m], 1 of two axes [-]."""
-    kinds = model.arrays.table(m.CLOSURE_ROWS, h)["kind"][selection.kept_places(model, h)]
+    """Return the unit of each selected row: a length along an axis [m], 1 between two axes [-]."""
+    kinds = model.arrays.table(m.CLOSURE_ROWS, h)["kind"][selection.selected_indices(model, h)]
     return np.where(kinds == 0, length, 1.0)
 
 
 def coordinate_scales(numbering: Numbering) -> np.ndarray:
-    """One radian, `SCALE`, or `SCALE` times the root of a kilogram, per free coordinate."""
+    """Return one radian, `SCALE`, or `SCALE` times the root of a kilogram, per free coordinate."""
     scales = np.full(numbering.nv, SCALE)
     for i, link in enumerate(numbering.mechanism.links):
         if i and not link.drives:
@@ -101,7 +102,7 @@ def coordinate_scales(numbering: Numbering) -> np.ndarray:
 
 
 def diagnosis(engine: Engine) -> str:
-    """Condition number at the last evaluated state, and the joint whose closure is nearest to dependent."""
+    """Return the condition number at the state evaluated last, and the joint whose closure is nearest to dependent."""
     if not engine.model.closures:
         return "no loop is closed"
     J = scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
@@ -117,10 +118,10 @@ def diagnosis(engine: Engine) -> str:
 
 
 def worst_joint(engine: Engine, left: np.ndarray) -> str:
-    """Joint with the largest fraction of a left singular vector."""
+    """Return the joint with the largest part of a left singular vector."""
     return selection.joints_of_rows(engine.model, engine.h)[int(np.argmax(np.abs(left)))]
 
 
 def condition(values: np.ndarray) -> float:
-    """Ratio of the largest to the smallest singular value, at most `INFINITE`."""
+    """Return the ratio of the largest to the smallest singular value, at most `INFINITE`."""
     return float(min(values[0] / max(values[-1], values[0] / INFINITE), INFINITE))

@@ -1,4 +1,4 @@
-"""A model with its compiled functions and a work space: evaluate a state, select closure rows and pieces of laws."""
+"""The engine: a model with compiled functions and a work array; evaluation, closure rows, pieces of laws."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile.functions import function, place
 from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, WHOLE
 from flexclear.pipeline.dynamics.effects import INTEGRATORS, scheme_of
 from flexclear.pipeline.dynamics.integrate.method import Method
@@ -26,19 +27,21 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
 from flexclear.pipeline.dynamics.run.evaluation.straight_code import Straight, address, equations, made
 
-#: selections of closure rows for which the steps have code of their own, of one integration
+#: selections of closure rows with specialised steps, per integration
 SELECTIONS = 4
-#: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
+#: without steps: no output times, no rows, no events
+NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
+#: two breaks closer than this fraction of the run are the same instant, computed in two ways
 SHORTEST_SEGMENT = 1e-12
 
 
 @dataclass(frozen=True)
 class Engine:
-    """One per run: the work space is not shared.
+    """An engine; each run has its own, since the work array is not shared.
 
-    h: wiring with the rows solved for.  w, n: floats and integers of the work space.  lengths: of the stretches of w.
+    h: topology with the selected rows.  w, n: floats and integers of the work array.  lengths: of the sections of w.
     selected: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
-    straight: code for this wiring alone.
+    straight: specialised code for this topology.
     """
 
     model: Model
@@ -57,12 +60,12 @@ class Engine:
 
     @property
     def has_straight_code(self) -> bool:
-        """Whether it evaluates with code for its wiring alone."""
+        """True when evaluations use code specialised for the topology."""
         return "evaluate" not in self.entry.addresses
 
     @cached_property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives, loads and samples, end [s]; times that differ by rounding only are one."""
+        """Return start, breaks of drives, loads and samples, end [s]; times that differ only by rounding are merged."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
         for first, count in self.model.arrays.table(m.LAWS):
             inner |= {float(t) for t in starts[first + 1 : first + count]}
@@ -86,12 +89,12 @@ class Engine:
         return indices
 
     def segments(self, times: np.ndarray | float, *, after: bool) -> np.ndarray:
-        """Number of the segment between breaks that holds each time; on a break, that before it or that `after` it."""
+        """Return the segment that contains each time; on a break, the one before it, or the one `after` it."""
         index = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
         return np.asarray(np.minimum(np.maximum(index, 0), len(self.breaks) - 2))
 
     def output_times(self, interval: float, origin: float | None = None) -> np.ndarray:
-        """Regular output times and all breaks [s], increasing; times nearer than rounding are one.
+        """Return regular output times and all breaks [s], increasing; times that differ only by rounding are merged.
 
         origin: from which the regular ones are counted [s]; the first break by default.
         """
@@ -103,12 +106,12 @@ class Engine:
         return np.union1d(regular[distinct], breaks)
 
     def select_pieces_after(self, t: float) -> None:
-        """Put the pieces in force that hold right after `t`; an earlier run leaves those of its end."""
+        """Select the pieces of laws that hold right after `t`, since an earlier run leaves those of its end."""
         first = self.n[m.ACTIVE]
         self.n[first : first + self.model.arrays.size(m.N_LAWS)] = self.pieces[self.segments(t, after=True)]
 
     def keep(self, rows: np.ndarray) -> None:
-        """Solve for these closure rows from now on; the others must follow from them."""
+        """Select these closure rows; the others must follow from them."""
         if not np.array_equal(self.selected, rows):
             self.selected[:] = rows
             selection.write(self.model, self.h, self.selected)
@@ -116,7 +119,7 @@ class Engine:
         self.connect()
 
     def connect(self) -> None:
-        """Let evaluations be those for the rows solved for, steps by code of their own where there is some."""
+        """Connect the functions for the selected rows: specialised code for the steps where it exists."""
         rows, known = self.selected.tobytes(), self.straight
         alone = rows in known.rows
         if self.has_straight_code:
@@ -126,14 +129,14 @@ class Engine:
 
     @property
     def staged(self) -> bool:
-        """Whether its attempts can be made together with those of others."""
+        """True when the engine can step together with others."""
         return bool(self.method.staged and self.has_straight_code)
 
     def settle(self, progress: Progress) -> None:
-        """Let steps from here on evaluate with code of their own for the closure rows solved for, at a place together.
+        """Let further steps use specialised code for the selected rows, at a place together with other engines.
 
-        That is decided by what the integration has met, so one that was interrupted continues as it would, with the
-        code for all rows that it has met before.
+        The selections that the integration has met decide, so an interrupted integration continues with the same code
+        as an uninterrupted one.
         """
         straight, rows, changes = self.straight, self.selected.tobytes(), self.h[m.N_CHANGES]
         if self.has_straight_code or changes:
@@ -147,47 +150,57 @@ class Engine:
         self.connect()
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
-        """Evaluate what is recorded of every row, in this thread."""
+        """Evaluate the outputs of every row, in this thread."""
         if self.has_straight_code:
             self.h[m.DESCRIBE] = address(self.model, self.h, self.straight, self.selected.tobytes(), DESCRIBED)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
-        pieces = pieces.reshape(len(rows), self.model.arrays.size(m.N_LAWS))
-        self.entry.observe(self.h, self.model.arrays.f, self.w, self.n, rows, pieces, tolerance, out)
+        given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
+        function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
-        """Step to the end of the segment or of the budget, in this thread or by the group."""
-        group = self.straight.group
-        by = group.advance if group is not None and self.n[m.TOGETHER] else None
-        self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
+        """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
+        group, record = self.straight.group, _record(outputs, rows, events)
+        if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
+            group.advance(self.entry.addresses["advance"], [*self._arrays(), *record])
+        else:
+            function("advance", self.entry.addresses["advance"])(*self._arrays(), 0, -1, *record)
+
+    def evaluate(self, t: float, repeat: int = 1) -> None:
+        """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
+        function("advance", self.entry.addresses["advance"])(*self._arrays(), t, repeat, *_record(*NO_RECORD))
+
+    def _arrays(self) -> tuple[Any, ...]:
+        """Return the addresses of h, f, w and n for compiled functions."""
+        return place(self.h, np.int64), place(self.model.arrays.f), place(self.w), place(self.n, np.int64)
 
     def view(self, index: int) -> np.ndarray:
-        """A stretch of the work space, not copied."""
+        """Return a section of the work array, not copied."""
         o = self.h[index]
         return self.w[o : o + self.lengths[index]]
 
     def table(self, table: Any) -> np.ndarray:
-        """A table of the work space with named fields, not copied, shape (rows,)."""
+        """Return a table of the work array with named fields, not copied, shape (rows,)."""
         return m.named(table, self.view(table.place))
 
     @property
     def control(self) -> np.ndarray:
-        """The stepper's floats, not copied; m.TIME is the index of the time."""
+        """Control floats of the stepper, not copied; m.TIME is the index of the time."""
         return self.view(m.CONTROL)
 
     @property
     def slope(self) -> np.ndarray:
-        """Where an evaluation leaves the rates of the state, not copied."""
+        """Rates of the state from the last evaluation, not copied."""
         return self.view(m.SLOPES)[: self.model.ny]
 
     @property
     def magnitudes(self) -> np.ndarray:
-        """What counts as far of each variable of the state, shape (NY,)."""
+        """Typical magnitude of each variable of the state, shape (NY,)."""
         arrays = self.model.arrays
         return np.asarray(arrays.table(m.FLOORS)["magnitude"][arrays.table(m.GROUPS)["group"]])
 
     @property
     def modes(self) -> np.ndarray:
-        """1 per closed contact, 0 per open one, not copied."""
+        """Modes of the contacts, 1 closed and 0 open, not copied."""
         return self.n[self.n[m.MODE] :]
 
     @property
@@ -196,34 +209,38 @@ class Engine:
         return self.view(m.LATCHED)
 
     def explained(self) -> str | None:
-        """Why an effect ends the run, in words; None where none does."""
+        """Reason for which an effect ends the run; None when none does."""
         reasons = (explain(self) for explain in self.model.parts.functions("explains"))
         return next((why for why in reasons if why is not None), None)
 
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
-        """Evaluate f(t, y) in the work space; whether it could be."""
+        """Evaluate f(t, y) in the work array; return True on success."""
         self.view(m.Y)[:] = y
-        self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, t, repeat)
+        self.evaluate(t, repeat)
         return bool(self.n[m.EVALUATION] == m.OK)
 
     def complete(self) -> None:
-        """See that the work space holds all of an evaluation, if need be of the state that the last step came to."""
+        """Evaluate the state at the end of the last step again, unless the work array has all intermediate results."""
         if self.n[m.ABRIDGED]:
-            self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, float(self.control[m.TIME]))
+            self.evaluate(float(self.control[m.TIME]))
 
     def independence(self) -> np.ndarray:
-        """How far each selected closure row is from depending on those before it, at the last evaluated state."""
+        """Return the independence of each selected closure row from those before it, at the state evaluated last."""
         envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
         diagonal = envelope["origin"] + np.arange(len(envelope))
         return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
 
     def rows(self, stored: int) -> np.ndarray:
-        """JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
+        """Return JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
         return selection.dense(self.model, self.h, self.view(stored))
 
 
+def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[Any, ...]:
+    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
+
+
 def prepare(model: Model, progress: Progress) -> Engine:
-    """The engine of a model, its kernels compiled or fetched; SolverError for a start that cannot continue."""
+    """Return the engine of a model, its kernels compiled or loaded. Raise SolverError for an impossible start."""
     refuse_missed(model.mechanism)
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
@@ -236,7 +253,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
 
 
 def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:
-    """The engine of a model whose functions are compiled, with a work space of its own."""
+    """Return an engine with a new work array for a model whose functions are compiled."""
     solver, space = model.scene.solver, model.arrays.work_space(method.room)
     entry.connect(space.h)
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
@@ -247,7 +264,7 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
 
 
 def another(engine: Engine) -> Engine:
-    """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
+    """Return a new engine of the same model, in the state before any run."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
     made.straight.exact = engine.straight.exact
     made.straight.addresses = engine.straight.addresses.copy()
@@ -255,7 +272,7 @@ def another(engine: Engine) -> Engine:
 
 
 def may_start_singular(model: Model) -> bool:
-    """Whether a run may start in a singular pose: something moves or says which way, and no contact may interfere."""
+    """Return True when a run may start in a singular pose: the branch is determined, and no contact interferes."""
     bodies = model.scene.body.values()
     given = [v for b in bodies for v in (getattr(b, "velocity", None), getattr(b, "angular_velocity", None))]
     moved = any(v is not None and np.any(np.asarray(v) != 0.0) for v in given) or bool(given_rates(model))
@@ -264,7 +281,7 @@ def may_start_singular(model: Model) -> bool:
 
 
 def _check_branch(model: Model, mobility: Mobility) -> None:
-    """InputError for a choice between branches where there is none, or by a coordinate that is not there."""
+    """Raise InputError when `[start] branch` is given without a choice, or names an unknown coordinate."""
     if model.scene.start is None or not model.scene.start.branch:
         return
     for choice in model.scene.start.branch:

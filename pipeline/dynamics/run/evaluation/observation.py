@@ -1,4 +1,4 @@
-"""States as rows of the record, and what is observed of these, their loops closed."""
+"""Rows of the record from states, and outputs observed from rows with their loops closed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from flexclear.pipeline.dynamics.equations.observation import Blocks, Frames, Ob
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
-#: no row is projected to less than this fraction of the mechanism's size
+#: least tolerance of the projection of rows, as a fraction of the mechanism's size
 ROUNDING = 1e-14
 
 
@@ -20,9 +20,9 @@ def rows_of(
     modes: float | np.ndarray = 0.0,
     latched: float | np.ndarray = 0.0,
 ) -> np.ndarray:
-    """Rows of the record for states, shape (rows, NY), at a time or times [s].
+    """Return rows of the record for states, shape (rows, NY), at a time or times [s].
 
-    modes, latched: of the contacts, shape (contacts,), or one for all: open, without an impact rate.
+    modes, latched: of the contacts, shape (contacts,), or one number for all; default open, without an impact rate.
     """
     contacts = len(engine.model.contacts)
     rows = recording.empty_record(len(states), contacts, states.shape[1])
@@ -32,21 +32,21 @@ def rows_of(
 
 
 def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observed:
-    """What is recorded of rows of the record, whose states are projected first.
+    """Return the outputs at rows of the record, whose states are projected first.
 
-    On a break the laws hold as before it, or as `after` it.
+    On a break the laws before it hold, or those `after` it.
     """
     return observation.by_name(observe_blocks(engine, rows, after=after), engine.model.arrays.size)
 
 
 def observe_blocks(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Blocks:
-    """The same as the kernel writes it; see `equations.observation.by_name`."""
+    """Return the outputs as the kernel stores them; see `equations.observation.by_name`."""
     pieces = engine.pieces[engine.segments(rows[:, 0], after=after)]
     return observe_with(engine, rows, pieces, max(recording.record_share(engine.rtol) * engine.rtol, ROUNDING))
 
 
 def frames(engine: Engine, rows: np.ndarray) -> Frames:
-    """The frames of links and sites in rows of the record, whose loops are as open as the run left them."""
+    """Return the frames of links and sites in rows of the record, without projection."""
     size = engine.model.arrays.size
     pieces = engine.pieces[engine.segments(rows[:, 0], after=False)]
     whole, blocks = observation.room(len(rows), size, frames=True)
@@ -55,7 +55,7 @@ def frames(engine: Engine, rows: np.ndarray) -> Frames:
 
 
 def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, fraction: float) -> Blocks:
-    """The same with given pieces of the laws, (rows, laws), projected to a fraction of the mechanism's size."""
+    """Return the outputs for given pieces of laws, (rows, laws), projected to a fraction of the mechanism's size."""
     whole, blocks = observation.room(len(rows), engine.model.arrays.size)
     engine.observe(rows, pieces, fraction * engine.model.length, whole)
     return blocks

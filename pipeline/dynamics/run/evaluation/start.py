@@ -1,4 +1,4 @@
-"""A consistent start: loops closed, speeds projected, contacts that are closed already found."""
+"""A consistent start: loops closed, speeds projected, closed contacts detected."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
-from flexclear.pipeline.dynamics.model.given_start import moved
+from flexclear.pipeline.dynamics.model.given_start import corrected_starts
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.plausibility import refuse_depth
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 
-#: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
+#: impact rate of a contact at rest: its damping no longer depends on the past impact [m/s]
 NO_IMPACT = 1e300
 #: surfaces that overlap by less than this fraction of the clearance touch
 TOUCHING = 1e-9
 
 
 def consistent_start(engine: Engine) -> np.ndarray:
-    """State at the start with its loops closed and the bodies' velocities as given; shape (NY,).
+    """Return the state at the start with closed loops and the bodies' given velocities, shape (NY,).
 
     Raises InputError for a start that joints, drives or surfaces do not allow.
     """
@@ -49,7 +49,7 @@ def consistent_start(engine: Engine) -> np.ndarray:
 
 
 def start_motions(engine: Engine) -> initial.Motions:
-    """What speeds at the start mean: motions of the links, and rates at which the loops open."""
+    """Return the effect of speeds at the start: motions of the links, and rates at which the loops open."""
 
     def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         _look(engine, state)
@@ -59,18 +59,18 @@ def start_motions(engine: Engine) -> initial.Motions:
 
 
 def mends(engine: Engine, y: np.ndarray) -> list[str]:
-    """Sentences about what a consistent start y has changed of the poses and velocities that the scene gives."""
+    """Return sentences about the differences of a consistent start y from the scene's poses and velocities."""
     _look(engine, y)
     frames = engine.table(m.LINK_FRAMES)
     now = [Placement(frame["origin"], frame["axes"]) for frame in frames]
     model = engine.model
     bent = initial.changed_positions(model, initial.start_state(model), y)
     speeds = initial.changed_velocities(model, frames, engine.table(m.SITE_FRAMES), y)
-    return [*moved(model.mechanism, now), *bent, *speeds]
+    return [*corrected_starts(model.mechanism, now), *bent, *speeds]
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
-    """`project` of a start that only the engine can close: with paths, or with flexible bodies."""
+    """Apply `project` to a start that only the engine can close: with paths, or with flexible bodies."""
     try:
         return project(engine, y)
     except SolverError as error:
@@ -81,7 +81,7 @@ def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 
 def _look(engine: Engine, y: np.ndarray) -> None:
-    """Evaluate at the start what does not take accelerations, which a singular pose does not have."""
+    """Evaluate the kinematics at the start; a singular pose has no unique accelerations."""
     if engine.mobility.singular_start:
         engine.attempt(y, engine.start)
     else:
@@ -89,7 +89,7 @@ def _look(engine: Engine, y: np.ndarray) -> None:
 
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
-    """Y at the start with the loops closed and their rates zero; SolverError when that fails."""
+    """Return Y at the start with the loops closed and their rates zero. Raise SolverError when that fails."""
     seen = observe(engine, rows_of(engine, y[None], engine.start))
     if seen.status[0] != m.OK:
         why = engine.explained() or "the loops cannot be closed from the start that the scene gives"
@@ -98,16 +98,16 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 
 def rates_at_speeds(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Rates of a state at the start with other speeds, as nearly as drives and loops allow."""
-    moved = y.copy()
-    moved[engine.model.speeds] = speeds
-    return closure_rows.evaluate(engine, project(engine, moved), engine.start)
+    """Return the rates of a state at the start with other speeds, as nearly as drives and loops allow."""
+    corrected_starts = y.copy()
+    corrected_starts[engine.model.speeds] = speeds
+    return closure_rows.evaluate(engine, project(engine, corrected_starts), engine.start)
 
 
 def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Change of what is read of the rates, or of the work space, per unit of each free speed; shape (..., nv).
+    """Return the change of `read`'s result, from rates or work array, per unit of each free speed; shape (..., nv).
 
-    From the rates at speeds, less those at the speeds of the drives alone: no step width enters.
+    It is the difference from the result at the speeds of the drives alone: no step width enters.
     """
     nv = engine.model.nv
     driven = read(rates_at_speeds(engine, y, np.zeros(nv)))
@@ -116,7 +116,7 @@ def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.nda
 
 
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
-    """Contacts whose surfaces overlap at the start, by number, and how deep [m]."""
+    """Return the contacts whose surfaces overlap at the start, by index, and their depths [m]."""
     contacts = engine.model.contacts
     if not contacts:
         return {}

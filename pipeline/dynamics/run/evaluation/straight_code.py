@@ -1,7 +1,7 @@
-"""Straight code for the wiring of a mechanism alone: which there is, and where.
+"""Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
-It is made once for all scenes of a wiring, and takes less time to make and to run than kernels do. Kernels are for what
-is too long for it. The wiring decides, no clock and no cache, so that equal scenes give equal bytes.
+It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Kernels serve mechanisms
+whose code would be too long. The topology alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
-#: addresses by parts, wiring, name, lanes, whether exact and whether with changes: many engines of a process use them
+#: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Wiring, str, int, bool, bool], int] = {}
 
 
 @dataclass
 class Straight:
-    """Code for one wiring (`Engine.settle`), shared by the engines of one work space.
+    """Code for one topology (`Engine.settle`), shared by the engines of one work array.
 
-    exact: whether it is to give the same bits for one state as for several at once.
-    place: where it may step together with others; by default each engine takes its own steps.
-    group: who takes the steps there, for the closure rows that it is for.
-    addresses: where it is, by the closure rows that it solves for and its name (`compile.sources`).
-    rows: those for which the present integration has code for steps alone.  They are its own, since what other
-    integrations of this engine have met must not change a bit of this one.
+    exact: whether one state and several at once must give the same bits.
+    place: for stepping together with others; by default each engine takes its own steps.
+    group: the group at that place, for the closure rows of its code.
+    addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
+    rows: those for which the present integration has specialised steps.  They belong to one integration, since other
+    integrations of this engine must not change a bit of this one.
     """
 
     exact: bool = False
@@ -53,9 +53,9 @@ class Straight:
 
 
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
-    """Sources of what evaluates a model and describes it, by name, with all closure rows: no selection has longer code.
+    """Return the sources of a model's evaluation and description, by name, with all closure rows: the longest code.
 
-    Steps that solve for all of them have code of their own as well; where some are redundant, which is chosen later.
+    Steps that solve for all rows are specialised as well; for redundant rows that is decided later.
     """
     if INTERPRETED:
         return sources.kernels(model.parts)
@@ -67,7 +67,7 @@ def equations(model: Model, mobility: Mobility) -> dict[str, str]:
 def address(
     model: Model, h: np.ndarray, straight: Straight, rows: bytes, name: str = SPECIALISED, progress: Progress = silent
 ) -> int:
-    """Address of straight code for closure rows, by its name (`compile.sources`)."""
+    """Return the address of specialised code for closure rows, by its name (`compile.sources`)."""
     known = straight.addresses
     if (rows, name) not in known:
         known[rows, name] = made(model, h, rows, progress, name, exact=straight.exact)
@@ -84,7 +84,7 @@ def made(
     *,
     exact: bool = False,
 ) -> int:
-    """Address of code for closure rows, of several lanes where so many are requested; 0 where there is none."""
+    """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
     h, parts, of_steps = h.copy(), model.parts, name == SPECIALISED
     changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
     selection.write(model, h, np.frombuffer(rows, dtype=bool))

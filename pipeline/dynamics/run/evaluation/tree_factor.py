@@ -1,4 +1,4 @@
-"""Factor of the mass matrix and bias forces, in full, from what an evaluation left in the work space."""
+"""Factor of the mass matrix and bias forces as full arrays, from the results of an evaluation in the work array."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def mass_factor(engine: Engine) -> np.ndarray:
 
 
 def _from_envelope(engine: Engine) -> np.ndarray:
-    """Of articulated inertias the blocks on the diagonal: of each body's modes, of each coordinate of a joint."""
+    """Return the factor in the envelope; with articulated inertias only the blocks of modes and coordinates."""
     L, entries = np.zeros((engine.model.nv,) * 2), engine.view(m.MASS)
     for i, (first, origin) in enumerate(engine.model.arrays.table(m.ENVELOPE)):
         L[i, first : i + 1] = entries[origin + first : origin + i + 1]
@@ -26,7 +26,7 @@ def _from_envelope(engine: Engine) -> np.ndarray:
 
 
 def _from_gains(engine: Engine) -> np.ndarray:
-    """Columns of coordinates times the gains of those beyond them."""
+    """Return the products of columns with the gains of the coordinates beyond them."""
     numbering, columns, gains = engine.model.numbering, engine.table(m.COLUMNS), engine.table(m.GAIN)
     L, origins = np.zeros((engine.model.nv,) * 2), engine.table(m.LINK_FRAMES)["origin"]
     for i in range(1, len(numbering.coordinates)):
@@ -41,7 +41,7 @@ def _from_gains(engine: Engine) -> np.ndarray:
 
 
 def carried_wrenches(engine: Engine, w: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return what the motion without free accelerations needs of each link and all that it carries.
+    """Return the wrench that each link and its subtree need for the motion without free accelerations.
 
     Moments about the kernels' origin and forces, shapes (links, 3).  w: as of `bias`.
     """
@@ -89,5 +89,5 @@ def _stretch(engine: Engine, w: np.ndarray, index: int) -> np.ndarray:
 
 
 def _vectors(engine: Engine, w: np.ndarray, table: Any, field: int) -> np.ndarray:
-    """A vector of each row of a table."""
+    """Return a vector of each row of a table."""
     return _stretch(engine, w, table.place).reshape(-1, table.size)[:, field : field + 3]

@@ -1,1 +1,1 @@
-"""How long a motion is predictable: perturbed runs, tangent equations, exponents, periods."""
+"""Predictability of a motion: perturbed runs, tangent equations, exponents, periods."""

@@ -1,8 +1,8 @@
-"""The largest exponent of a run, and its horizon, by the tangent equations with the jumps of impacts.
+"""Largest Lyapunov exponent and predictability horizon of a run, by tangent equations with jumps at impacts.
 
-A change of the start grows, in the long run, by the largest exponent: the slope of the logarithm of its size in the
-norm of the kinetic energy. No second run is needed, and no distance: the change is infinitely small. As large as that
-of a perturbed run, it says when such a run would be visibly separated, as long as it is small.
+In the long run, a change of the start grows by the largest exponent: the slope of the logarithm of its size in the norm
+of the kinetic energy. That needs no second run and no finite distance: the change is infinitesimal. Scaled to the
+change of a perturbed run, it shows when that run would be visibly separated, as long as the change is small.
 
 Source: Mueller (1995), Chaos, Solitons & Fractals 5, 1671-1681 (exponents of systems with discontinuities).
 """
@@ -17,20 +17,20 @@ from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, separated
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, askew, moved_start
+from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, asymmetric, moved_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
 EXPONENT_BATCHES, STUDENT = 10, 2.262
-#: change of a state whose motion is compared, as a fraction of what counts as far: its square is rounding
+#: step of finite differences of a state, as a fraction of its magnitudes: the square is rounding
 STATE_CHANGE = 1e-6
 
 
 @dataclass(frozen=True)
 class Growth:
-    """How a change of the start grows.
+    """Growth of a change of the start.
 
-    exponent, error: the mean growth of its logarithm over the run and half of the 95 % interval, from batch means
+    exponent, error: mean growth rate of its logarithm over the run and half of the 95 % interval, from batch means
     [1/s].  horizon [s]: when a perturbed run would be visibly separated; end of the run where it never is.
     """
 
@@ -40,23 +40,23 @@ class Growth:
 
 
 def start_direction(engine: Engine, y: np.ndarray) -> Direction:
-    """Return the change of a consistent start by which a perturbed run begins, and none of the numbers.
+    """Return the direction that changes a consistent start as a perturbed run does, and no numbers.
 
-    Of a mechanism without contacts one along no axis, as large.
+    For a mechanism without contacts, a change of the same size along no axis.
     """
     model, nothing = engine.model, np.zeros(len(engine.model.arrays.f))
     if model.contacts:
         return Direction(nothing, moved_start(engine, y) - y)
     end = model.speeds.stop
     change = np.zeros(len(y))
-    change[:end] = STATE_CHANGE * engine.magnitudes[:end] * askew(end)
+    change[:end] = STATE_CHANGE * engine.magnitudes[:end] * asymmetric(end)
     return Direction(
         nothing, PERTURBATION / STATE_CHANGE * 0.5 * (project(engine, y + change) - project(engine, y - change))
     )
 
 
 def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
-    """Return how the change along direction k of a run grows."""
+    """Return the growth of the change along direction k of a run."""
     metric, trajectory = Metric(engine), run.trajectory
     changes, end = run.changes[:, k], engine.model.speeds.stop
     steps = STATE_CHANGE / np.maximum((np.abs(changes) / engine.magnitudes)[:, :end].max(axis=1, initial=0.0), 1e-300)
@@ -77,7 +77,7 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
 def _slope(time: np.ndarray, logarithm: np.ndarray) -> tuple[float, float]:
     """Return the mean slope and half of its 95 % interval.
 
-    Without a first batch, in which the change turns to what grows.
+    The first batch is left out: in it the change turns to the direction that grows.
     """
     ends = np.linspace(time[0], time[-1], EXPONENT_BATCHES + 2)[1:]
     slopes = np.diff(np.interp(ends, time, logarithm)) / np.diff(ends)

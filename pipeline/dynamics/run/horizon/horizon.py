@@ -39,10 +39,10 @@ from flexclear.pipeline.dynamics.run.evaluation.observation import frames
 from flexclear.pipeline.dynamics.run.evaluation.start import per_speed, project, rates_at_speeds
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
-#: the two are compared at about this many times, which bounds the cost; where outputs are rarer, between them as well
+#: about this many times of comparison, which bounds the cost; with rarer outputs, comparisons are also between them
 SAMPLES = 180
-#: a body's motion counts relative to its own largest, but no less than this fraction of the liveliest body's, below
-#: which rounding and the drift of loops move it
+#: a body's motion is relative to its own largest, but at least to this fraction of the liveliest body's; smaller
+#: motions are rounding and drift of loops
 LEAST_LIVELY = 1e-3
 
 
@@ -50,8 +50,8 @@ LEAST_LIVELY = 1e-3
 class PerturbedRun:
     """Separation of a run and the same run from a perturbed start.
 
-    time [s], separation, a fraction of the largest motion, shape (n,); horizon [s], the start where the perturbed run
-    fails.
+    time [s]; separation, a fraction of the largest motion, shape (n,); horizon [s], which is the start where the
+    perturbed run fails.
     """
 
     time: np.ndarray
@@ -60,8 +60,8 @@ class PerturbedRun:
 
 
 @dataclass
-class _Seen:
-    """One of the two so far. rows: of the record.  motion: at the times of comparison, (times so far, entries)."""
+class _Side:
+    """Rows and motion so far of one of the two runs; motion: at the times of comparison, (times so far, entries)."""
 
     rows: np.ndarray
     motion: np.ndarray
@@ -78,15 +78,15 @@ class Pair:
         self.added = _between(engine, requested)
         self.outputs = np.union1d(requested, self.added)
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
-        self._engine, self._looking = another(engine), another(engine)
+        self._engine, self._observer = another(engine), another(engine)
         self._metric = Metric(engine)
-        self._run, self._complete, self._ended = self._unseen(), False, Event()
+        self._run, self._complete, self._ended = self._no_rows(), False, Event()
 
     def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
-        """Result of the run that takes these steps, without the rows that serve comparisons alone."""
+        """Return the result of the run that takes these steps, without the rows that only serve comparisons."""
         try:
-            engine, trajectory, switched = steps(self._hear, self.outputs)
-            self._hear(trajectory.rows)
+            engine, trajectory, switched = steps(self._store_rows, self.outputs)
+            self._store_rows(trajectory.rows)
             self._complete = True
         except StoppedError as stopped:
             if stopped.partial is not None:
@@ -102,10 +102,10 @@ class Pair:
     ) -> PerturbedRun:
         """Run the scene again from a start whose contacts are moved, and compare the two.
 
-        steps: takes the same steps as the run, with an engine from a start.  alive: called while it waits for the run;
-        what it raises ends the work.
+        steps: takes the same steps as the run, with an engine from a start.  alive: called while the perturbed run
+        waits for the run; an exception from it ends the work.
         """
-        engine, other, failed = self._engine, self._unseen(), False
+        engine, other, failed = self._engine, self._no_rows(), False
 
         def enough(rows: np.ndarray) -> bool:
             other.rows = rows
@@ -117,48 +117,48 @@ class Pair:
         except SolverError:
             failed = True
         self._await_run(alive)
-        time, separation, horizon = self._compared(other)
+        time, separation, horizon = self._comparison(other)
         if failed and horizon is None:
-            # a neighbour that cannot be run says nothing for the run itself: no value is predictable
+            # a perturbed run that fails without separation: no value of the run counts as predictable
             return PerturbedRun(np.array([engine.start]), np.zeros(1), engine.start)
         return PerturbedRun(time, separation, engine.end if horizon is None else horizon)
 
-    def _hear(self, rows: np.ndarray) -> bool:
-        """Note the rows that the run has so far; it continues."""
+    def _store_rows(self, rows: np.ndarray) -> bool:
+        """Store the rows that the run has so far, and return False: it continues."""
         self._run.rows = rows
         return False
 
-    def _enough(self, other: _Seen, alive: Progress) -> bool:
-        """Whether the two have diverged, so that the horizon is known.
+    def _enough(self, other: _Side, alive: Progress) -> bool:
+        """Return True when the two have diverged, so that the horizon is known.
 
-        What counts depends on the largest motion of the whole run. Where the two have diverged by the largest one
-        so far, the perturbed run waits for the run to end instead of going on, since that seldom changes.
+        The criterion depends on the largest motion of the whole run. Once the two have diverged relative to the largest
+        motion so far, the perturbed run waits for the end of the run, since further steps seldom change the result.
         """
-        if not self._beyond(other):
+        if not self._have_diverged(other):
             return False
         self._await_run(alive)
-        return self._complete and self._beyond(other)
+        return self._complete and self._have_diverged(other)
 
-    def _beyond(self, other: _Seen) -> bool:
-        """Whether the two have diverged for long enough, by what is known of the run."""
-        self._look(self._run)
-        self._look(other)
+    def _have_diverged(self, other: _Side) -> bool:
+        """Return True when the two have diverged for long enough, relative to the run so far."""
+        self._update(self._run)
+        self._update(other)
         first = self._diverged(self._separation(other))
-        return first is not None and bool(other.rows[-1, 0] >= self._judged(first))
+        return first is not None and bool(other.rows[-1, 0] >= self._examined_until(first))
 
     def _await_run(self, alive: Progress) -> None:
-        """Wait for the end of the run; one that fails before it begins has none."""
+        """Wait for the end of the run; a run that fails before its first step has no end."""
         while not self._ended.wait(TICK):
             alive(None, "")
 
-    def _compared(self, other: _Seen) -> tuple[np.ndarray, np.ndarray, float | None]:
-        """Times of comparison [s], separation and the horizon [s], when both have ended; None where they stay close."""
-        self._look(self._run)
-        self._look(other)
+    def _comparison(self, other: _Side) -> tuple[np.ndarray, np.ndarray, float | None]:
+        """Return times of comparison [s], separation, and horizon [s] or None, when both runs have ended."""
+        self._update(self._run)
+        self._update(other)
         separation = self._separation(other)
         time, diverged = self.times[: len(separation)], self._diverged(separation)
         if diverged is not None:
-            shown = time <= self._judged(diverged)
+            shown = time <= self._examined_until(diverged)
             time, separation = time[shown], separation[shown]
         k = separated_from(time, separation, self._span)
         if k is None:
@@ -171,23 +171,23 @@ class Pair:
         return np.insert(time, k, finer[first]), np.insert(separation, k, between[first]), horizon
 
     def _diverged(self, separation: np.ndarray) -> int | None:
-        """Index of the comparison from which on the two diverge."""
+        """Return the index of the comparison from which on the two diverge."""
         return divergence(self.times[: len(separation)], separation, self._span)
 
-    def _judged(self, k: int) -> float:
-        """Time [s] up to which a divergence that begins at comparison k is examined."""
+    def _examined_until(self, k: int) -> float:
+        """Return the time [s] up to which a divergence that begins at comparison k is examined."""
         return min(float(self.times[k]) + LASTING * self._span, float(self.times[-1]))
 
     @property
     def _span(self) -> float:
         return self._engine.end - self._engine.start
 
-    def _unseen(self) -> _Seen:
-        model = self._looking.model
-        return _Seen(recording.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
+    def _no_rows(self) -> _Side:
+        model = self._observer.model
+        return _Side(recording.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
 
-    def _look(self, seen: _Seen) -> None:
-        """Add the motion at the times of comparison that a run has come to since the last look."""
+    def _update(self, seen: _Side) -> None:
+        """Add the motion at the times of comparison that a run has reached since the last call."""
         rows = seen.rows
         if len(rows):
             reached = int(np.searchsorted(self.times, rows[-1, 0], side="right"))
@@ -195,25 +195,25 @@ class Pair:
             seen.motion = np.concatenate([seen.motion, new])
 
     def _motion(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Motion at times of which there are rows, shape (time, entries)."""
-        return self._metric.motion(self._looking, rows[np.searchsorted(rows[:, 0], times)])
+        """Return the motion at times that are times of rows, shape (time, entries)."""
+        return self._metric.motion(self._observer, rows[np.searchsorted(rows[:, 0], times)])
 
-    def _separation(self, other: _Seen) -> np.ndarray:
-        """Separation at the times of comparison that both have come to."""
+    def _separation(self, other: _Side) -> np.ndarray:
+        """Return the separation at the times of comparison that both have reached."""
         both = min(len(self._run.motion), len(other.motion))
         return self._metric.distance(self._run.motion[:both], other.motion[:both], self._largest())
 
     def _largest(self) -> np.ndarray:
-        """Largest motion of each body in the run so far, shape (body,)."""
+        """Return the largest motion of each body in the run so far, shape (body,)."""
         return self._metric.norms(self._run.motion).max(axis=0, initial=0.0)
 
 
 class Metric:
     """The motion of all bodies as entries whose squares add up to twice their kinetic energies.
 
-    Of a body: its centre of mass's velocity times the root of its mass, its angular velocity in its own axes times the
-    root of its inertia, and the rates of its modes, which have unit mass. Of flexible bodies the deformation's part of
-    the first two is left out: this is a measure of separation, not an energy balance.
+    Entries of a body: its centre of mass's velocity times the root of its mass, its angular velocity in its own axes
+    times the root of its inertia, and the rates of its modes, which have unit mass. For flexible bodies the
+    deformation's part of the first two is left out: this is a measure of separation, not an energy balance.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -230,7 +230,7 @@ class Metric:
         self._first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
 
     def motion(self, engine: Engine, rows: np.ndarray) -> np.ndarray:
-        """Entries of all bodies in rows of the record [sqrt(J)], shape (row, entries)."""
+        """Return the entries of all bodies in rows of the record [sqrt(J)], shape (row, entries)."""
         seen = frames(engine, rows).links
         speeds = recording.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
         entries = [np.zeros((len(rows), 0))]
@@ -242,21 +242,21 @@ class Metric:
         return np.hstack(entries)
 
     def norms(self, motion: np.ndarray) -> np.ndarray:
-        """Root of twice the kinetic energy of each body [sqrt(J)], shape (row, body)."""
+        """Return the root of twice the kinetic energy of each body [sqrt(J)], shape (row, body)."""
         if not len(self._first):
             return np.zeros((len(motion), 0))
         return np.sqrt(np.add.reduceat(motion**2, self._first, axis=1))
 
     def distance(self, one: np.ndarray, other: np.ndarray, largest: np.ndarray) -> np.ndarray:
-        """Largest separation of a body at each time, as a fraction of its largest motion in the run."""
+        """Return the largest separation of a body at each time, as a fraction of its largest motion in the run."""
         scale = np.maximum(largest, LEAST_LIVELY * largest.max(initial=0.0))
         return np.asarray((self.norms(one - other)[:, scale > 0.0] / scale[scale > 0.0]).max(axis=1, initial=0.0))
 
 
 def _between(engine: Engine, requested: np.ndarray) -> np.ndarray:
-    """Times [s] between outputs that are rarer than comparisons should be.
+    """Return times [s] of comparison between outputs that are too rare.
 
-    Motions diverge in impacts: outputs as rare as a stroke would show it one stroke late.
+    Motions diverge at impacts: with one output per stroke, the divergence would be detected one stroke late.
     """
     interval = engine.model.scene.output.interval
     parts = int(np.ceil(SAMPLES * interval / (engine.end - engine.start) - 1e-9))
@@ -269,9 +269,9 @@ def _between(engine: Engine, requested: np.ndarray) -> np.ndarray:
 
 
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
-    """Change of the ball-to-socket vectors (world) per change of the positions, closures closed; (3 contacts, nv).
+    """Return the derivative of ball-to-socket vectors (world) by the positions, closures closed; (3 contacts, nv).
 
-    Of a stop, whose way has no direction in space, its three rows are alike.
+    The three rows of a stop, whose displacement has no direction in space, are equal.
     """
     engine.select_pieces_after(engine.start)
     contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
@@ -286,7 +286,7 @@ def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
+    """Return the start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
     there, nq = y.copy(), engine.model.nq
@@ -295,12 +295,12 @@ def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.n
 
 
 def moved_start(engine: Engine, y: np.ndarray) -> np.ndarray:
-    """The start of a perturbed run: every contact moved by PERTURBATION of its clearance, along no axis."""
+    """Return the start of a perturbed run: every contact moved by PERTURBATION of its clearance, along no axis."""
     along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
     offsets = [PERTURBATION * contact.joint.clearance * along for contact in engine.model.contacts]
     return perturbed(engine, y, offset_jacobian(engine, y), np.concatenate(offsets))
 
 
-def askew(count: int) -> np.ndarray:
-    """Numbers from -1 to 1 that make a direction which no symmetry of a mechanism has, shape (count,)."""
+def asymmetric(count: int) -> np.ndarray:
+    """Return numbers from -1 to 1 as a direction that no symmetry of a mechanism has, shape (count,)."""
     return np.asarray(np.sin(1.0 + np.arange(count) * 2.399963))

@@ -1,10 +1,10 @@
-"""A motion followed period after period, and a neighbour that shows at what rate such motions part.
+"""Motion of period after period, and the growth rate of its distance from a neighbouring motion.
 
-The laws of one period hold in each, so that the run's time starts over while its state continues: memory does not grow
-with the number of periods, and neither does the rounding of the time. The neighbour starts a small distance away and is
-brought back to that distance, in its own direction, at every waypoint; the mean of the logarithms of what it went
-astray in between is the largest Lyapunov exponent. It is a motion like any other, so that what impacts do to it, which
-begin earlier or later in it, needs no equations of its own.
+The laws of one period hold in each, so the run's time starts over while its state continues: neither memory nor the
+rounding of the time grows with the number of periods. The neighbour starts a small distance away and is moved back to
+that distance, in its own direction, at every waypoint; the largest Lyapunov exponent is the mean logarithm of the
+distance's growth per time. The neighbour is an ordinary motion, so impacts, which it begins earlier or later, need no
+additional equations.
 
 Source: Benettin, Galgani, Giorgilli & Strelcyn (1980), Lyapunov characteristic exponents for smooth dynamical systems,
 Meccanica 15, 9-30 (rescaled neighbours); Mueller (1995), Calculation of Lyapunov exponents for dynamic systems with
@@ -26,37 +26,37 @@ from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.horizon.horizon import askew
+from flexclear.pipeline.dynamics.run.horizon.horizon import asymmetric
 from flexclear.pipeline.dynamics.run.pieces import Handover, Moment, Tape
 from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, integrate
 
-#: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
+#: number of waypoints per period: impacts may separate two motions a hundredfold, and they must stay close
 WAYPOINTS = 16
-#: the neighbour's distance in units of the relative tolerance: what steps differ by is then a thousandth of it
+#: distance of the neighbour in units of the relative tolerance: errors of steps are then a thousandth of the distance
 NEIGHBOUR = 1e3
-#: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is reported
+#: growth of the distance between two waypoints above which it is not linear, which is reported
 NOT_LINEAR = 1e4
-#: laws repeat when they end a period as they began it, but for this fraction
+#: laws repeat when their values at both ends of a period agree to this fraction
 EQUAL_LAWS = 1e-6
 
 
 @dataclass(frozen=True)
 class Cursor:
-    """Where a motion is between two periods: number of the next one, the motion itself, and its neighbour."""
+    """State of the iteration between two periods: number of the next period, motion, and neighbour."""
 
     number: int = 0
     here: Moment | None = None
     neighbour: Moment | None = None
 
     def packed(self) -> dict[str, np.ndarray]:
-        """All of it as arrays; what is not there has none."""
+        """Return all values as arrays; motion and neighbour have none where they do not exist."""
         moments = {"here": self.here, "neighbour": self.neighbour}
         arrays = {f"{name}.{k}": v for name, one in moments.items() if one is not None for k, v in vars(one).items()}
         return {**arrays, "number": np.array(self.number)}
 
     @staticmethod
     def unpacked(arrays: Mapping[str, np.ndarray]) -> Cursor:
-        """From what `packed` gave."""
+        """Return the cursor from the arrays of `packed`."""
 
         def moment(name: str) -> Moment | None:
             mine = {k.removeprefix(f"{name}."): v for k, v in arrays.items() if k.startswith(f"{name}.")}
@@ -67,11 +67,11 @@ class Cursor:
 
 @dataclass(frozen=True)
 class Period:
-    """One period of the motion, and by how much the neighbour's distance grew.
+    """One period of the motion, and the growth of the neighbour's distance.
 
     parts: the stretches between waypoints; times start over with each period.
-    growth: logarithm of the distance's growth, 0 where no neighbour is followed.  lost: how often the neighbour was
-    beyond what is linear.  after: from where the next one begins.
+    growth: logarithm of the distance's growth, 0 where no neighbour is followed.  lost: number of waypoints at which it
+    failed or was not linear.  after: cursor from which the next period begins.
     """
 
     number: int
@@ -82,8 +82,7 @@ class Period:
 
 
 def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
-    """InputError unless there are laws, and all end the period with the values that they begin it with, drives with
-    the rates, too.
+    """Raise InputError unless laws exist and all end the period with their initial values, drives also with the rates.
 
     Whole turns of a driven angle are no difference.
     """
@@ -114,19 +113,19 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
 
 
 def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
-    """The engine between the waypoints of a period, one of which is at `phase`; they use its work space."""
+    """Return the engine for each stretch between waypoints of a period, one at `phase`; all share the work space."""
     regular = period * np.linspace(0.0, 1.0, WAYPOINTS + 1)
-    # where a regular one is next to the phase, the phase replaces it
+    # the phase replaces a regular waypoint next to it
     inner = regular[1:-1][np.abs(regular[1:-1] - phase) > 0.25 * period / WAYPOINTS]
     times = engine.start + np.unique([0.0, *inner, phase, period])
     return [replace(engine, start=float(a), end=float(b)) for a, b in pairwise(times)]
 
 
 def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) -> Iterator[Period]:
-    """Period after period from a consistent start y, for ever.
+    """Yield period after period from a consistent start y, without end.
 
     parts: stretches of a period.  followed: numbers of the periods in which a neighbour is followed.
-    begin: from where it continues.
+    begin: cursor from which the motion continues.
     Raises SolverError where the run cannot continue.
     """
     period = parts[-1].end - parts[0].start
@@ -138,10 +137,10 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
         if number not in followed:
             neighbour = None
         for part in parts:
-            trajectory, there = _go(part, y, here)
+            trajectory, there = _integrated(part, y, here)
             if neighbour is not None:
                 after = _follow(part, neighbour)
-                neighbour, grown = brought_back(part, scales, there, after, separation)
+                neighbour, grown = rescaled(part, scales, there, after, separation)
                 growth, lost = growth + grown[0], lost + grown[1]
             elif number in followed:
                 neighbour = _set_neighbour(part, scales, there, separation)
@@ -153,30 +152,30 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
 
 
 def state_scales(engine: Engine, period: float) -> np.ndarray:
-    """Size of each state variable, of speeds in a period; infinite of the ledger, of which nothing feeds back."""
+    """Return the size of each state variable, for speeds per period; infinite for the ledger, which has no feedback."""
     floors = engine.magnitudes
     floors[engine.model.speeds] /= period
     floors[engine.model.speeds.stop :] = np.inf
     return floors
 
 
-def _go(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
-    """Over one stretch; from the start of the run where there is no moment yet."""
-    left = None if here is None else handed(part, here)
+def _integrated(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
+    """Integrate over one stretch, from the run's start where no moment exists; return the trajectory and its end."""
+    left = None if here is None else handover(part, here)
     trajectory = integrate(part, y, silent, left=left)
     return trajectory, _moment(part, trajectory)
 
 
 def _follow(part: Engine, here: Moment) -> Moment | None:
-    """Where the neighbour comes to; None where it cannot be followed."""
+    """Return the neighbour at the end of a stretch; None where it cannot be followed."""
     try:
-        return _go(part, here.y, here)[1]
+        return _integrated(part, here.y, here)[1]
     except SolverError:
         return None
 
 
-def handed(part: Engine, here: Moment) -> Handover:
-    """A moment as what another method would have left of this stretch: one row."""
+def handover(part: Engine, here: Moment) -> Handover:
+    """Return a moment as the handover of another method at the start of this stretch, with one row."""
     counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
     for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.events))):
         counters[index - m.STATUS] = value
@@ -188,7 +187,7 @@ def handed(part: Engine, here: Moment) -> Handover:
 
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:
-    """What the work space holds at the end of a stretch."""
+    """Return the moment at the end of a stretch from the work space."""
     watched, events = part.view(m.WATCH.place).copy(), list[np.ndarray]()
     table = m.named(m.WATCH, watched)
     for c in range(len(part.model.contacts)):
@@ -202,27 +201,27 @@ def _moment(part: Engine, trajectory: Trajectory) -> Moment:
 
 
 def _earlier(moment: Moment, period: float) -> Moment:
-    """The moment when time has started over: its contacts began a period earlier."""
+    """Return the moment with the start times of its contacts a period earlier, since time has started over."""
     events = moment.events.copy()
     m.named(m.EVENT, events)["time"] -= period
     return replace(moment, events=events)
 
 
 def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: float) -> Moment:
-    """A neighbour in a direction that no symmetry of a mechanism has."""
-    direction = np.where(np.isfinite(scales), askew(len(scales)), 0.0)
+    """Return a neighbour in a direction that no symmetry of a mechanism has."""
+    direction = np.where(np.isfinite(scales), asymmetric(len(scales)), 0.0)
     unit = direction / np.linalg.norm(direction)
     moved = here.y + separation * unit * np.where(np.isfinite(scales), scales, 0.0)
     return replace(here, y=_closed(part, moved))
 
 
-def brought_back(
+def rescaled(
     part: Engine, scales: np.ndarray, here: Moment, neighbour: Moment | None, separation: float
 ) -> tuple[Moment, tuple[float, int]]:
-    """The neighbour at its distance again; by how much that had grown (its logarithm), and 1 if it was lost.
+    """Return the neighbour at its distance again, the logarithm of its growth, and 1 if the growth was not linear.
 
-    Where one of both has a contact closed and the other has not, they are left as they are until both have: a state
-    between them would have surfaces that overlap without having met.
+    Where the closed contacts of the two differ, both stay as they are until they agree: a state between them would have
+    surfaces that overlap without an impact.
     """
     if neighbour is None:
         return _set_neighbour(part, scales, here, separation), (0.0, 1)
@@ -239,5 +238,5 @@ def brought_back(
 
 
 def _closed(part: Engine, y: np.ndarray) -> np.ndarray:
-    """The state at the end of a stretch, its loops closed."""
+    """Return the state at the end of a stretch, with closed loops."""
     return project(replace(part, start=part.end), y)

@@ -6,9 +6,9 @@ change of the numbers. It is part of the state: the same method steps it, to the
 
 .. math:: S^+ = R\,(S^- + g^-t_e') - g^+t_e', \qquad t_e' = -\dot\varphi / (\mathrm d\varphi/\mathrm dt),
 
-:math:`R` being what the event does to the state (bristles that begin bear nothing). The impact rate that a contact
-keeps from its closing changes by its own tangent and by that of the time. Steps that end on a kink of friction need no
-jump: forces are continuous there.
+where :math:`R` is the derivative of the event's reset of the state (bristles begin without deflection). The impact rate
+that a contact stores at its closing changes by its own tangent and by that of the time. Steps that end on a kink of
+friction need no jump: forces are continuous there.
 
 Source: Hiskens & Pai (2000), IEEE Trans. Circuits Syst. I 47, 204-220; Leine & Nijmeijer (2004), *Dynamics and
 Bifurcations of Non-Smooth Mechanical Systems*, ch. 7.
@@ -34,16 +34,16 @@ from flexclear.pipeline.dynamics.run.pieces import Tape
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 
-# N_CHANGES in the header: number of directions; F_CHANGE, W_CHANGE: lengths of f and w, each of which has its changes
-# along the directions behind itself, arranged as it is itself
+# N_CHANGES in the header: number of directions; F_CHANGE, W_CHANGE: lengths of f and w, which are each followed by
+# their changes along the directions, in the same layout
 
-#: how many times the tolerance changes may err by, and floors of changes of what is only summed up, such as energies:
-#: their rates jump where a force has a kink, where steps would vanish else
+#: factors of the tolerance of changes, and of the floors of changes of accumulated variables such as energies: their
+#: rates jump where a force has a kink, and steps would vanish there
 LOOSER, COARSER = 1e2, 1e4
 
 
 class Direction(NamedTuple):
-    """A direction of change. numbers: of the model's f, (len(f),).  start: of the start's state, (NY,)."""
+    """A direction of change; numbers: of the model's f, (len(f),); start: of the start's state, (NY,)."""
 
     numbers: np.ndarray
     start: np.ndarray
@@ -53,9 +53,9 @@ class Direction(NamedTuple):
 class Differentiated:
     """A trajectory with its derivatives.
 
-    trajectory: without them.  changes: of the states, (rows, directions, NY).  impact_rates: changes of the impact
-    rates, (rows, directions, contacts).  event_times: of the times of events [s], (events, directions), NaN of those
-    that are no change of mode.
+    trajectory: without derivatives.  changes: of the states, (rows, directions, NY).  impact_rates: changes of the
+    impact rates, (rows, directions, contacts).  event_times: changes of the events' times [s], (events, directions),
+    NaN for events that are no change of mode.
     """
 
     trajectory: Trajectory
@@ -70,7 +70,7 @@ def differentiate(
     directions: Sequence[Direction],
     progress: Progress,
 ) -> Differentiated:
-    """Run from a consistent start with derivatives along directions; SolverError where there are none."""
+    """Run from a consistent start with derivatives along directions; raise SolverError where they do not exist."""
     model, count, ny = engine.model, len(directions), engine.model.ny
     mine, jumps = differentiated_engine(engine, directions), _Jumps(ny, count)
     start = np.concatenate([y, *(direction.start for direction in directions)])
@@ -92,7 +92,7 @@ def differentiate(
 
 
 def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> Engine:
-    """Return an engine whose state holds changes along directions behind itself.
+    """Return an engine whose state is followed by its changes along directions.
 
     Raises SolverError for a mechanism that is not differentiated.
     """
@@ -122,15 +122,15 @@ def _widened(arrays: Arrays, f: np.ndarray, count: int) -> Arrays:
     groups, floors = tables[m.GROUPS], tables[m.FLOORS]
     tables[m.GROUPS] = np.concatenate([groups + k * len(floors) for k in range(1 + count)])
     coarser = floors.copy()
-    coarser[np.unique(groups[_summed_up(arrays)]), :2] *= COARSER
+    coarser[np.unique(groups[_accumulated(arrays)]), :2] *= COARSER
     coarser[:, 2] *= LOOSER
     tables[m.FLOORS] = np.concatenate([floors, *[coarser] * count])
     own = (m.NY, m.N_GROUPS)
     return pack({k: arrays.size(k) for k in range(m.ADDRESSES[0]) if k not in own}, tables, arrays.columns)
 
 
-def _summed_up(arrays: Arrays) -> np.ndarray:
-    """Return whether each variable of the state is one of the ledger that no rate depends on, (NY,)."""
+def _accumulated(arrays: Arrays) -> np.ndarray:
+    """Return True for each state variable that is an accumulated one of the ledger, on which no rate depends, (NY,)."""
     first, end = arrays.size(m.NQ) + arrays.size(m.NV), arrays.size(m.NY) - arrays.size(m.N_INTERNAL)
     summed = (np.arange(arrays.size(m.NY)) >= first) & (np.arange(arrays.size(m.NY)) < end)
     for bristle in arrays.table(m.CONTACTS)["bristle"]:
@@ -139,7 +139,7 @@ def _summed_up(arrays: Arrays) -> np.ndarray:
 
 
 class _Change(NamedTuple):
-    """A change of mode. times: of its time, impact_rates: of the impact rate that holds from then on; (directions,)."""
+    """A change of mode; times, impact_rates: changes of its time and of the impact rate from then on, (directions,)."""
 
     time: float
     contact: int
@@ -149,7 +149,7 @@ class _Change(NamedTuple):
 
 @dataclass
 class _Jumps:
-    """Jumps of the changes along `count` directions of a state with `ny` variables."""
+    """Jumps at events of the changes along `count` directions of a state with `ny` variables."""
 
     ny: int
     count: int
@@ -212,7 +212,7 @@ class _Jumps:
     def _evaluate(self, engine: Engine, t: float) -> np.ndarray:
         """Return rates of the state with its changes, by the code that steps use."""
         generic, engine.h[m.EVALUATE] = int(engine.h[m.EVALUATE]), engine.h[m.RATES]
-        engine.entry.evaluate(engine.h, engine.model.arrays.f, engine.w, engine.n, t)
+        engine.evaluate(t)
         engine.h[m.EVALUATE] = generic
         return engine.slope.copy()
 
@@ -221,18 +221,18 @@ class _Jumps:
         return engine.view(m.Y)[self.ny :].reshape(self.count, self.ny)
 
     def _numbers(self, engine: Engine) -> np.ndarray:
-        """Return those of the numbers, not copied, (directions, len(f))."""
+        """Return the changes of the numbers, not copied, (directions, len(f))."""
         return engine.model.arrays.f.reshape(1 + self.count, -1)[1:]
 
     def _work(self, engine: Engine) -> np.ndarray:
-        """Return those of the work space, not copied, (directions, len(w))."""
+        """Return the changes of the work space, not copied, (directions, len(w))."""
         return engine.w.reshape(1 + self.count, -1)[1:]
 
     def _starts(self, engine: Engine) -> np.ndarray:
-        """Return those of where pieces of laws begin, not copied, (directions, pieces)."""
+        """Return the changes of the start times of laws' pieces, not copied, (directions, pieces)."""
         begin, pieces = engine.h[m.PIECES.place] + m.PIECES.start, len(engine.model.arrays.table(m.PIECES))
         return self._numbers(engine)[:, begin : begin + m.PIECES.size * pieces : m.PIECES.size]
 
     def _touch(self, engine: Engine, c: int, offset: int) -> np.ndarray:
-        """Return those of what a contact does, (directions,)."""
+        """Return the changes of a field of a contact's row in TOUCH, (directions,)."""
         return self._work(engine)[:, engine.h[m.TOUCH.place] + m.TOUCH.size * c + offset].copy()

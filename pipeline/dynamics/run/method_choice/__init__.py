@@ -1,1 +1,1 @@
-"""Which method and tolerance a run gets, and whether it reaches the requested accuracy."""
+"""Choice of a run's method and tolerance, and verification of the requested accuracy."""

@@ -1,10 +1,10 @@
-"""A run whose time integration is as accurate as the scene asks: tolerances are tried, errors estimated.
+"""Run with the requested accuracy of time integration, by trying tolerances and estimating errors.
 
-Where the scene names no integrator, each run is made with the one that is foreseen to be cheapest (`method_selection`).
+Where the scene names no integrator, each run uses the one that is predicted to be cheapest (`method_selection`).
 
-The error of a run is estimated by the same run at a hundred times tighter tolerance: an adaptive method
-whose tolerance is proportional to its error (tolerance proportionality) then overestimates its distance to the
-exact solution by about one per cent. Errors of the model (modes, mesh, contact law) are not part of it.
+The error of a run is estimated by the same run at a hundred times tighter tolerance: an adaptive method whose tolerance
+is proportional to its error (tolerance proportionality) then overestimates its distance to the exact solution by about
+one per cent. Errors of the model (modes, mesh, contact law) are not part of it.
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, sec. II.4.
 """
 
@@ -27,33 +27,33 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.method_choice.method_selection import Suit
+    from flexclear.pipeline.dynamics.run.method_choice.method_selection import Costs
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
-#: the estimate compares with a run at this fraction of the tolerance
+#: tolerance of the run that serves the error estimate, as a fraction of the run's
 FINER_TOLERANCE = 1e-2
-#: tolerances that are tried lie between these; below, rounding decides
+#: limits of the tolerances that are tried; below, rounding dominates
 TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE = 1e-14, 1e-2
-#: a run is accepted when its error is between these fractions of the requested accuracy: enough, and not wasteful
+#: limits of an accepted run's error, as fractions of the requested accuracy: sufficient, and not wasteful
 ACCEPTED, WASTEFUL = 1.0, 1.0 / 3.0
-#: what the next try aims at, between the two
+#: error at which the next try aims, between the two
 AIM = 0.6
 TOLERANCE_TRIES = 12
-#: of the evaluations of a run that is accurate enough, what a looser tolerance must be foreseen to save
+#: least predicted saving of a looser tolerance, as a fraction of the evaluations of a sufficient run
 SAVED = 0.25
-#: a run that is refused at a looser tolerance than this is tried again at a fraction of it
+#: a run refused at a tolerance looser than this is tried again at a fraction of the tolerance
 REFUSED_FOR_GOOD, TIGHTER_AFTER_REFUSAL = 1e-9, 0.1
-#: an error that does not fall below this fraction at the FINER_TOLERANCE has another cause than the steps
+#: an error that does not fall below this fraction at FINER_TOLERANCE has another cause than the steps
 STUCK = 0.3
-#: the default request, as a fraction of each quantity's range; it is searched for at so many tolerances at most
+#: default requested accuracy, as a fraction of each quantity's range; largest number of tolerances tried for it
 BY_DEFAULT, FEW_TRIES = 1e-3, 4
-#: what is below this fraction of the motion's natural size is rounding, which stiff rods magnify in forces
+#: motions below this fraction of their natural size are rounding, which stiff rods magnify in forces
 ROUNDING_OF_MOTION = 1e-9
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """A run at one tolerance: estimated errors by quantity, and the largest as a fraction of the requested accuracy."""
+    """A run at one tolerance: estimated errors by quantity, and the largest one relative to the requested accuracy."""
 
     rtol: float
     run: xr.Dataset
@@ -63,54 +63,54 @@ class Attempt:
 
 @dataclass
 class Search:
-    """Runs made so far by tolerance, and what is requested of them.
+    """Runs made so far, by tolerance, and the request.
 
-    predictable: whether runs are compared up to the horizon of their predictability only; the request is then the
-    default one, and a quantity that never changes meets it.
+    predictable: True for the default request, for which runs are compared only up to the predictability horizon, and
+    quantities that never change meet the request.
     """
 
     scene: Scene
-    once: Callable[[Scene, Judges | None], xr.Dataset]
-    suit: Suit | None = None
+    make: Callable[[Scene, Judges | None], xr.Dataset]
+    costs: Costs | None = None
     runs: dict[float, xr.Dataset] = field(default_factory=dict)
     predictable: bool = False
 
     def run(self, rtol: float) -> xr.Dataset:
-        """The run at a tolerance, made once."""
+        """Return the run at a tolerance, made once."""
         if rtol not in self.runs:
             self.runs[rtol] = self._made(rtol)
         return self.runs[rtol]
 
     def _made(self, rtol: float) -> xr.Dataset:
-        if self.suit is None:
-            return self.once(edited(self.scene, {"solver.rtol": rtol}), None)
-        name, why = self.suit.best(rtol), self.suit.why(rtol)
-        run = self.once(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.suit.judges(rtol))
-        self.suit.learn(rtol, name, run)
+        if self.costs is None:
+            return self.make(edited(self.scene, {"solver.rtol": rtol}), None)
+        name, why = self.costs.best(rtol), self.costs.why(rtol)
+        run = self.make(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.costs.judges(rtol))
+        self.costs.learn(rtol, name, run)
         return run.assign_attrs(method_reason=why)
 
     def attempt(self, rtol: float) -> Attempt:
-        """The run at a tolerance and its estimated errors."""
+        """Return the run at a tolerance and its estimated errors."""
         run = self.run(rtol)
         finer = max(rtol * FINER_TOLERANCE, TIGHTEST_TOLERANCE)
-        # the tightest of all can only be compared with a looser one, whose error is the larger
+        # the tightest run can only be compared with a looser one, whose error is larger
         other = self.run(finer if finer < rtol else rtol / FINER_TOLERANCE)
         requested = self.requested(other)
-        # all tighter runs are witnesses: with impacts, two neighbours may agree by luck
+        # all tighter runs are compared: with impacts, two close tolerances may agree by chance
         witnesses = [other, *(r for tolerance, r in self.runs.items() if tolerance <= 0.1 * rtol)]
         errors = {q.name: max(self.error(run, r, q) for r in witnesses) for q in requested}
         return Attempt(rtol, run, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
 
     def error(self, run: xr.Dataset, other: xr.Dataset, quantity: Quantity) -> float:
-        """Largest difference of two runs, as far as they are compared, in the unit of the quantity."""
+        """Return the largest difference of two runs within the compared time, in the unit of the quantity."""
         horizons = [float(one["horizon"]) for one in (run, other) if self.predictable and "horizon" in one]
         return quantities.error(run, other, quantity, min(horizons, default=math.inf))
 
     def cheapest(self, attempt: Attempt) -> Attempt:
-        """The attempt, or the run that told its error, where another method made that for less.
+        """Return the attempt, or the run that served its error estimate if another method made that run at less cost.
 
-        How much the two differ is the error of either at most, unless both err alike; runs that are tighter than both
-        are asked as well.
+        The difference of the two is at least the error of either, unless both err alike, so runs tighter than both are
+        compared as well.
         """
         finer = attempt.rtol * FINER_TOLERANCE
         other = self.runs.get(finer)
@@ -129,16 +129,16 @@ class Search:
         return Attempt(finer, other, errors, fraction) if fraction <= ACCEPTED else attempt
 
     def uncompared(self, refusal: SolverError) -> Attempt:
-        """The tightest run by default, whose error no other tells; raises the refusal of those where there is none."""
+        """Return the tightest run of a default request, without an estimate; raise the refusal where none exists."""
         if not self.runs or not self.predictable:
             raise refusal
         rtol = min(self.runs)
         return Attempt(rtol, self.runs[rtol], {}, math.inf)
 
     def saves(self, rtol: float, looser: float) -> bool:
-        """Whether a run at a looser tolerance is foreseen to be so much cheaper that it is worth to be made.
+        """Return True when a run at a looser tolerance is predicted to be cheap enough to be worth making.
 
-        Where stability limits the steps it is not, and it takes two runs to know its error.
+        Where stability limits the steps it is not, and two runs are needed to know its error.
         """
         at = max(rtol * FINER_TOLERANCE, TIGHTEST_TOLERANCE)
         before, finer = self.runs[rtol], self.runs.get(at)
@@ -148,7 +148,7 @@ class Search:
         return (rtol / looser) ** max(growth, 0.0) < 1.0 - SAVED
 
     def requested(self, run: xr.Dataset) -> dict[Quantity, float]:
-        """Requested accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
+        """Return the requested accuracy in SI by quantity; relative ones refer to the quantity's size in `run`."""
         accuracy = self.scene.accuracy
         assert accuracy is not None
         requested = {}
@@ -172,24 +172,24 @@ class Search:
 
 
 def deliver(
-    scene: Scene, once: Callable[[Scene, Judges | None], xr.Dataset], progress: Progress, suit: Suit | None = None
+    scene: Scene, make: Callable[[Scene, Judges | None], xr.Dataset], progress: Progress, costs: Costs | None = None
 ) -> xr.Dataset:
-    """The cheapest run found whose estimated errors are what the scene wants; or the best, and a word on it.
+    """Return the cheapest run whose estimated errors meet the request, or the most accurate one with an explanation.
 
-    once: makes the run of a scene, under judges of its integrators.  suit: by what its integrator is chosen; None where
-    the scene names one.  The dataset's attributes say what was requested, estimated and met, and why by which
-    integrator.
+    make: makes the run of a scene, under judges of its integrators.  costs: costs for method selection; None where the
+    scene names an integrator.  The dataset's attributes state requested and estimated errors, the verdict, and the
+    reason of the method.
     """
-    return _delivered(Search(scene, once, suit), progress)
+    return _delivered(Search(scene, make, costs), progress)
 
 
 def by_default(
     scene: Scene,
-    once: Callable[[Scene, Judges | None], xr.Dataset],
+    make: Callable[[Scene, Judges | None], xr.Dataset],
     progress: Progress,
-    suit: Callable[[Scene], Suit],
+    costs: Callable[[Scene], Costs],
 ) -> xr.Dataset:
-    """The run of a scene that requests no accuracy and leaves its integration open.
+    """Return the run of a scene that requests no accuracy and leaves its integration open.
 
     As `deliver`, for BY_DEFAULT of each usual quantity over time (`Scene.requested`), up to the predictability horizon.
     """
@@ -197,7 +197,7 @@ def by_default(
     names = [q.name for q in scene.requested() if q.over_time]
     request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
     wanting = edited(scene, {"accuracy": request})
-    return _delivered(Search(wanting, once, suit(wanting), predictable=True), progress)
+    return _delivered(Search(wanting, make, costs(wanting), predictable=True), progress)
 
 
 def _delivered(search: Search, progress: Progress) -> xr.Dataset:
@@ -222,7 +222,7 @@ def _delivered(search: Search, progress: Progress) -> xr.Dataset:
 
 
 def _search(search: Search, progress: Progress) -> Attempt:
-    """Tolerance by tolerance: the error's logarithm is close to linear in the tolerance's."""
+    """Return the attempt found by varying the tolerance: the errors' logarithm is nearly linear in the tolerance's."""
     rtol = _first(search.scene)
     enough: Attempt | None = None
     nearest: Attempt | None = None
@@ -236,7 +236,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
                 if not search.predictable:
                     raise
                 break
-            # a tolerance so loose that the run is refused, as its ledger does not close
+            # the tolerance is so loose that the run is refused, as when its energy ledger does not close
             too_loose = min(too_loose, rtol)
             rtol = _next(rtol, 1.0 / TIGHTER_AFTER_REFUSAL, enough, too_loose)
             continue
@@ -260,7 +260,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
 
 
 def _first(scene: Scene) -> float:
-    """A guess that the search corrects; a tenth of the tightest relative wish, or the scene's own tolerance."""
+    """Return a first tolerance: a tenth of the tightest relative request, or the scene's own tolerance."""
     assert scene.accuracy is not None
     fractions = [want.relative for want in scene.accuracy.quantities.values() if want.relative is not None]
     guess = 0.1 * min(fractions) if fractions else scene.solver.rtol
@@ -268,7 +268,7 @@ def _first(scene: Scene) -> float:
 
 
 def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float) -> float:
-    """The next tolerance, which two digits describe."""
+    """Return the next tolerance, rounded to two digits."""
     if enough is not None and too_loose < math.inf:
         return float(f"{math.sqrt(enough.rtol * too_loose):.1e}")
     change = float(np.clip(AIM / max(fraction, 1e-300), 1e-3, 1e3))
@@ -276,7 +276,7 @@ def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float
 
 
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
-    """By how much, and why no tolerance helps."""
+    """Return a sentence with the missed accuracy and the reason why no tolerance helps."""
     if not best.errors:
         return "not verified: runs at tighter tolerances are refused, so that the error is unknown"
     name = max(requested, key=lambda n: best.errors[n] / requested[n])

@@ -1,9 +1,9 @@
-"""Which integrator suits a scene that asks for accuracy alone, by what reason, and who looks whether it was right.
+"""Method selection for a scene that requests only an accuracy, with reasons and with checks during the run.
 
-Costs are counted in evaluations of the right-hand side. What stability will cost the explicit method follows from the
-fastest rate of the equations, linearised at the start; the cost of accuracy comes from a run: it is extrapolated to
-other tolerances by the order of the error estimate. So the first run is a guess, which runs to come and, while it goes
-on, its judge correct.
+Costs are numbers of evaluations of the right-hand side. The steps that stability requires of the explicit method follow
+from the fastest rate of the equations, linearised at the start. The cost of accuracy comes from a run, extrapolated to
+other tolerances by the order of the error estimate. So the choice for the first run is a guess, which later runs and,
+during a run, its judge correct.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.2 (stability limits).
 """
@@ -30,40 +30,40 @@ from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Look, P
 from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.run import engine_of
 
-#: evaluations of a step of the default method, and how far its region of stability reaches where steps swing about it,
-#: along both axes; the product of rate and step that its error control settles at
+#: evaluations per step of the default method; and the extent of its stability region along both axes where steps
+#: oscillate about the limit: the product of rate and step at which error control settles
 STEP_EVALUATIONS, STABILITY_REACH = 12.0, 5.0
-#: an evaluation with the algebra that its method needs, in evaluations of the default method
-DEARER = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
-#: of a scene with contacts, evaluations of the default method where the modes limit it, as a fraction of what it needs
-#: to be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
+#: cost of an evaluation with the algebra of its method, in evaluations of the default method
+RELATIVE_COST = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
+#: evaluations of the default method in a scene with contacts, limited by the modes, relative to what stability needs:
+#: the method starts again at each contact, with stricter steps (measured: 1.45 and more)
 CONTACT_FACTOR = 1.5
 #: least and largest power of the tolerance with which evaluations grow, according to two runs
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
-#: the vibrations must be so much faster than all else, for nothing else limits the exponential method
+#: least ratio of the vibrations' rate to the other rates, which alone limit the exponential method
 FASTER_VIBRATIONS = 2.0
-#: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
-#: is taken without any run
+#: least cost of the default method at which the exponential and the stiff one are tried, and at which the stiff one is
+#: chosen without any run
 CHEAP, WORTH_STIFF, CRAWLING = 200.0, 3000.0, 300_000.0
-#: the same in a scene with contacts, at which each method begins again: of the default method before the exponential
-#: one is tried, and at the pace of a run before it hands on to one that is not known yet. A method is compiled once,
-#: for some seconds (the slider-crank of `flexclear new`: 13 s for two that gave up, where the default one took 0.5 s)
+#: these costs in a scene with contacts, at which each method starts again: before the exponential method is tried, and,
+#: at the progress rate of a run, before it hands over to a method of unknown cost. A method is compiled once, for some
+#: seconds (slider-crank of `flexclear new`: 13 s for two that gave up, where the default one took 0.5 s)
 BETWEEN_CONTACTS, WORTH_COMPILING = 3e6, 1e6
-#: what the stiff method is taken to cost where nothing is known of it, at a tolerance and at looser ones
+#: assumed cost of the stiff method without any run, at this tolerance and at looser ones
 UNKNOWN, AT = 20_000.0, 1e-4
-#: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
-#: is only tried
-CLEARLY_DEARER, TRIED = 3.0, 1.5
-#: where a method has used this fraction of what the other one is foreseen to take, it must be twice as many times
-#: dearer, earlier still more: starts may be hasty
+#: cost ratio to another method above which a method is given up, since progress rate and prediction are rough; and the
+#: ratio for a method that is only tried
+CLEARLY_COSTLIER, TRIED = 3.0, 1.5
+#: fraction of the other method's predicted cost at which the required ratio doubles, and earlier grows further: starts
+#: may be hasty
 EARLY_FRACTION = 0.1
-#: what a method takes for the rest of a motion characterises it where that is more than half
+#: least fraction of the motion that characterises the cost of the method that completes it
 CHARACTERISTIC = 0.5
-#: evaluations between two looks, as a fraction of those foreseen, and at least
+#: evaluations between two checks, as a fraction of those predicted, and at least
 LOOK_FRACTION, LEAST_LOOK = 0.02, 200
-#: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
+#: an integrator that was too expensive is possible again at a tolerance looser by this factor
 AGAIN = 10.0
-#: relative step of the differences
+#: relative step of finite differences
 DIFFERENCE_STEP = 1e-7
 
 
@@ -76,13 +76,13 @@ class Rates:
 
 
 @dataclass
-class Suit:
-    """What is known of a scene's costs.
+class Costs:
+    """Known and predicted costs of a scene's runs.
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
-    loosest tolerance at which a run with it has been handed on.  expected: by integrator, the evaluations
-    expected of the present run when it was handed on from it.  left: evaluations and fraction of the motion when that
-    happened last.  touching: whether there are contacts.
+    loosest tolerance at which it handed a run over.  expected: by integrator, the evaluations predicted for the present
+    run when it handed over.  left: evaluations and fraction of the motion at the last handover.  touching: True with
+    contacts.
     """
 
     rates: Rates
@@ -101,16 +101,16 @@ class Suit:
 
     @property
     def least(self) -> float:
-        """Evaluations that the default method takes at any tolerance."""
+        """Least evaluations of the default method at any tolerance."""
         return (CONTACT_FACTOR if self.touching else 1.0) * self.by_stability
 
     def evaluations(self, name: str, rtol: float) -> float:
-        """Evaluations at a tolerance, taken over from the run at the nearest other one."""
+        """Return the evaluations at a tolerance, extrapolated from the run at the nearest other one."""
         seen = self.seen[name]
         at = min(seen, key=lambda known: abs(np.log(known / rtol)))
-        # half of them are spent on finding and beginning contacts, whatever the tolerance
+        # half of them locate and begin contacts, at any tolerance
         power = (0.5 if self.touching or name == DEFAULT else 1.0) / (ORDERS[name] + 1.0)
-        if len(seen) > 1 and name != DEFAULT:  # of the default method two runs may only show where it is stable
+        if len(seen) > 1 and name != DEFAULT:  # stability may limit both runs of the default method
             other = min((one for one in seen if one != at), key=lambda known: abs(np.log(known / at)))
             slope = float(np.log(seen[other] / seen[at]) / np.log(at / other))
             power = float(np.clip(slope, LEAST_POWER, LARGEST_POWER))
@@ -119,13 +119,13 @@ class Suit:
         return max(expected, min(self.least, seen[at])) if name == DEFAULT else expected
 
     def cost(self, name: str, rtol: float) -> float:
-        """What a run is foreseen to take, in evaluations of the default method; 0 where only a run can show it."""
+        """Return the predicted cost of a run, in evaluations of the default method; 0 where only a run can show it."""
         if name in self.seen:
-            return DEARER[name] * self.evaluations(name, rtol)
+            return RELATIVE_COST[name] * self.evaluations(name, rtol)
         return self.least if name == DEFAULT else 0.0
 
     def possible(self, rtol: float) -> list[str]:
-        """Integrators that can be taken at a tolerance, the first of equally cheap ones first."""
+        """Return the integrators that are possible at a tolerance, the first of equally cheap ones first."""
         left = [name for name in (VIBRATING, DEFAULT, STIFF) if name in self.names and not self._dropped(name, rtol)]
         if VIBRATING in left and VIBRATING not in self.seen and not self._vibrates():
             left.remove(VIBRATING)
@@ -137,24 +137,24 @@ class Suit:
         return left or [STIFF]
 
     def _growth(self, rtol: float) -> float:
-        """By how much more evaluations the stiff method takes than at a loose tolerance, by its order."""
+        """Return the factor of the stiff method's evaluations against those at a loose tolerance, by its order."""
         return float(max(AT / rtol, 1.0) ** (1.0 / (ORDERS[STIFF] + 1.0)))
 
     def _dropped(self, name: str, rtol: float) -> bool:
-        """What stability limits is dear at all tolerances, what accuracy limits at tighter ones."""
+        """Return True for a method that was too expensive: by stability anywhere, by accuracy at tighter tolerances."""
         return name in self.missed and (name == DEFAULT or rtol < AGAIN * self.missed[name])
 
     def _vibrates(self) -> bool:
-        """Whether the modes' vibrations alone make the default method dear."""
+        """Return True when the modes' vibrations alone make the default method expensive."""
         enough = BETWEEN_CONTACTS if self.touching else CHEAP
         return self.rates.all > FASTER_VIBRATIONS * self.rates.held and self.by_stability > enough
 
     def best(self, rtol: float) -> str:
-        """The integrator to take at a tolerance."""
+        """Return the cheapest integrator at a tolerance."""
         return min(self.possible(rtol), key=lambda name: self.cost(name, rtol))
 
     def heir(self, name: str, rtol: float) -> tuple[str, float]:
-        """What continues where an integrator is too dear, if any, and what that one is foreseen to take."""
+        """Return the integrator that continues where another is too expensive, "" for none, and its predicted cost."""
         others = [
             one
             for one in self.names
@@ -165,7 +165,7 @@ class Suit:
         return best, foreseen.get(best, 0.0)
 
     def why(self, rtol: float) -> str:
-        """The reason in words."""
+        """Return the reason of the choice as a sentence."""
         name, most = self.best(rtol), f"{self.by_stability:.2g} evaluations for {DEFAULT} to be stable"
         known = [
             f"{other} takes {n:.0f} at {at:.1e}"
@@ -195,7 +195,7 @@ class Suit:
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
     def judges(self, rtol: float) -> Judges:
-        """Judges of whether a run goes as expected, and the same for its perturbed run, of which nothing is stored."""
+        """Return judges that compare a run with the prediction, and separate ones for its perturbed run."""
         self.expected.clear()
         return Judges(self._panel(rtol), replace(self, expected={}, left=(0.0, 0.0))._panel(rtol))
 
@@ -208,22 +208,22 @@ class Suit:
             every = max(int(LOOK_FRACTION * most), LEAST_LOOK)
             least = WORTH_STIFF
             if self.touching and heir not in self.seen:
-                least = WORTH_COMPILING / CLEARLY_DEARER
+                least = WORTH_COMPILING / CLEARLY_COSTLIER
             panel[name] = (Judge(every, self._verdict(name, heir, max(most, least))), heir)
         return panel
 
     def _verdict(self, name: str, heir: str, most: float) -> Callable[[Engine, Sequence[Look]], str]:
-        """Why an integrator is to be given up for one that takes so much."""
+        """Return the function that decides, with a reason, to give up an integrator for one with cost `most`."""
         tried = name == STIFF and STIFF not in self.seen and heir in self.seen
 
         def verdict(engine: Engine, looks: Sequence[Look]) -> str:
             if engine.model.scene.solver.integrator == DEFAULT and not limited(looks):
                 return ""
-            # what has been handed on from in this run already was seen to take more than was foreseen
-            enough = max(most, DEARER[heir] * self.expected.get(heir, 0.0)) / DEARER[name]
-            whole = pace(looks, CLEARLY_DEARER * enough) * self.span
+            # a method that handed over in this run took more than predicted
+            enough = max(most, RELATIVE_COST[heir] * self.expected.get(heir, 0.0)) / RELATIVE_COST[name]
+            whole = pace(looks, CLEARLY_COSTLIER * enough) * self.span
             used = max(looks[-1].evaluations - looks[0].evaluations, 1)
-            if whole < (TRIED if tried else CLEARLY_DEARER) * (1.0 + EARLY_FRACTION * enough / used) * enough:
+            if whole < (TRIED if tried else CLEARLY_COSTLIER) * (1.0 + EARLY_FRACTION * enough / used) * enough:
                 return ""
             self.expected[name] = whole
             self.left = looks[-1].evaluations, (looks[-1].time - engine.start) / self.span
@@ -231,14 +231,14 @@ class Suit:
                 return refusal.stiffness(engine.n, engine.control)
             return (
                 f"at this pace the run takes {whole:.2g} evaluations with {name}, "
-                f"which {heir} is foreseen to make with {most / DEARER[heir]:.2g}"
+                f"which {heir} is foreseen to make with {most / RELATIVE_COST[heir]:.2g}"
             )
 
         return verdict
 
     def learn(self, rtol: float, name: str, run: xr.Dataset) -> None:
-        """Remember what a run that began with an integrator took."""
-        if DEFAULT in self.expected:  # where stability sets the pace, it gives the cost of the whole run
+        """Store the cost of a run that began with an integrator."""
+        if DEFAULT in self.expected:  # where stability limits the steps, the progress rate gives the whole cost
             self.seen.setdefault(DEFAULT, {})[rtol] = self.expected[DEFAULT]
         if run.attrs["method"] != name and not (name == DEFAULT and name in self.expected):
             self.missed[name] = max(rtol, self.missed.get(name, 0.0))
@@ -248,12 +248,12 @@ class Suit:
             self.seen.setdefault(run.attrs["method"], {})[rtol] = max(rest, 1.0)
 
 
-#: powers of the step with which the error estimates fall
+#: orders of the error estimates: powers of the step
 ORDERS = {DEFAULT: 7.0, VIBRATING: 4.0, STIFF: 3.0}
 
 
-def suit(scene: Scene, bundles: Mapping[str, Labelled]) -> Suit:
-    """What is known of a scene before any run."""
+def method_costs(scene: Scene, bundles: Mapping[str, Labelled]) -> Costs:
+    """Return the costs of a scene's methods that are known before any run."""
     names = by_need(bool(scene.flexible()))
     engine = engine_of(
         edited(scene, {"solver.integrator": VIBRATING if VIBRATING in names else DEFAULT}), bundles, silent
@@ -262,13 +262,13 @@ def suit(scene: Scene, bundles: Mapping[str, Labelled]) -> Suit:
     engine.select_pieces_after(engine.start)
     try:
         known = rates(engine, start)
-    except SolverError:  # a run may well start where nothing can be linearised, as in a singular pose
+    except SolverError:  # a run may start where linearisation is impossible, as in a singular pose
         known = Rates(0.0, 0.0)
-    return Suit(known, engine.end - engine.start, names, touching=bool(engine.model.contacts))
+    return Costs(known, engine.end - engine.start, names, touching=bool(engine.model.contacts))
 
 
 def rates(engine: Engine, y: np.ndarray) -> Rates:
-    """Magnitudes of the largest eigenvalues of the equations, linearised in a state at the start."""
+    """Return the magnitudes of the largest eigenvalues of the equations, linearised in a state at the start."""
     n, model = engine.model.nq + engine.model.nv, engine.model
     J, scales = np.empty((n, n)), model.state_scales
     for k in range(n):

@@ -1,1 +1,1 @@
-"""What ends a run, or is doubted in it, in words."""
+"""Reasons why a run ends or is doubtful, in words."""

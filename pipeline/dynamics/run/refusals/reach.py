@@ -1,10 +1,10 @@
-"""Ends of a motion at a singular pose: a drive that pulls a loop further than it reaches, a rest in the pose, and what
-moves too fast there for a branch to be followed.
+"""Motions that end at a singular pose: a drive that pulls a loop further than it reaches, a rest in the pose, and
+speeds too large to follow a branch.
 
 A drive that leads a loop with ideal joints out of reach ends the run there. With clearance the contact gives way
-instead, in ever shorter steps, millions of which friction's slope at rest may ask for. What it must come to is a matter
-of geometry: the least depth at the drives' positions, over all that they leave free. It is followed from the pose that
-the run has come to along the drives' laws.
+instead, in ever shorter steps, possibly millions because of friction's slope at rest. Geometry alone decides the
+outcome: the least depth at the drives' positions, over all free coordinates. The search follows that depth from the
+present pose along the drives' laws.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import per_speed, project
 
-#: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
-#: and above which it is not singular
+#: least singular values of the closures, as fractions of the largest, above which a pose is not at the end of reach,
+#: and not singular
 END_OF_REACH, SINGULAR = 0.1, 1e-3
-#: a rest: fraction of a row in what depends, and speeds as fraction of the largest before
+#: a rest: least part of a row in the dependent combination, and largest speeds as fraction of the largest before
 REST_FRACTION, DYING = 0.1, 0.1
-#: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
+#: at the end of reach speeds grow without bound: elsewhere no loop moves faster than the drives by this factor
 FASTER = 40.0
-#: times ahead at which the least depth is searched for
+#: number of times ahead at which the least depth is computed
 TIMES_AHEAD = 60
-#: a search proceeds in so many boxes of one of these half widths, in fractions of the mechanism's size or in rad:
+#: a search uses at most so many boxes of one of these half widths, in fractions of the mechanism's size or in rad: the
 #: coordinates of a box are those of the loops' tangents in its middle
 BOXES, HALF_WIDTHS = 60, (0.1, 0.05, 0.025, 0.0125)
-#: a depth is the least when another box takes off less than this fraction of it
+#: a depth is the least when another box reduces it by less than this fraction
 LEAST_GAIN = 1e-3
-#: of the search in a box, in which depths are fractions of that in its middle, so that no size of a mechanism matters
+#: tolerance of the search in a box; depths are fractions of that in its middle, independent of the mechanism's size
 OPTIONS: Any = {"eps": 1e-6}
 
 
 @contextmanager
 def preserved(engine: Engine) -> Iterator[None]:
-    """The work space is afterwards as it was."""
+    """Restore the work array afterwards."""
     saved = engine.w.copy(), engine.n.copy()
     try:
         yield
@@ -53,11 +53,11 @@ def preserved(engine: Engine) -> Iterator[None]:
 
 
 def beyond_reach(engine: Engine) -> str:
-    """When, which drive, and at which joint, in words; nothing where reach is not what ends at the stepper's state.
+    """Return time, drive and joint, in words, when a loop's reach ends at the stepper's state; else nothing.
 
-    In a singular pose that a motion passes, the combination of closures that becomes dependent asks nothing of the
-    drives; at the end of a loop's reach it asks them not to move.  Of loops with flexible
-    bodies, whose modes give way, this says nothing.  The memory stays as it is.
+    In a singular pose that a motion passes, the dependent combination of closures does not constrain the drives; at the
+    end of a loop's reach it demands that they stand still.  Loops with flexible bodies are not judged, since their
+    modes give way.  The engine is not changed.
     """
     model = engine.model
     if not model.drives or not model.closures or not model.mechanism.all_rigid:
@@ -67,10 +67,10 @@ def beyond_reach(engine: Engine) -> str:
 
 
 def require_shallow(engine: Engine) -> None:
-    """SolverError for a contact that is pressed through its socket at the stepper's state.
+    """Raise SolverError for a contact that is pressed through its socket at the stepper's state.
 
-    Contacts give way where ideal joints do not, so that a drive leads a loop with clearance beyond its reach in ever
-    shorter steps: the run would be refused at its end, if it ever came there.  The memory stays as it is.
+    Contacts give way where ideal joints do not, so a drive leads a loop with clearance beyond its reach in ever shorter
+    steps, to a run that would be refused at its end.  The engine is not changed.
     """
     from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
 
@@ -98,9 +98,9 @@ def require_shallow(engine: Engine) -> None:
 
 
 def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
-    """Why the motion ends in a singular pose at the stepper's state, in words; nothing where there is none.
+    """Return why the motion ends in a singular pose at the stepper's state, in words; nothing without such a pose.
 
-    rows: recorded so far, whose speeds those at the stepper's state are compared with.
+    rows: the record so far, for comparison with the speeds at the stepper's state.
     """
     model, t, y = engine.model, float(engine.control[m.TIME]), engine.view(m.Y).copy()
     with preserved(engine):
@@ -119,7 +119,7 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
 
 
 def rest(t: float, where: str) -> str:
-    """A rest in a singular pose, in words."""
+    """Describe a rest in a singular pose."""
     return (
         f"at t = {t:.6g} s: the mechanism comes to rest in a singular pose ({where}), where it can continue in several "
         "ways and no motion chooses one: let it pass the pose at speed, or stop elsewhere"
@@ -127,7 +127,7 @@ def rest(t: float, where: str) -> str:
 
 
 def _too_fast(engine: Engine, t: float, where: str) -> str:
-    """What keeps a pass at speed from being smooth, in words; nothing where there is nothing of the kind."""
+    """Return what prevents a smooth pass at speed, in words; nothing when the pass is smooth."""
     model = engine.model
     closed = [contact.name for contact, mode in zip(model.contacts, engine.modes, strict=True) if mode]
     flexible = [name for link in model.links if link.flexible for name in link.places]
@@ -155,7 +155,7 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     still[model.speeds] = 0.0
     engine.attempt(still, t)
     U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
-    pulled = engine.view(m.RESIDUAL_RATE)[selection.kept_places(model, engine.h)]
+    pulled = engine.view(m.RESIDUAL_RATE)[selection.selected_indices(model, engine.h)]
     pulled = pulled / closure_rows.row_units(model, engine.h, model.length)
     if values[-1] > END_OF_REACH * values[0]:
         return ""
@@ -169,7 +169,7 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
 
 
 def _pulling(engine: Engine) -> str | None:
-    """The drive with the largest power in the state evaluated last; None where none has any."""
+    """Return the drive with the largest power in the state evaluated last; None when no drive has power."""
     powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[engine.model.nv :])
     return engine.model.drives[int(np.argmax(powers))] if np.any(powers > 0.0) else None
 
@@ -179,10 +179,10 @@ def _shorten(drive: str) -> str:
 
 
 def forced_depth(engine: Engine, contact: int, shallow: float) -> tuple[float, float]:
-    """When contact number `contact` must be deeper [m] than its inner radius, and how deep then; else (inf, 0).
+    """Return when a contact must be deeper [m] than its inner radius, and how deep then; else (inf, 0).
 
-    From the stepper's state on, if the contact is deeper than `shallow` [m] already; rigid bodies only, since others
-    bend instead. Searches are local, as the motion is.  The memory is not preserved.
+    The prediction starts at the stepper's state if the contact is already deeper than `shallow` [m], with rigid bodies
+    only, since others bend. Searches are local, as the motion is.  The engine is changed.
     """
     model, t = engine.model, float(engine.control[m.TIME])
     radius, y = model.contacts[contact].joint.radius, engine.view(m.Y).copy()
@@ -197,9 +197,9 @@ def forced_depth(engine: Engine, contact: int, shallow: float) -> tuple[float, f
 
 
 def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> tuple[np.ndarray, float]:
-    """A state nearby in which the contact is least deep, or no deeper than `enough`; and how deep [m].
+    """Return a nearby state with the least depth of the contact, or one of at most `enough`; and the depth [m].
 
-    Drives are where they are at the engine's start.
+    Drives have their positions at the engine's start.
     """
     y = project(engine, y)
     depth = _depth(engine, y, contact)
@@ -214,7 +214,7 @@ def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> t
 
 
 def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tuple[np.ndarray, float]:
-    """The same in the box about a state in which it is so deep; a smaller one where other loops cannot follow."""
+    """Search for the least depth in a box about a state; the box shrinks when other loops cannot follow."""
     from scipy.optimize import minimize  # slow to import, and few runs come here
 
     nq, scales = engine.model.nq, engine.model.speed_scales[: engine.model.nv]
@@ -239,6 +239,6 @@ def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tup
 
 
 def _depth(engine: Engine, y: np.ndarray, contact: int) -> float:
-    """How deep the contact is [m]."""
+    """Return the depth of the contact [m]."""
     engine.attempt(y, engine.start)
     return -float(engine.table(m.TOUCH)["gap"][contact])

@@ -1,4 +1,4 @@
-"""Why a run does not continue, in words that say what to do about it."""
+"""Reasons why a run does not continue, with remedies."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.refusals.reach import beyond_reach, end_in_pose
 
-#: above this fraction of steps that stability limits, stiffness is named as the cause of a long run
+#: fraction of steps limited by stability above which stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
-#: why the stepper stops where loops are pulled further than they reach
+#: the stepper's status where loops may be pulled further than they reach
 LOOPS = (m.STEP_TOO_SMALL, m.NO_START, m.NO_CONVERGENCE, m.AT_SINGULAR, m.LOST_CLOSURE)
-#: events per step from which on they are named as the cause
+#: events per step above which they are named as the cause
 OFTEN = 0.05
 
 
 def text(engine: Engine, rows: np.ndarray) -> str:
-    """When and why the stepper stopped, in words; rows: of the record so far."""
+    """Say when and why the stepper stopped; rows: the record so far."""
     failed = int(engine.n[m.EVALUATION])
     engine.complete()
     engine.n[m.EVALUATION] = failed  # of the trial that came to nothing
@@ -65,7 +65,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
 
 
 def _doubts(engine: Engine) -> str:
-    """What may well be why the run ended: negative gains, else what flexible bodies are doubted for; or nothing."""
+    """Return the probable cause of the end: negative gains, else doubts about flexible bodies; or nothing."""
     gains = [f"load.{name}.{key}" for name, key in negative_gains(engine.model.scene)]
     if gains:
         return f"; a negative gain pushes away from the reference: {', '.join(gains)}"
@@ -77,7 +77,7 @@ def _doubts(engine: Engine) -> str:
 
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
-    """What used the evaluations up, and what helps."""
+    """Say what used the evaluations up, and what helps."""
     name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
     other = engine.method.traits.hands_over_to
     steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
@@ -94,7 +94,7 @@ def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
 
 
 def _remedy(steps: int, rejected: int, events: int, other: str) -> str:
-    """What helps by what there was most of; other: the implicit method that is one of the remedies, or nothing."""
+    """Return the remedy for the largest cost; other: the implicit method that may help, or nothing."""
     implicit = f", {other} where contacts or friction are stiff," if other else ""
     if events > OFTEN * steps:
         return (
@@ -106,7 +106,7 @@ def _remedy(steps: int, rejected: int, events: int, other: str) -> str:
 
 
 def stiffness(n: np.ndarray, control: np.ndarray) -> str:
-    """How many steps stability limited, and the rates that did it."""
+    """Say how many steps stability limited, and by which rates."""
     return (
         f"{n[m.STIFF_STEPS]} of {n[m.STEPS]} steps were limited by stability: the equations have rates up "
         f"to {control[m.STEEPEST]:.2g} 1/s, as the slope of friction at small sliding speeds has"

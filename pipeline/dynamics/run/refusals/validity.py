@@ -1,8 +1,8 @@
-"""Whether flexible bodies stay within what linear modes carry: how far they bend, how fast they turn.
+"""Range of validity of linear modes: how far flexible bodies bend, how fast they rotate.
 
-Limits are those at which the terms left out reach some per cent: the tip of a cantilever that bends by a tenth of its
-length is one per cent off the elastica, and the centrifugal stiffening of a turning beam is to its stiffness about as
-the square of its speed to the square of its first frequency.
+At the limits the omitted terms reach some per cent: the tip of a cantilever that bends by a tenth of its length is one
+per cent off the elastica, and the centrifugal stiffening of a rotating beam over its stiffness is about the square of
+its speed over the square of its first frequency.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.refusals.reach import preserved
 
-#: displacement of a point in its body frame, as fraction of the body's length, above which linear modes are doubted
+#: displacement of a point in its body frame, as fraction of the body's length, above which a warning follows
 BENT = 0.05
-#: rotation of a section in the body frame [rad] above which they are doubted
+#: rotation of a section in the body frame [rad] above which a warning follows
 SECTION_ROTATION = 0.15
-#: speed of turning, as fraction of the first frequency, above which a body without stiffening is doubted
+#: angular speed, as fraction of the first frequency, above which a warning follows for a body without stiffening
 SPIN = 0.2
-#: rows whose shapes are added up at a time
+#: rows whose shapes are superposed at a time
 ROWS = 16
 
 
 @dataclass(frozen=True)
 class Flexible:
-    """What a flexible link is judged by.
+    """Data of a flexible link for the limits.
 
     axis: unit vector along its longest extent, `length` [m], in the body frame.
-    first: its lowest frequency [rad/s] in the modes that it keeps; 0 for a body whose turning is not judged.
+    first: lowest frequency [rad/s] of its modes; 0 for a body whose rotation is not limited.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Flexible:
 
 
 def flexibles(model: Model) -> list[Flexible]:
-    """The flexible links of a model, and by what each is judged."""
+    """Return the flexible links of a model, with their data for the limits."""
     bodies = []
     for i, coordinates in sorted(model.numbering.modal_positions.items()):
         name, bundle = str(model.links[i].flexible), model.links[i].bundle
@@ -74,12 +74,12 @@ def flexibles(model: Model) -> list[Flexible]:
 
 
 def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
-    """Sentences about flexible bodies that left the range of linear modes in the observed rows of a run."""
+    """Return warnings about flexible bodies that left the range of linear modes in the observed rows of a run."""
     return [text for body in flexibles(model) for text in _judged(body, time, seen.positions, seen.links)]
 
 
 def doubts(engine: Engine) -> list[str]:
-    """The same of the state that the engine's last step came to; the engine is left as it was."""
+    """Return such warnings about the state at the end of the last step; the engine is not changed."""
     with preserved(engine):
         # the last evaluation may be of a step that was rejected, at speeds that the motion never had
         engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
@@ -91,7 +91,7 @@ def doubts(engine: Engine) -> list[str]:
 
 
 def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray) -> Iterator[str]:
-    """Sentences about one body; shapes (rows, coordinate) and (rows, link), the latter named fields of LINK_FRAMES."""
+    """Return warnings about one body; shapes (rows, coordinate) and (rows, link), the latter fields of LINK_FRAMES."""
     yield from _spun(body, time, frames[:, body.link])
     q = coordinates[:, body.coordinates]
     if body.length > 0.0:
@@ -112,7 +112,7 @@ def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: n
 
 
 def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
-    """A sentence about turning across its length: turning about it neither stiffens nor softens bending."""
+    """Warn of rotation across the body's length; rotation about it neither stiffens nor softens bending."""
     if body.first <= 0.0:
         return
     speeds = np.linalg.norm(np.cross(frame["omega"], frame["axes"] @ body.axis), axis=1)
@@ -126,7 +126,7 @@ def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
 
 
 def largest(shapes: np.ndarray, q: np.ndarray, floor: float) -> tuple[int, float]:
-    """Row and size of the largest displacement or rotation of any node; rows that cannot exceed `floor` are left out.
+    """Return row and size of the largest displacement or rotation of any node, among rows that can exceed `floor`.
 
     shapes: (node, axis, mode).  q: modal coordinates, (rows, mode).
     """

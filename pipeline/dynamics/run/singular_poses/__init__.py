@@ -1,1 +1,1 @@
-"""Over singular poses, and out of them."""
+"""Motion over singular poses, and out of them."""

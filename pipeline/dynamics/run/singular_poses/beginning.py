@@ -1,13 +1,13 @@
-"""Out of a singular pose in which a run starts, along one of the branches that cross there.
+"""Start in a singular pose: motion out of it along one of the branches that cross there.
 
-Velocities that are given choose the branch; where they, and the drives, leave a choice, `[start] branch` of the scene
-does. Each branch has a motion out of the pose, a polynomial with closed states (`collocation`). Velocities that belong
-to no branch show in that there is none, however short the way.
+Given velocities select the branch; if they and the drives leave a choice, `[start] branch` of the scene decides. Each
+branch has a motion out of the pose, a polynomial with closed states (`collocation`). For velocities that belong to no
+branch there is no such polynomial, however short.
 
-A branch leaves the pose in a direction in which the closures hold to second order. The rows that depend on each other
-there say nothing of first order about the directions that they leave free; what they say of second order is a quadratic
-form of each. Its zeros are the tangents of the branches. It is taken from the residuals of states a small way off, at
-the time when the drives have gone as far.
+A branch leaves the pose in a direction in which the closures hold to second order. The dependent rows have no first
+order part in the free directions; their second order part is a quadratic form each. The common zeros of the forms are
+the tangents of the branches. The forms come from residuals of states at a small distance, at the time when the drives
+have moved as far.
 """
 
 from __future__ import annotations
@@ -30,31 +30,32 @@ from flexclear.pipeline.dynamics.run.evaluation.start import start_motions
 from flexclear.pipeline.dynamics.run.refusals.reach import preserved
 from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
 
-#: the way is first as long as the fastest coordinate takes for this fraction of its unit, then half of that, and so on
+#: the polynomial is first as long as the fastest coordinate takes for this fraction of its unit, then half, and so on
 FIRST_WAY, WAY_HALVINGS = 0.3, 9
-#: velocities may differ from those of a branch by this fraction: they are given with some digits
+#: given velocities may differ from those of a branch by this fraction: they have few digits
 EQUAL_VELOCITIES = 1e-6
-#: directions that were searched for are good to some hundredths
+#: computed directions have an error of some hundredths
 ANY = 0.5
-#: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this fraction
-#: are alike
+#: changes of a coordinate on two branches, known to some hundredths, are equal when they differ by less than this
+#: fraction
 EQUAL_CHANGES = 0.05
-#: way off, in units of the coordinates, and singular values below this fraction of the largest, which are zero
+#: distance of the displaced states, in units of the coordinates; singular values below this fraction of the largest are
+#: zero
 WAY, ZERO_SINGULAR = 1e-2, 1e-6
-#: directions in which nothing of second order is said, to this fraction, are not those of a branch
+#: free directions whose second order part is below this fraction belong to no branch
 SILENT = 1e-3
-#: most directions among which branches are searched for, starts of the search for each, its steps, and what is the same
+#: most directions among which branches are computed, starts of the iteration for each, its steps, and its tolerance
 MOST_DIRECTIONS, SEARCH_STARTS, SEARCH_STEPS, EQUAL_DIRECTIONS = 6, 60, 40, 1e-3
-#: fraction of the time since the start over which a rate is taken
+#: fraction of the time since the start for finite differences of rates
 RATE_INTERVAL = 1e-4
-#: halvings of the time in which the drives go the way
+#: halvings of the time in which the drives move that distance
 TIME_HALVINGS = 60
 
 
 def start_motion(engine: Engine, y: np.ndarray) -> Collocation:
-    """From the state at the start, which has all loops closed; leaves its closure rows selected.
+    """Return the motion out of the start y, which has all loops closed; its closure rows remain selected.
 
-    SolverError when its velocities are not those of one smooth motion, or nothing says which of several it takes.
+    Raise SolverError when the velocities do not belong to a smooth motion, or the branch is not determined.
     """
     choices = engine.model.scene.start.branch if engine.model.scene.start is not None else ()
     if np.any(y[engine.model.speeds] != 0.0) and not choices:
@@ -69,7 +70,7 @@ def start_motion(engine: Engine, y: np.ndarray) -> Collocation:
 
 
 def _along(engine: Engine, way: Direction, turn: float) -> Collocation | None:
-    """The motion in a direction; None when there is none, or none whose start differs by `turn` at most."""
+    """Return the motion in a direction; None when there is none whose start differs by at most `turn`."""
     if way.size == 0.0:
         return None
     engine.control[m.END] = engine.breaks[1]
@@ -85,11 +86,11 @@ def _along(engine: Engine, way: Direction, turn: float) -> Collocation | None:
     return None
 
 
-# Which of them -------------------------------------------------------------------------------------------------------
+# Choice of the branch ------------------------------------------------------------------------------------------------
 
 
 def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) -> list[Direction]:
-    """The ways that the choices leave; an error unless there is one at most."""
+    """Return the directions that satisfy the choices. Raise an error when there are several."""
     if len(ways) > 1:
         until = engine.start + min(way.reaching(WAY) for way in ways)
         changes = [_changes(engine, way, until) for way in ways]
@@ -107,14 +108,14 @@ def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) 
 
 
 def _changes(engine: Engine, way: Direction, until: float) -> dict[str, float]:
-    """Change of every joint coordinate up to a time, roughly."""
+    """Return the approximate change of every joint coordinate up to a time."""
     times = np.array([engine.start, until])
     seen = observe(engine, rows_of(engine, np.array([way.state(t) for t in times]), times))
     return {name: float(np.diff(series[0])[0]) for name, series in joint_coordinates(engine.model, seen).items()}
 
 
 def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple[Branch, ...]) -> None:
-    """Say which joint distinguishes the branches best, and how its coordinate changes on each."""
+    """Raise an error that names the joint that distinguishes the branches best, and its changes on each."""
     spread = {name: float(np.ptp([change[name] for change in changes])) for name in changes[0]}
     size = {name: max(abs(change[name]) for change in changes) for name in changes[0]}
     best = max(spread, key=lambda name: spread[name] / size[name] if size[name] > 0.0 else 0.0)
@@ -137,11 +138,11 @@ def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple
 
 @dataclass(frozen=True)
 class Direction:
-    """A way out of the pose. begin, end: times of the start and of the next break of the laws [s].
+    """A direction out of the pose. begin, end: times of the start and of the next break of the laws [s].
 
-    start: the state at the start.  way: change of the state after a unit of progress; size: of the coordinate that
-    changes most, in its unit.  speeds: change of the state at a unit of the progress's rate; none where the motion
-    begins at speed, not from rest.  progress: of the motion by time [s].
+    start: the state at the start.  way: change of the state after a unit of progress; size: largest change of a
+    coordinate, in its unit.  speeds: change of the state at a unit rate of progress; None when the motion begins at
+    speed, not from rest.  progress: of the motion by time [s].
     """
 
     begin: float
@@ -153,7 +154,7 @@ class Direction:
     progress: Callable[[float], float]
 
     def reaching(self, size: float) -> float:
-        """How long until the fastest coordinate has gone so many of its units, or to the next break [s]."""
+        """Return the time [s] until the fastest coordinate has moved `size` units, or to the next break."""
         from scipy.optimize import brentq  # slow to import, and few runs begin in a singular pose
 
         def beyond(span: float) -> float:
@@ -163,7 +164,7 @@ class Direction:
         return longest if beyond(longest) <= 0.0 else float(brentq(beyond, 0.0, longest, xtol=1e-15 * longest))
 
     def state(self, t: float) -> np.ndarray:
-        """State at a time, roughly."""
+        """Return the approximate state at a time."""
         progress = self.progress(t)
         if self.speeds is None or t == self.begin:
             return np.asarray(self.start + progress * self.way)
@@ -173,7 +174,7 @@ class Direction:
 
 
 def by_speeds(engine: Engine, y: np.ndarray) -> Direction:
-    """The direction of the state's own speeds."""
+    """Return the direction of the state's own speeds."""
     nq = engine.model.nq
     engine.attempt(y, engine.start)
     rate = engine.slope.copy()
@@ -188,13 +189,13 @@ def _steady(engine: Engine, y: np.ndarray, rate: np.ndarray) -> Direction:
 
 
 def directions(engine: Engine, y: np.ndarray) -> list[Direction]:
-    """All directions that the drives and the given velocities leave, from the state at the start; few or none."""
+    """Return all directions that drives and given velocities allow from the state at the start; few or none."""
     with preserved(engine):
         return _Pose(engine, y).directions()
 
 
 class _Pose:
-    """What there is of first and second order in the pose."""
+    """First and second order data of the closures in the pose."""
 
     def __init__(self, engine: Engine, y: np.ndarray) -> None:
         self.engine, self.nv, self.units = engine, engine.model.nv, engine.model.speed_scales
@@ -209,27 +210,27 @@ class _Pose:
         self.rates = np.array([self._rate(k) for k in range(self.nv)]).reshape(self.nv, engine.model.nq)
 
     def _rate(self, k: int) -> np.ndarray:
-        """Rates of the positions at a unit of speed k."""
+        """Return the rates of the positions at a unit of speed k."""
         speeds = np.zeros(self.nv)
         speeds[k] = 1.0
         self.engine.attempt(self._with(speeds), self.engine.start)
         return self.engine.slope[: self.engine.model.nq].copy()
 
     def moved(self, step: np.ndarray) -> np.ndarray:
-        """The state in the pose displaced by coordinates, in their units."""
+        """Return the state displaced from the pose by coordinates, in their units."""
         y = self.rest.copy()
         y[: self.engine.model.nq] += step @ self.rates
         return y
 
     def residual(self, step: np.ndarray, t: float) -> np.ndarray:
-        """Residuals of all closures after a displacement, at a time; lengths in units of the mechanism's size."""
+        """Return the residuals of all closures after a displacement, at a time; lengths over the mechanism's size."""
         model = self.engine.model
         self.engine.attempt(self.moved(step), t)
         along = model.arrays.table(m.CLOSURE_ROWS, self.engine.h)["kind"] == 0
         return np.asarray(self.engine.view(m.RESIDUAL) * np.where(along, 1.0 / model.length, 1.0))
 
     def directions(self) -> list[Direction]:
-        """By speeds that are asked for, by where the drives go from rest, or by forces from rest."""
+        """Return the directions: of given speeds, of drives that start from rest, or of forces from rest."""
         rows, target = self.asked.matrix, self.asked.target
         speeds, *_ = np.linalg.lstsq(rows, target, rcond=ZERO_SINGULAR)
         fastest = float(np.max(np.abs(speeds), initial=0.0))
@@ -246,17 +247,17 @@ class _Pose:
         return [self._driven(step, float(np.linalg.norm(went))) for step in self._tangents(base, _null(self.J), t)]
 
     def _with(self, speeds: np.ndarray) -> np.ndarray:
-        """The pose with speeds, in units of the coordinates."""
+        """Return the pose with speeds, in units of the coordinates."""
         y = self.rest.copy()
         y[self.engine.model.speeds] = speeds * self.units
         return y
 
     def _slope(self, step: np.ndarray) -> np.ndarray:
-        """Change of the state that a displacement is."""
+        """Return the change of the state by a displacement."""
         return self.moved(step) - self.rest
 
     def _drives_go(self) -> float | None:
-        """How long until the drives have opened the loops by about WAY; None when they do not move them."""
+        """Return the time until the drives have opened the loops by about WAY; None when they do not move them."""
         begin, end = self.engine.start, float(self.engine.breaks[1])
 
         def opened(span: float) -> float:
@@ -272,7 +273,7 @@ class _Pose:
         return span
 
     def _driven(self, step: np.ndarray, went: float) -> Direction:
-        """From rest, as far as the drives have opened the loops."""
+        """Return a direction from rest whose progress is the opening of the loops by the drives."""
         return self._from_rest(step, lambda t: float(np.linalg.norm(self.residual(np.zeros(self.nv), t))) / went)
 
     def _from_rest(self, step: np.ndarray, progress: Callable[[float], float]) -> Direction:
@@ -281,7 +282,7 @@ class _Pose:
         return Direction(begin, end, self.rest, self._slope(step), size, speeds, progress)
 
     def _fall(self, step: np.ndarray) -> list[Direction]:
-        """From rest under the forces, if they push this way along the branch."""
+        """Return the direction from rest under the forces, if they push this way along the branch."""
         t, y = self.engine.start, self.moved(step)
         closure_rows.select_rows(self.engine, y, t)
         if not self.engine.attempt(y, t):
@@ -292,7 +293,7 @@ class _Pose:
         return [self._from_rest(step, lambda at: 0.5 * push * (at - t) ** 2)]
 
     def _tangents(self, base: np.ndarray, free: np.ndarray, t: float | None) -> list[np.ndarray]:
-        """Displacements by about WAY with which the closures hold to second order; from rest both ways of a line."""
+        """Return displacements of about WAY with closures that hold to second order; from rest in both senses."""
         homogeneous, at = t is None, self.engine.start if t is None else t
 
         def open_by(alpha: np.ndarray) -> np.ndarray:
@@ -308,7 +309,7 @@ class _Pose:
 
 
 def _null(rows: np.ndarray) -> np.ndarray:
-    """Directions (k, nv) in which rows say nothing, orthonormal."""
+    """Return the null space of rows: orthonormal directions, shape (k, nv)."""
     _, values, Vt = np.linalg.svd(rows)
     rank = int(np.sum(values > ZERO_SINGULAR * values[0])) if len(values) and values[0] > 0.0 else 0
     return np.asarray(Vt[rank:])
@@ -330,7 +331,7 @@ class _Forms:
 
 
 def _quadratic(function: Callable[[np.ndarray], np.ndarray], k: int) -> _Forms:
-    """The function's values at unit steps, as a quadratic function."""
+    """Fit a quadratic function to the function's values at unit steps."""
     e, c = np.eye(k), function(np.zeros(k))
     plus, minus = [function(e[i]) for i in range(k)], [function(-e[i]) for i in range(k)]
     B = 0.5 * np.array([p - q for p, q in zip(plus, minus, strict=True)]).reshape(k, len(c)).T
@@ -343,7 +344,7 @@ def _quadratic(function: Callable[[np.ndarray], np.ndarray], k: int) -> _Forms:
 
 
 def _heard(forms: _Forms, free: np.ndarray) -> np.ndarray:
-    """Combinations of the free directions of which the forms say something, (k', k)."""
+    """Return the combinations of free directions on which the forms depend, (k', k)."""
     rows = np.concatenate([forms.A.reshape(-1, len(free)), forms.B]) if len(free) else np.zeros((0, 0))
     if not rows.size or not np.any(rows):
         return np.zeros((0, len(free)))
@@ -352,7 +353,7 @@ def _heard(forms: _Forms, free: np.ndarray) -> np.ndarray:
 
 
 def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:
-    """Zeros of the forms; of homogeneous ones those of unit length.  Gauss-Newton from starts of a fixed seed."""
+    """Return zeros of the forms, of homogeneous ones with unit length, by Gauss-Newton from starts of a fixed seed."""
     k, roots = forms.B.shape[1], list[np.ndarray]()
     size = max(float(np.max(np.abs(forms.A), initial=0.0)), float(np.max(np.abs(forms.B), initial=0.0)))
     for start in np.random.default_rng(0).normal(size=(SEARCH_STARTS * k, k)):

@@ -1,11 +1,11 @@
 """The motion over a singular pose, or out of one: a polynomial with the slopes of the equations at closed states.
 
-In the pose the equations have no unique solution, and next to it what a method errs is blown up, so that no method's
-stages can be there. The motion itself is smooth, on its branch. So it is a polynomial through a state at which all is
-well, with the slopes of the equations at points each of which is closed first (collocation, by Picard's iteration);
-points too close to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
-its branch. That there is one shows: the iteration converges, closing changes nothing, the loops are closed between the
-points as well, and one point less gives the same end. It depends on no method and on no tolerance.
+In the pose the equations have no unique solution, and near it they amplify the errors of a method, so that no method
+can place its stages there. The motion itself is smooth on its branch. So it is computed as a polynomial through a
+regular state, with the slopes of the equations at points whose loops are closed first (collocation, by Picard's
+iteration); points too close to the pose are omitted. A polynomial that is closed on both sides and smooth between them
+follows its branch. Four checks accept it: the iteration converges, closing changes nothing, the loops are closed
+between the points, and one point less gives the same end. It depends on no method and no tolerance.
 
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.7 (collocation).
 """
@@ -26,37 +26,36 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import ROUNDING as CLOSED
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_with, rows_of
 
-#: points of the polynomial; the end is one of them, the start is not
+#: number of points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
 NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
-#: points where a closure row has less than this fraction of the independence that it has at the best one are left out;
-#: or less than the second where the first leaves out more than MANY_POINTS: a slow motion is long close to the pose
+#: points where a closure row has less than this fraction of its independence at the best point are omitted; or less
+#: than the second fraction when the first omits more than MANY_POINTS: a slow motion is near the pose for long
 LEAST_INDEPENDENCE, LEAST_WHERE_SLOW, MANY_POINTS = 0.05, 0.005, 2
-#: so many must be left
+#: least number of remaining points
 FEWEST_POINTS = 6
-#: out of a singular pose slopes of so many points lead on; so often the speeds there are made those of the branch
+#: out of a singular pose, slopes of so many points predict the next; corrections of the start's speeds to the branch
 LED, SPEED_CORRECTIONS = 2, 4
-#: iterations, each of which leaves a fraction of the error; below CONVERGED they end, below STAGNATED if they are idle
+#: most iterations; they end when the change is below CONVERGED, or below STAGNATED without further progress
 RELAXATIONS, HELPS, CONVERGED, STAGNATED = 40, 0.3, 1e-13, 1e-10
-#: iterations are given up when one is so much worse than the last, and, after so many, when what the points leave
-#: unresolved does not fall
+#: the iteration fails when a change is larger than the last by this factor, and, after so many, when the unresolved
+#: part does not fall
 WORSE, EARLY_ITERATIONS = 10.0, 6
-#: what the polynomial may be off, in units of the coordinates and in fractions of the mechanism's size; and how much
-#: its end may change without one of the points, which is at least ten times what it is off
+#: admissible error of the polynomial, in units of the coordinates and in fractions of the mechanism's size; admissible
+#: change of its end without one of the points, at least ten times its error
 POLYNOMIAL_ERROR, SENSITIVE = 1e-10, 1e-9
-#: all of that may be so much more out of a pose in which the motion begins at rest: it is long close to the pose then
+#: these bounds are larger by this factor for a motion from rest out of a pose: it is near the pose for long
 SLOW_START = 100.0
-#: and where the polynomial is so short that a row has less than this fraction left at its ends, by the square of that
+#: and, when a row has less than this fraction of its independence at the ends, by the square of their ratio
 SHORT_FRACTION = 0.03
 
-#: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
-#: 1e-14, and six, with which a row must do in whose own pose they hold nothing
+#: pivot ratios of the closures at which accelerations have eight digits when loops are closed to 1e-14, and six digits,
+#: which must suffice when the row's own pose gives none
 CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
-#: first distance in time from a singular pose, as fraction of the polynomial over it, its factor from try to try, and
-#: how many tries there are
+#: first distance in time from a singular pose, as fraction of the polynomial over it, its factor between attempts, and
+#: the number of attempts
 FIRST_DISTANCE, WIDER, DISTANCE_TRIES = 1e-4, 2.0, 11
-#: where the state is evaluated, in units of the distance, and the weights there of the limit between: exact for
-#: quintics
+#: points of evaluation, in units of the distance, and their weights in the limit between them: exact for quintics
 SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
 
 
@@ -70,15 +69,15 @@ class Collocation:
 
     @property
     def end(self) -> float:
-        """Time up to which it holds [s]."""
+        """Time of its end [s]."""
         return self.start + self.span
 
     def states(self, times: np.ndarray) -> np.ndarray:
-        """States at times [s], shape (len(times), n)."""
+        """Return the states at times [s], shape (len(times), n)."""
         return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, self.series).T)
 
     def lay(self, engine: Engine) -> None:
-        """Leave it ready for the stepper, whose state is then that of its start."""
+        """Store the polynomial for the stepper, and its start as the stepper's state."""
         engine.view(m.Y)[:] = self.states(np.array([self.start]))[0]
         engine.view(m.COLLOCATION)[:] = self.series.ravel()
         engine.control[m.COLLOCATED] = self.span
@@ -86,9 +85,9 @@ class Collocation:
 
 @dataclass(frozen=True)
 class Lead:
-    """What leads out of a singular pose. state: by time [s], roughly.
+    """A prediction out of a singular pose. state: approximate state by time [s].
 
-    turn: by what fraction of the fastest the speeds at the start may become those of the branch; 0 leaves them alone.
+    turn: admissible correction of the start's speeds to those of the branch, as a fraction of the fastest; 0: none.
     """
 
     state: Callable[[float], np.ndarray]
@@ -97,7 +96,7 @@ class Lead:
 
 @dataclass(frozen=True)
 class Sample:
-    """A state, closed, at a point: its slope, and the independence of the closure rows; sound: whether it has these."""
+    """A closed state at a point: its slope, and the independence of the closure rows; sound: whether these exist."""
 
     y: np.ndarray
     slope: np.ndarray
@@ -116,40 +115,40 @@ class Sampler:
         self._kept = engine.w.copy(), engine.n.copy()
 
     def restore(self) -> None:
-        """Put the engine's memory back, but for the number of evaluations."""
+        """Restore the engine's memory, except the number of evaluations."""
         self.engine.w[:], self.engine.n[:] = self._kept
         self.engine.n[m.EVALUATIONS] += self.evaluations
 
     def closed(self, t: float, y: np.ndarray) -> tuple[np.ndarray, bool]:
-        """The state nearest to y with its loops closed, and whether there is one."""
+        """Return the state nearest to y with its loops closed, and whether there is one."""
         row = rows_of(self.engine, y[None], t, *self._contacts)
         seen = observe_with(self.engine, row, self._pieces[None, :], CLOSED)
         self.evaluations += 2
         return seen["state"][0].copy(), bool(seen["status"][0, 0] == m.OK)
 
     def sample(self, t: float, y: np.ndarray) -> Sample:
-        """What there is at a state after closing it."""
+        """Return the sample at a state after closing its loops."""
         there, sound = self.closed(t, y)
         sound &= self.attempt(t, there)
         return Sample(there, self.slope(), self.engine.independence(), sound)
 
     def attempt(self, t: float, y: np.ndarray) -> bool:
-        """Evaluate a state as it is."""
+        """Evaluate a state without closing its loops."""
         self.evaluations += 1
         return self.engine.attempt(y, t)
 
     def slope(self) -> np.ndarray:
-        """Slope of the state evaluated last."""
+        """Return the slope of the state evaluated last."""
         return self.engine.slope.copy()
 
 
 def collocate(
     sampler: Sampler, t: float, y: np.ndarray, span: float, begin: np.ndarray | Lead, fraction: float = 1.0
 ) -> Collocation | None:
-    """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
+    """Return the motion over a span from a closed state; None without a smooth and resolved one.
 
-    begin: the slope at the start; in a singular pose, which has none, what leads out of it.  fraction: what a closure
-    row has left of its most at the ends; rounding follows its square.
+    begin: the slope at the start; in a singular pose, which has none, a prediction out of it.  fraction: independence
+    of a closure row at the ends over its largest; rounding follows the square.
     """
     lead = begin if isinstance(begin, Lead) else None
     samples = _march(sampler, t, y, span, begin)
@@ -184,7 +183,7 @@ def collocate(
 def _iterate(
     sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, evaluated: list[Sample], size: np.ndarray
 ) -> tuple[list[Sample], np.ndarray, float] | None:
-    """Picard's iteration from the slopes at the nodes: what is there at last, its slopes, what closing changed."""
+    """Iterate (Picard) from the slopes at the nodes; return the last samples, their slopes, the change by closing."""
     slopes = np.array([s.slope for s in evaluated])
     weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
     states = y + span * weights @ slopes
@@ -208,7 +207,7 @@ def _iterate(
 
 
 def _speeds_at_start(engine: Engine, y: np.ndarray, nodes: np.ndarray, closed: list[np.ndarray]) -> np.ndarray:
-    """The state with the speeds that the branch itself has at the start, from those of closed states on it."""
+    """Return the state with the branch's own speeds at the start, extrapolated from closed states on it."""
     speeds, better = engine.model.speeds, y.copy()
     polynomial = np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, len(nodes) - 1), np.array(closed)[:, speeds])
     better[speeds] = chebyshev.chebval(-1.0, polynomial)
@@ -216,7 +215,7 @@ def _speeds_at_start(engine: Engine, y: np.ndarray, nodes: np.ndarray, closed: l
 
 
 def _march(sampler: Sampler, t: float, y: np.ndarray, span: float, begin: np.ndarray | Lead) -> list[Sample]:
-    """What there is at the nodes, each state predicted by the polynomial through the slopes before it."""
+    """Return samples at the nodes, each state predicted by the polynomial through the slopes before it."""
     nodes, slopes = ([], []) if isinstance(begin, Lead) else ([0.0], [begin])
     samples = list[Sample]()
     for x in NODES:
@@ -232,7 +231,7 @@ def _march(sampler: Sampler, t: float, y: np.ndarray, span: float, begin: np.nda
 
 
 def _share(sample: Sample, samples: list[Sample]) -> float:
-    """Least fraction that a row has of the most independence that it has at any sample."""
+    """Return the least ratio of a row's independence to its largest at any sample."""
     if not len(sample.independence):
         return 1.0
     best = np.max([s.independence for s in samples if s.sound], axis=0)
@@ -240,14 +239,14 @@ def _share(sample: Sample, samples: list[Sample]) -> float:
 
 
 def _far_from_singular(samples: list[Sample], least: float) -> np.ndarray:
-    """Which samples may be used."""
+    """Return a mask of the usable samples."""
     if not any(s.sound for s in samples):
         return np.zeros(len(samples), dtype=bool)
     return np.array([s.sound and _share(s, samples) >= least for s in samples])
 
 
 def _sizes(engine: Engine, y: np.ndarray, slopes: list[np.ndarray]) -> np.ndarray:
-    """What errors of positions and speeds are compared with; the rest of the state follows from them."""
+    """Return the scales of errors of positions and speeds; the rest of the state follows from them."""
     nq, unit = engine.model.nq, engine.model.state_scales
     fastest = float(np.max(np.abs(np.array(slopes)[:, :nq]) / unit[:nq], initial=0.0))
     size = np.where(np.arange(len(y)) < nq, 1.0, fastest) * unit
@@ -256,7 +255,7 @@ def _sizes(engine: Engine, y: np.ndarray, slopes: list[np.ndarray]) -> np.ndarra
 
 
 def _integrals(nodes: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Weights (ends, nodes) of values at the nodes in the integral of their polynomial from 0 to each end."""
+    """Return weights (ends, nodes) of values at the nodes in the integral of their polynomial from 0 to each end."""
     degree = len(nodes) - 1
     basis = [chebyshev.chebint(row, lbnd=-1.0) for row in np.eye(degree + 1)]
     integrals = 0.5 * np.array([chebyshev.chebval(2.0 * ends - 1.0, c) for c in basis]).T
@@ -264,7 +263,7 @@ def _integrals(nodes: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def _series(nodes: np.ndarray, slopes: np.ndarray, y: np.ndarray, span: float) -> np.ndarray:
-    """Chebyshev coefficients of the state, filled up to COLLOCATION_ROWS."""
+    """Return the Chebyshev coefficients of the state, padded to COLLOCATION_ROWS."""
     derivative = np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, len(nodes) - 1), slopes)
     series = np.zeros((m.COLLOCATION_ROWS, len(y)))
     series[: len(nodes) + 1] = 0.5 * span * chebyshev.chebint(derivative, lbnd=-1.0)
@@ -273,14 +272,14 @@ def _series(nodes: np.ndarray, slopes: np.ndarray, y: np.ndarray, span: float) -
 
 
 def _sensitivity(nodes: np.ndarray, slopes: np.ndarray, span: float, size: np.ndarray) -> float:
-    """Change of the end when one of the points in the middle is left out."""
+    """Return the change of the end when one of the points in the middle is omitted."""
     middle, end = len(nodes) // 2, np.ones(1)
     fewer = _integrals(np.delete(nodes, middle), end) @ np.delete(slopes, middle, axis=0)
     return float(np.max(np.abs(_integrals(nodes, end) @ slopes - fewer) * span / size))
 
 
 def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
-    """Largest violation of a closure between the points, in fractions of the mechanism's size or as sines."""
+    """Return the largest residual of a closure between the points, in fractions of the mechanism's size or as sines."""
     model = sampler.engine.model
     along = model.arrays.table(m.CLOSURE_ROWS, sampler.engine.h)["kind"] == 0
     scale, worst = np.where(along, model.length, 1.0), 0.0
@@ -293,19 +292,18 @@ def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
 
 
 def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
-    """Whether a row of the record is so close to a singular pose that its accelerations and forces are rounding."""
+    """Return True when a row is so near a singular pose that its accelerations and forces are rounding."""
     one = recording.record(row[None], len(engine.model.contacts))
     seen = engine.attempt(one.state[0], float(one.time[0]))
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
 
 def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> Blocks | None:
-    """What is observed of such a row: the limit from both sides, of each block one row; None without one.
+    """Return the outputs of such a row as the limit from both sides, one row of each block; None without a limit.
 
-    In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
-    of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states
-    there are those of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold
-    between them.
+    In the pose the closures' multipliers are not unique; on a smooth motion they are continuous across it. Their mean
+    over both sides, at one, two and three distances, is accurate to the sixth power of the distance.  The polynomial
+    gives the states there, also a little beyond its ends, under the laws that hold between them.
     clear: pivot ratio of the closures that the sides must have.
     """
     pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))

@@ -1,4 +1,4 @@
-"""Over a singular pose: where a polynomial motion is laid, what passes on it, and what is said where it ends there."""
+"""Passage over a singular pose: the polynomial motion, the poses on it, and refusals where the motion ends there."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.refusals.reach import beyond_reach, rest
 from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
 
-#: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this fraction of its
-#: unit, then half of that, and so on
+#: without a predicted pose the polynomial is first as long as the fastest coordinate takes for this fraction of its
+#: unit, then half, and so on
 FIRST_REACH, REACH_HALVINGS = 0.3, 10
-#: fraction of its unit that the fastest coordinate goes back for the rate of the rows' independence
+#: backward step of the fastest coordinate, in its unit, for the rate of the rows' independence
 BACKWARD_STEP = 1e-4
-#: least fraction of a row with which a polynomial may begin: where other motions are fast it must be short
+#: least independence of a row, over its largest, with which a polynomial may begin: with other fast motions it is short
 LEAST_FRACTION = 3e-4
-#: speeds in a pose that a polynomial led to may be off by this fraction of the fastest
+#: admissible error of speeds in a pose at the end of a polynomial, as a fraction of the fastest
 TURNING_BACK = 1e-6
-#: where no polynomial was found and a row has less than this fraction left, it is asked whether a loop's reach ends
+#: without a polynomial, and with less than this fraction of a row's independence, the end of a loop's reach is checked
 OBVIOUS = 0.02
-#: what is left of a segment after the polynomial, in fractions of its length, that belongs to it
+#: a polynomial that leaves less than this fraction of its length to the segment's end is extended to that end
 REMAINDER = 1e-3
-#: looks at a polynomial for the poses that it passes; singular values below this fraction of the largest vanish there
+#: samples of a polynomial in the search for its poses; singular values below this fraction of the largest are zero
 SAMPLED_TIMES, VANISHED = 32, 1e-6
-#: fractions of the polynomial to which a pose is found, and at which it is examined from both sides
+#: tolerance of a pose's time, and distance of the samples on both sides, as fractions of the polynomial
 POSE_TOLERANCE, SIDE_DISTANCE = 1e-7, 1e-4
-#: two looks that find a pose at times which differ by less than this fraction of the polynomial have found the same one
+#: poses at times that differ by less than this fraction of the polynomial are the same
 EQUAL_TIMES = 1e-6
 #: a loop whose speeds in the pose are below this fraction of those next to it is at rest
 LOOP_AT_REST = 1e-5
@@ -41,7 +41,7 @@ LOOP_AT_REST = 1e-5
 
 @dataclass(frozen=True)
 class Pass:
-    """A singular pose on the way. lost: ranks lost; joint: whose closure is dependent there."""
+    """A singular pose of the motion. lost: ranks lost; joint: the one whose closure is dependent there."""
 
     time: float
     condition: float
@@ -50,10 +50,10 @@ class Pass:
 
 
 def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
-    """Leave a polynomial ready for the stepper, over the singular pose ahead of it or out of one; and what it passes.
+    """Store a polynomial for the stepper, over the singular pose ahead or out of one; return it and its poses.
 
-    Where there is none yet, the stepper's memory says how close to the pose it shall go before it asks again, or that
-    it shall continue by itself.  SolverError when the mechanism comes to rest in the pose.
+    Without a polynomial, the stepper's memory contains the distance to the pose for the next attempt, or 0 for normal
+    steps.  Raises SolverError when the mechanism comes to rest in the pose.
     """
     control = engine.control
     t, y = float(control[m.TIME]), engine.view(m.Y).copy()
@@ -75,7 +75,7 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
 
 
 def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """The state closed, and its slope; as it is, and None, where the pose is too close for both."""
+    """Return the closed state and its slope; the given state and None when the pose is too near for both."""
     closed, sound = sampler.closed(t, y)
     if not sound or not sampler.attempt(t, closed):
         return y, None
@@ -83,9 +83,9 @@ def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def foresee_at_start(engine: Engine) -> bool:
-    """Put a pose close ahead of the stepper's state into its memory, where no step has led to; whether it is so.
+    """Predict a pose close ahead of a state before the first step; return True and store it for the stepper if so.
 
-    From how fast the closure rows come to depend on each other there.
+    The prediction uses the rate at which the closure rows lose their independence.
     """
     control, model = engine.control, engine.model
     t, sampler = float(control[m.TIME]), Sampler(engine)
@@ -104,9 +104,9 @@ def foresee_at_start(engine: Engine) -> bool:
 
 
 def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple[Collocation | None, float]:
-    """A polynomial over the pose that is foreseen and as far beyond it as the stepper's reach.
+    """Return a polynomial over the predicted pose, as far beyond it as the stepper's reach, and that reach.
 
-    Else None, and from how far before the pose it may be tried again: 0 where rounding leaves nothing to try.
+    Else return None, and the distance before the pose for the next attempt: 0 when rounding leaves none.
     """
     control = sampler.engine.control
     ahead, reach, fraction = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
@@ -120,7 +120,7 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
 
 
 def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
-    """A polynomial out of a pose, or over one that is too close to be predicted, by the motion's own scale."""
+    """Return a polynomial out of a pose, or over one too near to be predicted, with a length by the motion's scale."""
     nq = sampler.engine.model.nq
     sampler.attempt(t, y)
     rate = np.append(sampler.slope()[:nq], np.zeros(len(y) - nq))
@@ -134,22 +134,22 @@ def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
 
 
 def _within(sampler: Sampler, t: float, span: float) -> float:
-    """The span, or what is left of the segment."""
+    """Return the span, or the rest of the segment."""
     left = float(sampler.engine.control[m.END]) - t
     return left if (1.0 + REMAINDER) * span >= left else span
 
 
-# What passes --------------------------------------------------------------------------------------------------------
+# Poses on a polynomial ----------------------------------------------------------------------------------------------
 
 
 def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
-    """The singular poses on a polynomial; SolverError where the mechanism comes to rest in one."""
+    """Return the singular poses on a polynomial. Raise SolverError when the mechanism comes to rest in one."""
     from scipy.optimize import minimize_scalar  # slow to import, and most runs pass nothing
 
     engine, times = sampler.engine, np.linspace(made.start, made.end, SAMPLED_TIMES + 1)
 
     def least(t: float) -> float:
-        """The least singular value of all closures, whichever of them are solved for."""
+        """Return the least singular value of all closures, whichever of them are selected."""
         sampler.attempt(t, made.states(np.array([t]))[0])
         J = closure_rows.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
         return float(np.linalg.svd(J, compute_uv=False)[engine.mobility.rank - 1])
@@ -173,14 +173,14 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
 
 
 def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
-    """Where straight lines on both sides meet at zero: in the pose itself nothing can be determined."""
+    """Return the time at which straight lines on both sides reach zero: the pose itself determines nothing."""
     before, after = least(t - aside), least(t + aside)
     fraction = before / (before + after) if before + after > 0.0 else 0.5
     return float(np.clip(t - aside + 2.0 * aside * fraction, *bracket))
 
 
 def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
-    """The singular pose at a time; SolverError where the mechanism comes to rest in it."""
+    """Return the singular pose at a time. Raise SolverError when the mechanism comes to rest in it."""
     engine = sampler.engine
     sampler.attempt(t, made.states(np.array([t]))[0])
     J = engine.rows(m.JACOBIAN)
@@ -193,7 +193,7 @@ def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
 
 
 def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray) -> None:
-    """SolverError where the coordinates of the dependent closures do not move in the pose."""
+    """Raise SolverError when the coordinates of the dependent closures do not move in the pose."""
     moving = selection.coordinates_of_rows(engine.model, engine.h, np.max(np.abs(left), axis=1) > 0.1)
     speeds = engine.model.speeds
     times = np.append(np.linspace(made.start, made.end, SAMPLED_TIMES + 1), one.time)

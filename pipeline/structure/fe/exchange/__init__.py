@@ -1,1 +1,1 @@
-"""Matrices of other finite element codes, in and out."""
+"""Import and export of matrices of other finite element codes."""

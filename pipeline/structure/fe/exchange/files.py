@@ -1,4 +1,4 @@
-"""Mass and stiffness matrices in files: npz (with everything of a model) and MatrixMarket with a table of unknowns."""
+"""Files of mass and stiffness matrices: npz (complete models), and MatrixMarket with a table of unknowns."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from flexclear.pipeline.structure.fe.model import DOFS, Model
 
 COMPONENTS = (*DOFS, "internal")
 COLUMNS = ("node", "x", "y", "z", "component")
-#: bodies with more unknowns are exported without their integrals, which are then taken from the mass matrix
+#: bodies with more unknowns are exported without integrals, which the import then takes from the mass matrix
 MOMENTS_UP_TO = 1500
-#: what a file holds is in memory so many times while it is checked and brought into SI units
+#: peak memory of reading a file, as a multiple of its content: checks and conversion to SI units make copies
 COPIES = 4.0
 SMALLER = "condense the body, or leave out what no frame needs"
 OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
@@ -33,9 +33,9 @@ OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 @dataclass(frozen=True)
 class Table:
-    """What the rows of the matrices are, in units of the file.
+    """Meaning of the rows of the matrices, in units of the file.
 
-    node: number, shape (n,).  component: index into COMPONENTS, shape (n,).  position: shape (n, 3).
+    node: node number, shape (n,).  component: index into COMPONENTS, shape (n,).  position: shape (n, 3).
     """
 
     node: np.ndarray
@@ -45,7 +45,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Contents:
-    """A file's matrices and table; moments by their name in schema MATRICES, empty where the file has none."""
+    """Matrices and table of a file; moments by their names in schema MATRICES, empty where the file has none."""
 
     stiffness: sp.coo_array
     mass: sp.coo_array
@@ -54,7 +54,7 @@ class Contents:
 
 
 def table(model: Model) -> Table:
-    """What the unknowns of a model are, read from its rigid motions; nodes are numbered by position."""
+    """Return the table of a model's unknowns, read from its rigid motions; nodes are numbered by position."""
     moved = np.abs(model.rigid) > 0.0
     component = np.where(moved[:, :3].any(axis=1), np.argmax(moved[:, :3], axis=1), 3 + np.argmax(moved[:, 3:], axis=1))
     component[~moved.any(axis=1)] = COMPONENTS.index("internal")
@@ -63,7 +63,7 @@ def table(model: Model) -> Table:
 
 
 def write_npz(model: Model, path: Path) -> None:
-    """All that `shape.type = "matrices"` needs of a body, in SI units."""
+    """Write all that `shape.type = "matrices"` needs of a body to an npz file, in SI units."""
     rows = table(model)
     content: dict[str, Any] = {}
     for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
@@ -74,7 +74,7 @@ def write_npz(model: Model, path: Path) -> None:
 
 
 def write_matrix_market(model: Model, folder: Path) -> None:
-    """stiffness.mtx, mass.mtx and unknowns.csv in a folder, in SI units."""
+    """Write stiffness.mtx, mass.mtx and unknowns.csv to a folder, in SI units."""
     for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
         scipy.io.mmwrite(folder / f"{name}.mtx", sp.coo_array(matrix), symmetry="symmetric", precision=17)
     content = table(model)
@@ -86,7 +86,7 @@ def write_matrix_market(model: Model, folder: Path) -> None:
 
 
 def moments(model: Model) -> dict[str, Any]:
-    """Integrals per unknown: those of unit vectors."""
+    """Return the volume integrals per unknown, those of unit vectors, by their names in schema MATRICES."""
     integrals = model.integrate(np.eye(model.size))
     entries = []
     for k in range(3):
@@ -108,7 +108,7 @@ def moments(model: Model) -> dict[str, Any]:
 
 
 def read_npz(path: Path, where: str) -> Contents:
-    """A file as `write_npz` makes it; InputError when something is missing."""
+    """Read a file that `write_npz` wrote; raise InputError when an array is missing."""
     require_file(path, where)
     with reading(path, where, f"'{path.name}' holds no matrices", "write it with exchange.files"):
         data = _unpacked(path, where)
@@ -130,7 +130,7 @@ def read_npz(path: Path, where: str) -> Contents:
 
 
 def _unpacked(path: Path, where: str) -> dict[str, np.ndarray]:
-    """All arrays of an npz file by name; pickled objects, which would be code, are refused."""
+    """Return all arrays of an npz file by name; refuse pickled objects, which could run code."""
     with zipfile.ZipFile(path) as packed:
         need = COPIES * sum(entry.file_size for entry in packed.infolist())
     machine.require_memory(need, f"{where}: '{path.name}' unpacked", SMALLER)
@@ -141,7 +141,7 @@ def _unpacked(path: Path, where: str) -> dict[str, np.ndarray]:
 def _array(
     data: dict[str, np.ndarray], name: str, kinds: str, shape: tuple[int | None, ...] | None = (None,)
 ) -> np.ndarray:
-    """An array taken out of a file's; ValueError unless its numbers are of these kinds (NumPy) and it has this shape.
+    """Remove an array from those of a file and return it; raise ValueError unless NumPy kind and shape are as given.
 
     shape: None for any length, or, as a whole, for any shape.
     """
@@ -155,7 +155,7 @@ def _array(
 
 
 def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) -> Contents:
-    """Matrices of any code; InputError when they and the table do not fit together."""
+    """Read matrices of any code; raise InputError when matrices and table do not fit together."""
     matrices = [_matrix(path, where) for path in (stiffness, mass)]
     content = _table(unknowns, where, max(matrix.shape[0] for matrix in matrices))
     for path, matrix in zip((stiffness, mass), matrices, strict=True):
@@ -166,9 +166,9 @@ def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) 
 
 
 def _matrix(path: Path, where: str) -> sp.coo_array:
-    """A real matrix in a MatrixMarket file: coordinates or array, general or symmetric.
+    """Return the real matrix of a MatrixMarket file: coordinate or array layout, general or symmetric.
 
-    `scipy.io.mmread` (1.17) ends the process where a file was cut or a bit of it flipped: NumPy reads the numbers.
+    NumPy reads the numbers: `scipy.io.mmread` (1.17) ends the process where a file was cut or has a flipped bit.
     """
     require_file(path, where)
     with reading(path, where, f"'{path.name}' is no MatrixMarket file"):
@@ -177,8 +177,8 @@ def _matrix(path: Path, where: str) -> sp.coo_array:
             raise ValueError(f"its header says {field} {symmetry}; known: real or integer, general or symmetric")
         machine.require_memory(COPIES * 24.0 * count, f"{where}: '{path.name}'", SMALLER)
         with OPENERS.get(path.suffix, open)(path, "rt", encoding="utf-8") as file:
-            next(line for line in file if line.strip() and not line.startswith("%"))  # the sizes
-            # one more than there should be: packed files have no end that follows from their size
+            next(line for line in file if line.strip() and not line.startswith("%"))  # the line of sizes
+            # one entry more than the header gives: the end of a compressed file does not follow from its size
             held = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
         if layout == "array":
             return _dense(held.ravel(), rows, columns, symmetry == "symmetric")
@@ -186,7 +186,7 @@ def _matrix(path: Path, where: str) -> sp.coo_array:
 
 
 def _sparse(held: np.ndarray, rows: int, columns: int, count: int, symmetric: bool) -> sp.coo_array:
-    """The matrix with these lines of row, column and value; of a symmetric one they are one triangle."""
+    """Return the matrix with these lines of row, column and value; symmetric files hold one triangle."""
     if len(held) != count or (count and held.shape[1] != 3):
         raise ValueError(f"it holds {len(held)} entries where its header says {count}")
     index = held[:, :2].T - 1
@@ -197,7 +197,7 @@ def _sparse(held: np.ndarray, rows: int, columns: int, count: int, symmetric: bo
 
 
 def _dense(value: np.ndarray, rows: int, columns: int, symmetric: bool) -> sp.coo_array:
-    """The matrix with these columns, one after the other; of a symmetric one their parts below the diagonal."""
+    """Return the matrix from its columns, one after the other; symmetric files hold the parts below the diagonal."""
     if symmetric and rows == columns and len(value) == rows * (rows + 1) // 2:
         column, row = np.triu_indices(rows)
         whole = np.zeros((rows, columns))
@@ -216,7 +216,7 @@ def _component(text: str) -> int:
 
 
 def _table(path: Path, where: str, count: int) -> Table:
-    """The table of so many rows; one more is read, so that a longer one is noticed."""
+    """Read a table of `count` rows; one more row is read, so that a longer table is noticed."""
     require_file(path, where)
     hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
     with (

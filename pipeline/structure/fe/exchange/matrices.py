@@ -1,4 +1,4 @@
-"""Bodies given by matrices: checked and brought into SI units with their frames, and such a dataset as a model."""
+"""Bodies given by matrices: check them, convert them to SI units, and build a model from the dataset."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from flexclear.pipeline.structure.fe.solid.model import families, integrals
 from flexclear.pipeline.structure.fe.vtu import vtu
 from flexclear.pipeline.structure.sparse.multifrontal import cholesky
 
-#: length [m], mass [kg] and time [s] of each consistent system
+#: units of length [m], mass [kg] and time [s] of each consistent system
 SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
-#: asymmetry of a matrix, relative to its largest entry, that is taken for rounding of the file
+#: asymmetry of a matrix, relative to its largest entry, that counts as rounding in the file
 SYMMETRIC = 1e-9
 WHERE = "mesh recipe [shape]"
-#: entries of mass matrices that differ by less, relative to the largest or to the mass (times a length), are the same
+#: entries of mass matrices are equal when they differ by less, relative to the largest or to the mass (times a length)
 ALIKE = 1e-9
-#: strain forces of a rigid motion, relative to the largest term that they are a sum of
+#: largest strain force of a rigid motion, relative to the largest term of the sum
 UNSTRAINED = 1e-6
 
 
 def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
-    """The dataset (schema MATRICES); InputError for files that do not fit together."""
+    """Build the dataset (schema MATRICES); raise InputError for files that do not fit together."""
     where = f"{path} [shape]"
     contents = _read(recipe.shape, folder, where)
     stiffness, mass, position = _in_si(contents, recipe.shape.units, where)
@@ -55,7 +55,7 @@ def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
     data |= _frames(recipe, contents.table, position, path)
     try:
         made = xr.Dataset(data)
-    except ValueError as error:  # integrals in a file are of other sizes than its unknowns
+    except ValueError as error:  # integrals in a file have other sizes than its unknowns
         raise InputError(where, f"what the file holds does not fit together: {error}") from None
     kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "matrices")
     return conform(made, MATRICES, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
@@ -73,7 +73,7 @@ def _in_si(contents: Contents, system: str, where: str) -> tuple[sp.csr_array, s
     if system != "m-kg-s" and (contents.moments or np.any(contents.table.component == COMPONENTS.index("internal"))):
         raise InputError(where, "internal unknowns and integrals have no units of their own", 'units = "m-kg-s"')
     energy = mass * length**2 / time**2
-    # u = S u' makes K = e S^-1 K' S^-1, and M the same times the square of the unit of time
+    # with u = S u' the matrices are K = e S^-1 K' S^-1 and M likewise, times the square of the unit of time
     per_unit = sp.diags_array(np.where(contents.table.component < 3, 1.0 / length, 1.0))
     K, M = (sp.csr_array(per_unit @ matrix @ per_unit) for matrix in (contents.stiffness, contents.mass))
     return sp.csr_array(energy * K), sp.csr_array(energy * time**2 * M), length * contents.table.position
@@ -119,14 +119,14 @@ def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: st
 
 
 def as_vtu(mesh: xr.Dataset) -> bytes:
-    """The nodes as points, for ParaView."""
+    """Return the nodes as points in a VTU file, for ParaView."""
     node, first = np.unique(mesh["unknown_node"].values, return_index=True)
     points = mesh["unknown_position"].values[first]
     return vtu(points, "vertex", np.arange(len(points))[:, None], of_points={"node": node})
 
 
 def assemble(mesh: xr.Dataset) -> Model:
-    """The model of a dataset (schema MATRICES); InputError when the matrices are not those of a free body."""
+    """Build the model of a dataset (schema MATRICES); raise InputError unless the matrices are those of a free body."""
     component = np.array([COMPONENTS.index(name) for name in mesh["unknown_component"].values])
     positions, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
     K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
@@ -159,7 +159,7 @@ def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positions: np.nd
         problem = f"a rigid motion along {worst} strains the body ({left.max():.2g} of the largest term)"
         remedy = "export the free body, without supports; check the units and the table of unknowns"
         raise InputError(WHERE, problem, remedy)
-    # unknowns of one node belong together, even where axial, bending and torsion are independent of each other
+    # unknowns of one node are connected, even where axial, bending and torsion do not couple
     _, node = np.unique(positions, axis=0, return_inverse=True)
     linked = sp.coo_array(K)
     pairs = (np.ones(linked.nnz), (node.ravel()[linked.row], node.ravel()[linked.col]))
@@ -221,7 +221,7 @@ def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
 
 
 def _motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_array:
-    """Motion of frame k: that of its node, or the mean one of its nodes."""
+    """Return the motion of frame k, that of its node or the mean motion of its nodes, shape (6, ndof)."""
     tied, node = mesh["tie_node"].values[mesh["tie_frame"].values == k], mesh["unknown_node"].values
     count = 6 if len(tied) == 1 else 3
     rows = np.array([[np.flatnonzero((node == t) & (component == c))[0] for c in range(count)] for t in tied])
@@ -233,7 +233,7 @@ def _motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_array:
 
 
 def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
-    """Nodes as points; a component that a node does not have is drawn at rest."""
+    """Return the nodes as points to draw; components that a node lacks are drawn at rest."""
     numbers, first, index = np.unique(mesh["unknown_node"].values, return_index=True, return_inverse=True)
     count, position = len(numbers), mesh["unknown_position"].values[first]
     motion = models.node_motion(index.ravel(), component, count)
@@ -241,15 +241,15 @@ def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
 
 
 def _lumped(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions: np.ndarray) -> Slices | None:
-    r"""The nodes as slices, where the mass matrix lumps; None where it is not that of rigid nodes.
+    r"""Return the nodes as slices of mass, or None where the mass matrix is not that of rigid nodes.
 
     Most programs have every node of beams and shells as a small rigid body. A node's block of such a matrix, with the
     mass m, its centre c from the node and the inertia J about that centre, is
 
     .. math:: \begin{bmatrix} m 1 & -m\tilde c \\ m\tilde c & J - m\tilde c\tilde c \end{bmatrix},
 
-    and from it every integral over the volume follows (`fe.slices`). A consistent mass of nodes that turn does not tell
-    them: it has forgotten where in the element each fraction of mass is.
+    and every volume integral follows from it (`fe.slices`). A consistent mass of nodes that turn does not determine
+    them: the matrix does not hold where in the element each fraction of the mass is.
 
     M: shape (n, n).  node: number, shape (n,).  component: index of ux uy uz rx ry rz, (n,).  positions: [m], (n, 3).
     """
@@ -274,7 +274,7 @@ def _lumped(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions:
 
 
 def _blocks(M: sp.csr_array, index: np.ndarray, component: np.ndarray, count: int) -> np.ndarray | None:
-    """The mass of each node, shape (count, 6, 6), zero for what it lacks; None where nodes share mass or have none."""
+    """Return the mass of each node, (count, 6, 6), zero for missing unknowns; None where nodes couple or lack mass."""
     if component.max() >= 6:
         return None
     entries = sp.coo_array(M)
@@ -289,6 +289,6 @@ def _blocks(M: sp.csr_array, index: np.ndarray, component: np.ndarray, count: in
 
 
 def _axial(matrices: np.ndarray) -> np.ndarray:
-    """Vectors of the antisymmetric parts, shape (n, 3)."""
+    """Return the axial vectors of the antisymmetric parts, shape (n, 3)."""
     a = 0.5 * (matrices - matrices.transpose(0, 2, 1))
     return np.stack([a[:, 2, 1], a[:, 0, 2], a[:, 1, 0]], axis=1)

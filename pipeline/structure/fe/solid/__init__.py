@@ -1,1 +1,1 @@
-"""Solids: recipes, meshes made here or read from files, isotropic elasticity, and frames tied to regions."""
+"""Solids: recipes, meshes (generated or read from files), isotropic elasticity, and frames tied to regions."""

@@ -1,4 +1,4 @@
-r"""Stiffness and mass of isotropic solids, cells at once.
+r"""Stiffness and mass of isotropic solids, evaluated for many cells together.
 
 .. math:: 2U = \int \lambda (\nabla\cdot u)^2 + 2\mu\,\varepsilon:\varepsilon\,dV, \qquad
           2T = \int \rho\,\dot u\cdot\dot u\,dV
@@ -23,7 +23,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import symmetric
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, Sampled, sampled
 
-#: numbers of a cell matrix that are worked on at once; bounds the memory
+#: numbers of cell matrices that are evaluated together; bounds the memory
 AT_ONCE = 20_000_000
 
 
@@ -40,7 +40,7 @@ class Solid:
 
 
 def stiffness(solid: Solid) -> sp.csr_array:
-    """Stiffness of all nodes, x y z of each in turn, shape (3 n, 3 n)."""
+    """Return the stiffness of all nodes, x y z of each in turn, shape (3 n, 3 n)."""
     at = sampled(solid.element, ELEMENTS[solid.element].stiffness_order)
     (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
     data = np.zeros((len(indices), 3, 3))
@@ -64,7 +64,7 @@ def stiffness(solid: Solid) -> sp.csr_array:
 
 
 def mass(solid: Solid) -> sp.csr_array:
-    """Mass of the nodes for motion along one axis [kg], shape (n, n)."""
+    """Return the mass of the nodes for motion along one axis [kg], shape (n, n)."""
     at = sampled(solid.element, ELEMENTS[solid.element].mass_order)
     (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
     products = np.einsum("qa,qb->qab", at.value, at.value).reshape(len(at.weight), -1)
@@ -77,7 +77,7 @@ def mass(solid: Solid) -> sp.csr_array:
 
 
 def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) -> None:
-    """InputError when cells are inverted or flat at some quadrature point."""
+    """Raise InputError when cells are inverted or flat at some quadrature point."""
     blank = np.zeros(len(cells))
     solid = Solid(element, nodes, cells, blank, blank, blank)
     for order in {ELEMENTS[element].stiffness_order, ELEMENTS[element].mass_order}:
@@ -91,20 +91,20 @@ def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) 
 
 
 def _jacobian(solid: Solid, part: slice, at: Sampled) -> tuple[np.ndarray, np.ndarray]:
-    """Determinant (c, q) and matrix dX/dxi (c, q, 3, 3) of some cells."""
+    """Return determinant (c, q) and matrix dX/dxi (c, q, 3, 3) of the cells of a part."""
     X = solid.nodes[solid.cells[part]]
     J = np.einsum("cai,qaj->cqij", X, at.gradient, optimize=True)
     return np.linalg.det(J), J
 
 
 def gradients(solid: Solid, part: slice, at: Sampled) -> tuple[np.ndarray, np.ndarray]:
-    """Weights times volume (c, q) and gradients in space (c, q, nodes, 3)."""
+    """Return weights times volume (c, q) and spatial gradients of the shape functions (c, q, nodes, 3)."""
     volume, J = _jacobian(solid, part, at)
     return volume * at.weight, at.gradient[None] @ np.linalg.inv(J)
 
 
 def chunks(solid: Solid, at: Sampled, fields: int = 0) -> Iterator[slice]:
-    """Cells by so many that their matrices, or the gradients of so many fields, stay within `AT_ONCE` numbers."""
+    """Yield ranges of cells whose matrices, or gradients of `fields` fields, stay within `AT_ONCE` numbers."""
     a = solid.cells.shape[1]
     step = max(1, AT_ONCE // (9 * a * a + 6 * a * len(at.weight) + 24 * fields * max(a, len(at.weight))))
     for start in range(0, len(solid.cells), step):
@@ -112,7 +112,7 @@ def chunks(solid: Solid, at: Sampled, fields: int = 0) -> Iterator[slice]:
 
 
 def _pattern(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the pairs of nodes of each cell lie in a sparse matrix of nodes, (cells, pairs); its columns and rows."""
+    """Return entries of each cell's node pairs in a sparse node matrix, (cells, pairs); columns and row pointers."""
     n, a = len(solid.nodes), solid.cells.shape[1]
     rows = np.repeat(solid.cells, a, axis=1).ravel().astype(np.int64)
     columns = np.tile(solid.cells, (1, a)).ravel().astype(np.int64)

@@ -1,4 +1,4 @@
-"""Solid elements: nodes as VTK and meshio number them, shape functions and quadrature from scikit-fem."""
+"""Solid elements: node numbering of VTK and meshio, shape functions and quadrature of scikit-fem."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HEX_CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
 )
 HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-#: corners of each face, seen from outside anticlockwise; faces at x = 0, 1, y = 0, 1, z = 0, 1
+#: corners of each face, anticlockwise seen from outside; faces at x = 0, 1, y = 0, 1, z = 0, 1
 HEX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
 TET_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
 TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
@@ -27,7 +27,7 @@ class Element:
     """One type of cell.
 
     cell: meshio's name.  local: positions of its nodes in the reference cell, shape (nodes, 3).
-    faces: corner nodes of each face.  between: corners whose mean is close to a node that is no corner, by node.
+    faces: corner nodes of each face.  between: for each node that is no corner, the corners with a mean close to it.
     stiffness_order, mass_order: degrees that the quadrature integrates; the mass of cells with curved sides is exact.
     stress_order: degree of the quadrature at whose points stress is taken, eight in a hexahedron, one or four in a
         tetrahedron.
@@ -44,7 +44,7 @@ class Element:
 
     @property
     def face_nodes(self) -> np.ndarray:
-        """All nodes of each face, shape (faces, nodes): corners, those between each and the next, the middle."""
+        """All nodes of each face, shape (faces, nodes): corners, the nodes between neighbouring corners, the middle."""
         at = {frozenset(part): node for node, part in self.between.items()}
         faces = []
         for face in self.faces:
@@ -81,7 +81,7 @@ def _element(
     return Element(cell, basis, local, faces, between, *orders)
 
 
-#: by the recipe's name
+#: elements by the recipe's name
 ELEMENTS = {
     "hex8": _element("hexahedron", ElementHex1(), HEX_CORNERS, HEX_FACES, (), (3, 5, 3)),
     "hex20": _element("hexahedron20", ElementHexS2(), HEX_CORNERS, HEX_FACES, HEX_EDGES, (5, 9, 3)),
@@ -95,7 +95,7 @@ ELEMENTS = {
 
 @cache
 def sampled(name: str, order: int) -> Sampled:
-    """Shape functions of an element at the points of a quadrature of this order."""
+    """Return the shape functions of an element at the points of a quadrature of this order."""
     element = ELEMENTS[name]
     points, weight = get_quadrature(element.basis.refdom, order)
     return Sampled(*shape_functions(name, points), weight)
@@ -103,9 +103,9 @@ def sampled(name: str, order: int) -> Sampled:
 
 @cache
 def from_stress_points(name: str) -> np.ndarray:
-    """Values at the nodes from those at the points where stress is taken, shape (nodes, points).
+    """Return the matrix from values at the stress points to values at the nodes, shape (nodes, points).
 
-    By the polynomial through these points: trilinear in a hexahedron, linear or constant in a tetrahedron.
+    The polynomial through these points is trilinear in a hexahedron, linear or constant in a tetrahedron.
     """
     element = ELEMENTS[name]
     points, _ = get_quadrature(element.basis.refdom, element.stress_order)
@@ -120,7 +120,7 @@ def from_stress_points(name: str) -> np.ndarray:
 
 @cache
 def on_face(name: str, face: int) -> tuple[Sampled, np.ndarray]:
-    """Shape functions of an element at quadrature points of one of its faces, and the face's two directions (2, 3)."""
+    """Return an element's shape functions at quadrature points of one face, and the face's two directions (2, 3)."""
     element = ELEMENTS[name]
     corners = element.local[list(element.faces[face])]
     directions = np.array([corners[1] - corners[0], corners[-1] - corners[0]])
@@ -129,10 +129,10 @@ def on_face(name: str, face: int) -> tuple[Sampled, np.ndarray]:
 
 
 def shape_functions(name: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values (q, nodes) and gradients (q, nodes, 3) at points of the reference cell, shape (3, q)."""
+    """Return values (q, nodes) and gradients (q, nodes, 3) at points of the reference cell, shape (3, q)."""
     element = ELEMENTS[name]
     places = np.asarray(element.basis.doflocs)
-    # scikit-fem's order to VTK's
+    # from scikit-fem's node order to VTK's
     order = [int(np.argmin(np.abs(places - point).sum(axis=1))) for point in element.local]
     pairs = [element.basis.lbasis(points, i) for i in order]
     value = np.stack([np.broadcast_to(phi, points.shape[1:]) for phi, _ in pairs], axis=1)

@@ -1,4 +1,4 @@
-"""A mesh of one element type with named regions, whatever it came from; its boundary; its faults."""
+"""Meshes of one element type with named regions, from any source: their boundary and their checks."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from flexclear.pipeline.structure.fe.solid.elasticity import check_cells
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.recipe import Block, Cylinder
 
-#: a node that is no corner lies this near to the mean of its corners, as a fraction of the cell's size
+#: largest distance of a mid-side, face or cell node from the mean of its corners, as a fraction of the cell's size
 ASTRAY = 0.3
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """Nodes [m] (n, 3), cells (c, nodes of the element), and regions by name: of nodes, and of cells."""
+    """Nodes [m] (n, 3), cells (c, nodes per cell), and named regions of nodes and of cells."""
 
     element: str
     nodes: np.ndarray
@@ -30,7 +30,7 @@ class Geometry:
 
 
 def made(shape: Cylinder | Block) -> Geometry:
-    """The mesh of a shape that is made here."""
+    """Generate the mesh of a cylinder or block."""
     if isinstance(shape, Cylinder):
         n = shape.cells
         nodes, cells = lattice.cylinder(shape.radius, shape.length, n.along, n.across, n.rings)
@@ -43,20 +43,20 @@ def made(shape: Cylinder | Block) -> Geometry:
     bare = Geometry(shape.element, nodes, cells, {}, {"body": np.arange(len(cells))})
     start, end = (np.flatnonzero(np.abs(x - end_at) < 1e-9 * length) for end_at in (0.0, length))
     faces = face_nodes(bare, *boundary(bare))
-    # faces of the mantle have nodes at different x
+    # the nodes of mantle faces have different x
     mantle = np.unique(faces[np.ptp(x[faces], axis=1) > 1e-9 * length])
     regions = {"start": start, "end": end, "side": mantle}
     return Geometry(shape.element, nodes, cells, regions, bare.cell_regions)
 
 
 def boundary(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """Cell and number of the face, for each face that belongs to one cell only."""
+    """Return cell and face number of each face that belongs to one cell only."""
     first, count = _faces(geometry)
     return np.divmod(np.sort(first[count == 1]), len(ELEMENTS[geometry.element].faces))
 
 
 def _faces(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """Each face once: its first index among the faces of all cells in turn, and the number of cells that have it."""
+    """Return each face once: its first index among the faces of all cells in turn, and its number of cells."""
     faces = np.array(ELEMENTS[geometry.element].faces)
     corners = np.sort(geometry.cells[:, faces], axis=2).reshape(-1, faces.shape[1])
     _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
@@ -64,17 +64,17 @@ def _faces(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
 
 
 def face_nodes(geometry: Geometry, cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """All nodes of the faces, corners first, shape (faces, nodes)."""
+    """Return all nodes of the faces, corners first, shape (faces, nodes)."""
     return np.take_along_axis(geometry.cells[cells], ELEMENTS[geometry.element].face_nodes[faces], axis=1)
 
 
 def boundary_nodes(geometry: Geometry) -> np.ndarray:
-    """All nodes on the boundary, ascending."""
+    """Return all nodes on the boundary, ascending."""
     return np.unique(face_nodes(geometry, *boundary(geometry)))
 
 
 def check(geometry: Geometry, where: str) -> None:
-    """InputError for cells that are inverted, oddly numbered or there twice, and for a body in several pieces."""
+    """Raise InputError for inverted, wrongly numbered or overlapping cells, and for a body in several pieces."""
     _check_numbering(geometry, where)
     check_cells(geometry.element, geometry.nodes, geometry.cells, where)
     _check_overlap(geometry, where)

@@ -1,4 +1,4 @@
-"""Meshes from files, as far as meshio reads them: one type of solid cells, units as declared, regions by name."""
+"""Meshes from files that meshio reads: one type of solid cells, units as declared, named regions."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
 if TYPE_CHECKING:
     from meshio import Mesh
 
-#: names of types by meshio's
+#: names of elements by meshio's names
 NAMES = {element.cell: name for name, element in ELEMENTS.items()}
-#: cells that may come along; those of faces name surfaces
+#: other cells that a file may hold; those of faces name surfaces
 FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 BESIDES = ("vertex", "line", "line3", *FACES)
-#: an integer array of cell data with more values than this numbers the cells and names no regions
+#: an integer array of cell data with more distinct values numbers the cells and names no regions
 MOST_REGIONS = 1000
 REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
 
 
 def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
-    """The mesh in a file; InputError when it cannot be read, has no solid cells or several types of them."""
+    """Read the mesh in a file; raise InputError for an unreadable one, or unless it has one type of solid cells."""
     path = folder / shape.file
     mesh = read_mesh(path, where, f"meshio cannot read '{path.name}'", REWRITE)
     name = _cell_type(mesh, where)
@@ -59,7 +59,7 @@ def _cell_type(mesh: Mesh, where: str) -> str:
 
 
 def _cells(blocks: list[np.ndarray], nodes: int, points: int, where: str) -> np.ndarray:
-    """Nodes of all solid cells, shape (cells, nodes); readers may have lost some on the way."""
+    """Return the nodes of all solid cells, shape (cells, nodes); raise InputError where a reader lost some."""
     wrong = [np.shape(block)[1:] for block in blocks if np.shape(block)[1:] != (nodes,)]
     if wrong:
         problem = (
@@ -80,9 +80,9 @@ def _points(mesh: Mesh, where: str) -> np.ndarray:
 
 
 def _regions(mesh: Mesh, solid: list[int], renumber: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Regions of solid cells (indices into all of them) and of nodes (renumbered), by name.
+    """Return named regions of solid cells (indices into all of them) and of nodes (renumbered).
 
-    Numbers of faces and of solid cells may be counted apart: where a group has both, its nodes are those of the faces.
+    Faces and solid cells may be numbered separately: where a group has both, its nodes are those of the faces.
     """
     first = np.cumsum([0, *(len(mesh.cells[k].data) for k in solid)])
     of_cells: dict[str, list[np.ndarray]] = {}
@@ -102,7 +102,7 @@ def _regions(mesh: Mesh, solid: list[int], renumber: np.ndarray) -> tuple[dict[s
 
 
 def _cell_groups(mesh: Mesh) -> list[tuple[str, list[np.ndarray]]]:
-    """Named groups of cells: for each block, the indices that belong to it."""
+    """Return named groups of cells: for each block, the indices that belong to the group."""
     groups = list(mesh.cell_sets.items())
     for key, values in mesh.cell_data.items():
         different = np.unique(np.concatenate(values))
@@ -115,5 +115,5 @@ def _cell_groups(mesh: Mesh) -> list[tuple[str, list[np.ndarray]]]:
 
 
 def _of(mesh: Mesh, chosen: list[np.ndarray], dimension: int) -> list[np.ndarray]:
-    """Those of one dimension: Gmsh counts the tags of surfaces and of volumes apart."""
+    """Return the chosen cells of one dimension: Gmsh numbers the tags of surfaces and of volumes separately."""
     return [part if block.dim == dimension else part[:0] for part, block in zip(chosen, mesh.cells, strict=True)]

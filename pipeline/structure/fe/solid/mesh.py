@@ -20,7 +20,7 @@ from flexclear.pipeline.structure.fe.vtu import vtu
 
 
 def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
-    """The mesh dataset (schema SOLID); InputError for meshes and frames that cannot be meant."""
+    """Build the mesh dataset (schema SOLID); raise InputError for faulty meshes and frames."""
     where = f"{path} [shape]"
     shape = recipe.shape
     geometry = imported.read(shape, folder, where) if isinstance(shape, MeshFile) else geometries.made(shape)
@@ -41,7 +41,7 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
 
 
 def _materials(recipe: SolidRecipe, geometry: Geometry, path: str) -> tuple[list[str], np.ndarray]:
-    """Names of the regions with a material, and the region of each cell."""
+    """Return the names of the regions with a material, and the region of each cell."""
     if recipe.material is not None:
         return ["body"], np.zeros(len(geometry.cells), dtype=np.int64)
     names = list(recipe.materials)
@@ -63,7 +63,7 @@ def _materials(recipe: SolidRecipe, geometry: Geometry, path: str) -> tuple[list
 
 
 def _regions(geometry: Geometry) -> dict[str, Any]:
-    """The nodes of each named region that are on the boundary."""
+    """Return the boundary nodes of each named region, as variables of schema SOLID."""
     outside = geometries.boundary_nodes(geometry)
     regions = {name: np.intersect1d(nodes, outside) for name, nodes in ties.regions(geometry).items()}
     nodes, region = grouped(regions.values())
@@ -106,7 +106,7 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any
 
 
 def as_vtu(mesh: xr.Dataset) -> bytes:
-    """The solid with its material in the cells, for ParaView."""
+    """Return the solid with its material in the cells as a VTU file, for ParaView."""
     region = mesh["cell_region"].values
     data = {name: mesh[name].values[region] for name in ("youngs_modulus", "poisson", "density")}
     cell = ELEMENTS[mesh.attrs["element"]].cell

@@ -1,4 +1,4 @@
-"""Solids as models: displacements of the nodes, and six degrees of freedom of each frame that is tied rigidly."""
+"""Solids as models: displacements of the nodes, and six degrees of freedom of each rigidly tied frame."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from flexclear.pipeline.structure.fe.solid import elasticity, ties
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry, boundary, face_nodes
 
-#: families by direction, in the order that they take within a cluster of equal frequencies
+#: families by direction, in their order within a cluster of equal frequencies
 FAMILIES = ("y", "z", "x")
-#: components of a frame's motion by family: turning about z moves the body along y
+#: components of a frame's motion by family: a rotation about z moves the body along y
 MEMBER = {"y": (1, 5), "z": (2, 4), "x": (0, 3)}
-#: corners of the pieces of a face with so many nodes, which are in the order of `Element.face_nodes`
+#: corners of the pieces into which a face is cut, by its number of nodes, in the order of `Element.face_nodes`
 PIECES = {
     3: [[0, 1, 2]],
     4: [[0, 1, 2, 3]],
@@ -31,7 +31,7 @@ PIECES = {
 
 @dataclass(frozen=True)
 class Unknowns:
-    """From the model's vector to the displacements of all nodes, shape (3 n, ndof), and what the vector is made of."""
+    """Map from the model's vector to the displacements of all nodes, (3 n, ndof), and the meaning of its unknowns."""
 
     spread: sp.csr_array
     position: np.ndarray  #: [m], shape (ndof, 3)
@@ -40,7 +40,7 @@ class Unknowns:
 
 
 def assemble(mesh: xr.Dataset) -> Model:
-    """The model of a solid mesh (schema SOLID)."""
+    """Build the model of a solid mesh (schema SOLID)."""
     solid = solid_of(mesh)
     unknowns = unknowns_of(mesh)
     T = unknowns.spread
@@ -64,7 +64,7 @@ def assemble(mesh: xr.Dataset) -> Model:
 
 
 def integrals(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array, vectors: np.ndarray) -> Integrals:
-    """Volume integrals from the mass matrix of one axis: positions are as exact in its space as displacements are.
+    """Return volume integrals from the mass matrix of one axis; its space holds positions as exactly as displacements.
 
     line: [kg], shape (n, n).  nodes: [m], shape (n, 3).  spread: vector to displacements, shape (3 n, ndof).
     """
@@ -87,7 +87,7 @@ def integrals(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array, vecto
 
 
 def solid_of(mesh: xr.Dataset) -> Solid:
-    """Nodes, cells and materials of a mesh."""
+    """Return nodes, cells and materials of a mesh."""
     region = mesh["cell_region"].values
     E, nu, rho = (mesh[name].values[region] for name in ("youngs_modulus", "poisson", "density"))
     lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu))
@@ -95,7 +95,7 @@ def solid_of(mesh: xr.Dataset) -> Solid:
 
 
 def unknowns_of(mesh: xr.Dataset) -> Unknowns:
-    """The model's vector: displacements of the free nodes, then six unknowns of each rigid frame."""
+    """Build the model's vector: displacements of the free nodes, then six unknowns of each rigidly tied frame."""
     x, n = mesh["node_position"].values, mesh.sizes["node"]
     tie_node, tie_frame = mesh["tie_node"].values, mesh["tie_frame"].values
     rigid = np.flatnonzero(mesh["frame_tie"].values == "rigid")
@@ -123,7 +123,7 @@ def unknowns_of(mesh: xr.Dataset) -> Unknowns:
 
 
 def _motion(mesh: xr.Dataset, unknowns: Unknowns, k: int) -> sp.csr_array:
-    """Motion of frame k: its own unknowns, or the mean of its nodes."""
+    """Return the motion of frame k: its own unknowns, or the mean motion of its nodes, shape (6, ndof)."""
     if k in unknowns.first:
         return models.selection(unknowns.first[k] + np.arange(6), len(unknowns.position))
     tied = mesh["tie_frame"].values == k
@@ -133,7 +133,7 @@ def _motion(mesh: xr.Dataset, unknowns: Unknowns, k: int) -> sp.csr_array:
 
 
 def families(position: np.ndarray, component: np.ndarray) -> Families:
-    """Those of unknowns along x, y and z, of position (ndof, 3) [m] and component 0 .. 5, or more, (ndof,)."""
+    """Return the families of unknowns along x, y, z; position [m] (ndof, 3), component 0 .. 5, or more, (ndof,)."""
     member = np.zeros(len(position), dtype=np.int64)
     for rank, name in enumerate(FAMILIES):
         member[np.isin(component, MEMBER[name])] = rank
@@ -145,7 +145,7 @@ def families(position: np.ndarray, component: np.ndarray) -> Families:
 
 
 def surface(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes of the boundary, ascending, and the corners of its faces among them, shape (faces, corners).
+    """Return the nodes of the boundary, ascending, and the corners of its faces among them, shape (faces, corners).
 
     Faces with nodes between their corners are cut into several, where these nodes can be corners of all pieces.
     """
@@ -159,7 +159,7 @@ def surface(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
     used, cell = surface(mesh)
-    # a solid has no rotations of its own
+    # nodes of a solid have no rotations
     unknowns, rows = (
         (size * np.asarray(nodes)[:, None] + np.arange(3)).ravel() for size, nodes in ((3, used), (6, range(len(used))))
     )

@@ -29,11 +29,11 @@ class Cylinder(Part):
 
     type: Literal["cylinder"]
     radius: Annotated[Length, Positive]
-    """of the rod"""
+    """radius and length of the rod"""
     length: Annotated[Length, Positive]
-    """of the rod"""
+    """radius and length of the rod"""
     cells: CylinderCells
-    """how it is cut"""
+    """numbers of cells"""
     element: ElementName = "hex27"
     """type of the cells"""
 
@@ -45,7 +45,7 @@ class Block(Part):
     size: Position
     """lengths along x, y, z"""
     cells: tuple[Cells, Cells, Cells]
-    """numbers along x, y, z"""
+    """numbers of cells along x, y, z"""
     element: ElementName = "hex27"
     """type of the cells"""
 
@@ -61,9 +61,9 @@ class MeshFile(Part):
 
     type: Literal["mesh-file"]
     file: str
-    """the mesh, relative to the recipe"""
+    """path of the mesh, relative to the recipe"""
     length_unit: Literal["m", "cm", "mm", "um", "in"]
-    """unit of the file's coordinates; a file does not say"""
+    """unit of the coordinates, which the file does not state"""
 
 
 def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -99,22 +99,22 @@ class Sphere(Part):
     """Nodes on a sphere's surface."""
 
     centre: Position
-    """of the sphere"""
+    """centre and radius of the sphere"""
     radius: Annotated[Length, Positive]
-    """of the sphere"""
+    """centre and radius of the sphere"""
 
 
 class On(Part):
-    """Which nodes a frame is tied to: those of a named region, or on a surface; on the boundary of the body only."""
+    """Selects the nodes that a frame is tied to: those of a named region, or on a surface; boundary nodes only."""
 
     region: str | None = None
     """a named region of the mesh"""
     plane: Plane | None = None
-    """a surface"""
+    """surface on which the nodes lie"""
     cylinder: Tube | None = None
-    """a surface"""
+    """surface on which the nodes lie"""
     sphere: Sphere | None = None
-    """a surface"""
+    """surface on which the nodes lie"""
     tolerance: Annotated[Length, Positive] | None = None
     """largest distance from the surface; default: 1e-6 of the body's size"""
 
@@ -131,9 +131,9 @@ class TiedFrame(TurnedFrame):
     """A named frame tied to nodes: rigidly (RBE2; they move as one), or to their mean motion (RBE3; they deform)."""
 
     on: On
-    """which nodes"""
+    """selects the nodes"""
     tie: Literal["rigid", "mean"]
-    """rigid or mean"""
+    """rigid (RBE2) or mean (RBE3)"""
     position: Position | None = None
     """origin in the mesh frame; default: the centre of the nodes"""
 
@@ -142,9 +142,9 @@ class SolidRecipe(BodyRecipe):
     """A solid body."""
 
     shape: Annotated[Cylinder | Block | MeshFile, Field(discriminator="type")]
-    """the solid"""
+    """shape of the solid"""
     material: Isotropic | None = None
-    """of all cells, or materials: by region"""
+    """material of all cells; `materials` gives one for each region"""
     materials: dict[str, Isotropic] = Field(default_factory=dict)
     """elastic constants and density by region"""
     frames: Annotated[dict[str, TiedFrame], Field(min_length=1)]

@@ -1,4 +1,4 @@
-r"""Frames tied to nodes: which nodes, and how.
+r"""Frames tied to nodes: selection of the nodes, and rigid or mean ties.
 
 Rigid (RBE2): the nodes follow the frame, :math:`u_n = u_p + \theta\times(x_n - p)`. Mean (RBE3): the frame follows the
 nodes, with weights w (the area that a node represents) and :math:`c = \sum w x / \sum w`,
@@ -27,7 +27,7 @@ TOLERANCE = 1e-6
 
 
 def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
-    """Nodes that a rule selects, ascending; InputError when there are none or no such region."""
+    """Return the nodes that a rule selects, ascending; raise InputError for no node or an unknown region."""
     if on.region is not None:
         named = regions(geometry)
         if on.region not in named:
@@ -44,7 +44,7 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
 
 
 def regions(geometry: Geometry) -> dict[str, np.ndarray]:
-    """Nodes of each named region; where a region has faces and cells, those of its faces."""
+    """Return the nodes of each named region; of a region with faces and cells, those of the faces."""
     of_cells = {name: np.unique(geometry.cells[cells]) for name, cells in geometry.cell_regions.items()}
     return of_cells | geometry.node_regions
 
@@ -67,7 +67,7 @@ def _on_surface(geometry: Geometry, on: On) -> np.ndarray:
 
 
 def areas(geometry: Geometry, nodes: np.ndarray) -> np.ndarray:
-    """Integrals of the nodes' shape functions over the selected faces [m^2]; of scattered nodes, equal fractions."""
+    """Return integrals of the nodes' shape functions over the selected faces [m^2]; ones without a selected face."""
     weight = np.zeros(len(geometry.nodes))
     cells, faces = boundary(geometry)
     whole = np.isin(face_nodes(geometry, cells, faces), nodes).all(axis=1)
@@ -82,12 +82,12 @@ def areas(geometry: Geometry, nodes: np.ndarray) -> np.ndarray:
 
 
 def centre(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Weighted centre of points (n, 3)."""
+    """Return the weighted centre of points (n, 3)."""
     return weight @ x / weight.sum()
 
 
 def check_rank(x: np.ndarray, where: str) -> None:
-    """InputError when the nodes lie on a line, so that turning about it is not determined."""
+    """Raise InputError when the nodes lie on a line, about which a rotation is not determined."""
     spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
     if len(x) < 3 or spread[1] < 1e-9 * spread[0]:
         problem = f"{len(x)} nodes on a line cannot carry a frame's rotation"
@@ -95,7 +95,7 @@ def check_rank(x: np.ndarray, where: str) -> None:
 
 
 def mean(x: np.ndarray, weight: np.ndarray, nodes: np.ndarray, position: np.ndarray, size: int) -> sp.csr_array:
-    """Motion of a frame that follows nodes, as functionals of all nodes' displacements, shape (6, 3 size)."""
+    """Return the motion of a frame that follows nodes, as functionals of all displacements, shape (6, 3 size)."""
     w = weight / weight.sum()
     c = centre(x, w)
     r = x - c

@@ -1,4 +1,4 @@
-"""Reference conditions: what ties the body frame to the deforming body, and so which shapes are admissible.
+"""Reference conditions: they tie the body frame to the deforming body, and so define the admissible shapes.
 
 To add one: a function ``(model, given) -> Condition`` in `held` or `floating`, and a line below.
 """

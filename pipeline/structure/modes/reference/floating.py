@@ -22,16 +22,16 @@ FAMILY = "flexclear.pipeline.structure.modes.reference"
 
 
 def free_free(model: Model, given: Given) -> Condition:
-    """Normal modes of the free body; `given` plays no part."""
+    """Return the condition for normal modes of the free body; `given` is not used."""
     return _free(model, "the six rigid-body modes below the gap in the free body's frequencies were left out")
 
 
 def craig_chang(model: Model, given: Given) -> Condition:
-    """Six inertia-relief attachment modes per interface and normal modes of the free body.
+    """Return the condition for six inertia-relief attachment modes per interface and normal modes of the free body.
 
-    The attachment modes are the answers of the free body to unit forces and moments at the interfaces, balanced by its
+    The attachment modes are responses of the free body to unit forces and moments at the interfaces, balanced by its
     own inertia; with them the static response at the interfaces is exact. Their rigid motion depends on the supports
-    that they were computed with and is taken out by mass orthogonality.  InputError without interfaces.
+    of their computation and is removed by mass orthogonality.  Raises InputError without interfaces.
     Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
     """
     different(joined(given, 1, "attachment modes need an interface to load"))
@@ -40,18 +40,18 @@ def craig_chang(model: Model, given: Given) -> Condition:
 
 
 def residual_flexibility(model: Model, given: Given) -> Condition:
-    """Six residual attachment modes per interface and normal modes of the free body, with the residual mass.
+    """Return the condition for six residual attachment modes per interface and normal modes of the free body.
 
-    A residual attachment mode is what the retained normal modes miss of the answer to a unit load at an interface; it
+    A residual attachment mode is the part of the response to a unit load at an interface that the normal modes miss; it
     is orthogonal to them. The space is Craig and Chang's; the shapes stay independent however many normal modes are
-    retained.  InputError without interfaces.
+    retained.  Raises InputError without interfaces.
     Source: MacNeal (1971), Computers & Structures 1, 581-601; Rubin (1975), AIAA Journal 13, 995-1006.
     """
     return replace(craig_chang(model, given), residual=True)
 
 
 def mean_axis(model: Model, given: Given) -> Condition:
-    """The shapes of the condition that `given.of` names, linear and angular momentum taken out."""
+    """Return the condition that `given.of` names, with linear and angular momentum removed from its shapes."""
     if given.of is None or given.of == "mean-axis":
         problem = "mean-axis changes the shapes of another condition, and none is named"
         raise InputError("modes.of", problem, 'name it, as of = "craig-bampton"')
@@ -61,6 +61,6 @@ def mean_axis(model: Model, given: Given) -> Condition:
 
 
 def _free(model: Model, note: str, loaded: sp.csr_array | None = None) -> Condition:
-    """Normal modes of the free body without rigid ones, and attachment modes for `loaded` functionals."""
+    """Return the condition for normal modes of the free body, and attachment modes for `loaded` functionals."""
     none = sp.csr_array((0, model.size))
     return Condition(none, note, np.empty(0, dtype=int), none if loaded is None else loaded, mean_axes=True)

@@ -1,4 +1,4 @@
-"""The body frame is held by motions of named frames, which vanish in every normal mode.
+"""Reference conditions that hold motions of named frames; the held motions vanish in every normal mode.
 
 Source: Shabana, *Dynamics of Multibody Systems*, ch. 5 (reference conditions).
 """
@@ -15,16 +15,16 @@ from flexclear.pipeline.structure.modes.condition import WHERE, Condition, Given
 
 
 def cantilever(model: Model, given: Given) -> Condition:
-    """Normal modes with the first interface clamped; InputError without one."""
+    """Return the condition for normal modes with the first interface clamped; raise InputError without interfaces."""
     first = joined(given, 1, "a cantilever is clamped at an interface")[0]
     return _holding(first.motion, f"the body frame rides on '{first.name}', where all shapes vanish")
 
 
 def craig_bampton(model: Model, given: Given) -> Condition:
-    """Normal modes with all interfaces clamped, and six constraint modes per interface beyond the first.
+    """Return the condition for normal modes with clamped interfaces, and constraint modes of all but the first.
 
-    The static response to forces and moments at the interfaces is exact with any number of normal modes.
-    Raises InputError without interfaces, and when two are the same.
+    There are six constraint modes per interface. They make the static response to interface loads exact.
+    Raises InputError without interfaces, and when two interfaces are the same.
     Source: Craig & Bampton (1968), AIAA Journal 6, 1313-1319.
     """
     different(joined(given, 1, "a Craig-Bampton basis needs at least one interface"))
@@ -35,10 +35,10 @@ def craig_bampton(model: Model, given: Given) -> Condition:
 
 
 def fixed_fixed(model: Model, given: Given) -> Condition:
-    """Normal modes between clamped ends: of a beam its ends, of a solid its first interfaces, wherever the joints are.
+    """Return the condition for normal modes between clamped ends: a beam's ends, or a solid's first two interfaces.
 
-    Both ends stay rigid, so joints there see no compliance at all (which is the truth of this basis).
-    Raises InputError when there are no ends, or nothing is free between them.
+    The basis has no compliance at the ends, and joints there see none.
+    Raises InputError without two ends, or without coordinates between them.
     Source: Wang & Wang (2019), eq. (6), sec. 3.4 and Table 4.
     """
     if len(model.ends) < 2:
@@ -51,10 +51,10 @@ def fixed_fixed(model: Model, given: Given) -> Condition:
 
 
 def pinned_pinned(model: Model, given: Given) -> Condition:
-    """Normal modes between two pins: a simply supported body.
+    """Return the condition for normal modes between two pins: a simply supported body.
 
     Six conditions: the first interface does not move and does not turn about the line to the second; the second moves
-    along that line only.  Raises InputError without two interfaces at different points.
+    along that line only.  Raises InputError unless two interfaces are at different points.
     """
     first, second = joined(given, 2, "a pinned-pinned basis needs two interfaces")[:2]
     line = second.position - first.position
@@ -71,7 +71,7 @@ def pinned_pinned(model: Model, given: Given) -> Condition:
 
 
 def constrained(model: Model, given: Given) -> Condition:
-    """Normal modes with the motions ``frame.direction`` of `given.held` at zero; InputError for unknown ones."""
+    """Return the condition that holds motions ``frame.direction`` of `given.held`; raise InputError if unknown."""
     if not given.held:
         raise InputError("modes.held", "no motion is held", 'list at least six, as held = ["top.x", "top.rz", ...]')
     held = sp.csr_array(sp.vstack([_functional(model.interfaces, name) for name in given.held], format="csr"))
@@ -79,13 +79,13 @@ def constrained(model: Model, given: Given) -> Condition:
 
 
 def _holding(held: sp.csr_array, note: str, moved: np.ndarray | None = None) -> Condition:
-    """Normal modes with some functionals held, and constraint modes for `moved` ones."""
+    """Return the condition with some functionals held, and constraint modes for the `moved` ones."""
     none = sp.csr_array((0, held.shape[1]))
     return Condition(held, note, np.empty(0, dtype=int) if moved is None else moved, none)
 
 
 def _functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:
-    """The motion ``frame.direction`` in axes of the frame, shape (1, ndof); InputError for unknown names."""
+    """Return the motion ``frame.direction`` in the frame's axes, (1, ndof); raise InputError for unknown names."""
     frame_name, _, direction = name.partition(".")
     known = {frame.name: frame for frame in frames}
     if frame_name not in known:
@@ -97,7 +97,7 @@ def _functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:
 
 
 def _triad(along: np.ndarray) -> np.ndarray:
-    """Rows: the direction and two across it, parallel to axes of the mesh frame where it is."""
+    """Return the direction and two across it as rows; they are parallel to mesh axes where the direction is."""
     k = int(np.argmin(np.abs(along)))
     second = np.cross(along, np.eye(3)[k])
     second /= np.linalg.norm(second)

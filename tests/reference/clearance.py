@@ -1,4 +1,18 @@
-"""From contact to contact: runs with one clearance joint, events located, nothing shared with the engine."""
+r"""The mechanism with a clearance joint at A1: the contact, the platform, and runs from contact to contact.
+
+The contact of a ball in a socket, for the second derivations.
+
+Wang & Wang (2019), eqs. (21)-(29): both forces act at one point on the line of centres, on the
+ball's surface; friction acts against the sliding of the material points there.
+
+The platform on legs 2, 3 and 4, with leg 1 replaced by a contact force at the socket A1.
+
+The distance :math:`\lambda` from B1 to the socket's centre and the driven lengths of the other legs
+fix the platform.  Its six balances are linear in :math:`\ddot\lambda`, three axial leg forces and
+two horizontal forces at C.
+
+From contact to contact: runs with one clearance joint, events located, nothing shared with the engine.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -7,11 +21,123 @@ import numpy as np
 from scipy.integrate import DOP853, OdeSolution
 from scipy.optimize import brentq, minimize_scalar
 
-from tests.reference.clearance_contact import Touch
-from tests.reference.clearance_platform import GRID
-from tests.reference.ideal_motion import Motion
+from tests.reference import sps4
+from tests.reference.contact_solutions import modified_coulomb
+from tests.reference.ideal_motion import (
+    UP,
+    WEIGHTLESS,
+    Motion,
+    cross,
+    ideal,
+    leg_loads,
+    motion,
+    motion_at,
+    platform_demand,
+)
 
 Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The contact now: gap [m], rate of penetration [m/s], normal force [N], force on the ball.
+
+    reach: from the ball's centre to the point where the forces act [m].
+    """
+
+    gap: float
+    rate: float
+    normal: float
+    force: Array
+    reach: Array
+
+
+def press(
+    c: sps4.Contact, offset: Array, velocity: Array, ball_omega: Array, socket_omega: Array, latched: float | None
+) -> Touch:
+    """Geometry and forces of the contact; without a latched impact rate [m/s] there is no force.
+
+    offset, velocity: of the ball's centre relative to the socket's, world axes [m, m/s].
+    """
+    distance = np.sqrt(offset @ offset)
+    if latched is None or distance == 0.0:
+        rate = offset @ velocity / distance if distance > 0.0 else 0.0
+        return Touch(c.clearance - distance, float(rate), 0.0, np.zeros(3), np.zeros(3))
+    n = offset / distance
+    rate = n @ velocity
+    depth = max(0.0, distance - c.clearance)
+    normal = max(0.0, c.stiffness * depth**1.5 * (1.0 + c.hysteresis * rate / latched))
+    reach = c.ball_radius * n
+    slip = velocity + cross(ball_omega, reach) - cross(socket_omega, offset + reach)
+    slip = slip - (n @ slip) * n
+    speed = np.sqrt(slip @ slip)
+    force = -normal * n
+    if speed > 0.0:
+        mu = modified_coulomb(speed, c.mu_static, c.mu_dynamic, c.v_static, c.v_dynamic)
+        force = force - normal * mu * slip / speed
+    return Touch(c.clearance - distance, float(rate), float(normal), force, reach)
+
+
+GRID = 1e-4
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What one run needs: contact data, platform, gravity, and ideal poses as guesses for Newton's method."""
+
+    contact: sps4.Contact
+    plate: sps4.Plate
+    gravity: Array
+    guesses: list[Motion]
+
+
+def setting() -> Setting:
+    """The paper's mechanism in the first layout, without weight."""
+    times = np.arange(0.0, 0.18 + GRID / 2, GRID)
+    guesses = ideal(sps4.FIRST, times, np.where(times < 0.18, 1, -1))
+    return Setting(sps4.Contact(), sps4.platform(sps4.FIRST), WEIGHTLESS, guesses)
+
+
+def platform_motion(s: Setting, t: float, side: int, distance: float, rate: float) -> Motion:
+    """The platform's motion while the socket's distance from B1 has no second derivative."""
+    guess = s.guesses[min(max(round(t / GRID), 0), len(s.guesses) - 1)]
+    return motion(*_lengths(t, side, distance, rate, 0.0), guess)
+
+
+def _lengths(t: float, side: int, distance: float, rate: float, second: float) -> tuple[Array, Array, Array]:
+    lengths, rates, accelerations = sps4.leg_lengths(sps4.FIRST, t, side)
+    lengths[0], rates[0], accelerations[0] = distance, rate, second
+    return lengths, rates, accelerations
+
+
+def demand(s: Setting, m: Motion) -> tuple[Array, Array, Array]:
+    """Six balances of platform, legs 2..4 and central chain in the motion m; axes of and arms to legs 2..4."""
+    legs = leg_loads(*(part[1:] for part in m.legs), s.gravity)
+    arms = m.layout.A[1:] @ m.rotation.T
+    force, moment = platform_demand(m, s.plate, s.gravity)
+    force = force + legs.across_at_A.sum(axis=0) + sps4.CENTRAL_MASS * (m.acceleration - s.gravity[2]) * UP
+    moment = moment + cross(arms, legs.across_at_A).sum(axis=0)
+    return np.concatenate([force, moment]), legs.axis, arms
+
+
+def socket_acceleration(
+    s: Setting, t: float, side: int, distance: float, rate: float, m: Motion, point: Array, force: Array
+) -> float:
+    """Second derivative of the socket's distance from B1 [m/s^2].
+
+    m: the motion with zero for it. force: on leg 1's ball by the socket, acting at `point`, world axes.
+    """
+    base, axes, arms = demand(s, m)
+    # the demand is linear in the unknown: one more evaluation, at 1 m/s^2, gives its column
+    faster = motion_at(m.layout, m.height, m.rotation, *_lengths(t, side, distance, rate, 1.0))
+    matrix = np.zeros((6, 6))
+    matrix[:, 0] = demand(s, faster)[0] - base
+    matrix[:3, 1:4], matrix[3:, 1:4] = axes.T, cross(arms, axes).T
+    matrix[0, 4] = matrix[1, 5] = 1.0
+    applied = -np.concatenate([force, cross(point - m.height * UP, force)])
+    return float(np.linalg.solve(matrix, applied - base)[0])
+
+
 RightHandSide = Callable[[float, Array], Array]
 
 
@@ -49,7 +175,6 @@ class Result:
     state: Array
     platform: list[Motion]
     impacts: list[Impact]
-    evaluations: int
 
 
 @dataclass(frozen=True)
@@ -71,7 +196,6 @@ class Stretch:
     state: Array
     event: bool
     states: OdeSolution
-    evaluations: int
 
 
 def advance(rhs: RightHandSide, t: float, y: Array, end: float, tol: Tolerance) -> Array:
@@ -107,8 +231,8 @@ def integrate(
 
             times[-1] = brentq(gap, before, solver.t, xtol=1e-17, rtol=1e-15)
             y = advance(rhs, before, y_before, times[-1], tol)
-            return Stretch(t, times[-1], y, True, OdeSolution(times, pieces), solver.nfev)
-    return Stretch(t, end, solver.y, False, OdeSolution(times, pieces), solver.nfev)
+            return Stretch(t, times[-1], y, True, OdeSolution(times, pieces))
+    return Stretch(t, end, solver.y, False, OdeSolution(times, pieces))
 
 
 def largest(f: Callable[[float], float], times: Array) -> float:
@@ -137,12 +261,10 @@ def simulate(m: Mechanism, until: float = 0.18, tol: Tolerance | None = None) ->
     y, t, latched = m.start, 0.0, None
     samples: list[tuple[float, Array]] = [(0.0, y)]
     impacts: list[Impact] = []
-    evaluations = 0
     while t < until:
         # right-hand values at 0, left-hand ones at 0.18 s; at 0.09 s only the jerk differs
         side = 1 if t < 0.09 else -1
         piece = integrate(m, t, y, min(until, 0.09 if t < 0.09 else 0.18), side, latched, tol)
-        evaluations += piece.evaluations
         grid = [k * GRID for k in range(int(t / GRID + 1e-6) + 1, int(piece.end / GRID + 1e-6) + 1)]
         samples += [(x, piece.states(x)) for x in grid]
         if latched is not None:
@@ -159,7 +281,7 @@ def simulate(m: Mechanism, until: float = 0.18, tol: Tolerance | None = None) ->
             latched = None
     time, state = np.array([x for x, _ in samples]), np.array([y for _, y in samples])
     platform = [m.platform(x, 1 if x < 0.18 else -1, y) for x, y in samples]
-    return Result(time, state, platform, impacts, evaluations)
+    return Result(time, state, platform, impacts)
 
 
 def table(result: Result, every: int = 10) -> dict[str, list[float]]:

@@ -1,4 +1,4 @@
-"""Points of a sweep whose steps are taken side by side: each is what it is alone, to the last bit."""
+"""Points of a sweep whose evaluations are batched: each is what it is alone, to the last bit."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def alone(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> li
     return [sweep_points._point(runner(scene, **asked), scene, point) for point in points]
 
 
-def abreast(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
+def batched(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
     return sweep_points._together(runner(scene, **asked), scene, points)
 
 
@@ -47,7 +47,7 @@ def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
 
 
 @pytest.fixture
-def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+def batched_evaluations(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The lanes of each group."""
     proper, made = batched_evaluation.LaneGroup, list[int]()
 
@@ -60,7 +60,7 @@ def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_points_are_the_same_to_the_last_bit_whichever_are_evaluated_with_them(
-    root: Path, evaluations_abreast: list[int]
+    root: Path, batched_evaluations: list[int]
 ) -> None:
     """More of them than lanes, in each other numbers, also of the laws of time and of the method; of all lengths."""
     ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.5})
@@ -69,10 +69,10 @@ def test_points_are_the_same_to_the_last_bit_whichever_are_evaluated_with_them(
     points += [{"body.ball.mass": mass} for mass in (0.5, 2.0, 3.0)] + [{"solver.rtol": 1e-6}]
     known = alone(ball, points, error=True)
     assert len({float(p.values["contact.peak_force.largest"]) for p in known}) == len(points)
-    assert_same(abreast(ball, points, error=True), known)
-    assert_same(abreast(ball, points[::-1], error=True), known[::-1])
-    assert_same(abreast(ball, points[:3], error=True), known[:3])
-    assert evaluations_abreast == ([points_of.TOGETHER] * 3 if not INTERPRETED else [])
+    assert_same(batched(ball, points, error=True), known)
+    assert_same(batched(ball, points[::-1], error=True), known[::-1])
+    assert_same(batched(ball, points[:3], error=True), known[:3])
+    assert batched_evaluations == ([points_of.TOGETHER] * 3 if not INTERPRETED else [])
 
 
 @pytest.mark.parametrize(
@@ -87,11 +87,11 @@ def test_points_of_a_closed_mechanism_with_friction_are_the_same_to_the_last_bit
     keep = ("platform.velocity.largest", "A1.peak_force", "A1.impact_times.count")
     known = alone(paper, points, keep=keep)
     assert all(p.values["A1.impact_times.count"] > 5 for p in known)
-    assert_same(abreast(paper, points, keep=keep), known)
+    assert_same(batched(paper, points, keep=keep), known)
 
 
 def test_points_whose_friction_takes_different_numbers_of_turns_are_the_same_to_the_last_bit(
-    root: Path, evaluations_abreast: list[int]
+    root: Path, batched_evaluations: list[int]
 ) -> None:
     """Next to one without friction, and one that friction jams on the way."""
     crank = load_scene(root / "scenes/checks/rubbing_slider_crank.toml", override={"time.end": 0.06})
@@ -100,8 +100,8 @@ def test_points_whose_friction_takes_different_numbers_of_turns_are_the_same_to_
     keep = ("crank.angular_velocity.final", "P.bearing_load.largest")
     known = alone(crank, points, keep=keep)
     assert [bool(p.refused) for p in known] == [False, False, False, True, False, False]
-    assert_same(abreast(crank, points, keep=keep), known)
-    assert evaluations_abreast == ([points_of.TOGETHER] if not INTERPRETED else [])
+    assert_same(batched(crank, points, keep=keep), known)
+    assert batched_evaluations == ([points_of.TOGETHER] if not INTERPRETED else [])
 
 
 def test_a_point_that_fails_fails_alone_and_in_the_same_words(root: Path) -> None:
@@ -113,7 +113,7 @@ def test_a_point_that_fails_fails_alone_and_in_the_same_words(root: Path) -> Non
     known = alone(ball, points)
     assert [bool(p.refused) for p in known] == [False, True, True, True, False, False, False]
     assert len({p.refused for p in known}) == 4
-    assert_same(abreast(ball, points), known)
+    assert_same(batched(ball, points), known)
 
 
 def test_sections_and_members_of_points_are_the_same_to_the_last_bit(root: Path) -> None:
@@ -122,12 +122,12 @@ def test_sections_and_members_of_points_are_the_same_to_the_last_bit(root: Path)
     )
     points = [{"load.torque.force.amplitude": value} for value in (0.9, 1.2, 1.5)]
     keep = ("bob.angular_velocity.sections",)
-    assert_same(abreast(pendulum, points, keep=keep), alone(pendulum, points, keep=keep))
+    assert_same(batched(pendulum, points, keep=keep), alone(pendulum, points, keep=keep))
     ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.3})
     points = [{"joint.contact.normal.restitution": e} for e in (0.5, 0.6, 0.7)]
     known = alone(ball, points, members=2)
     assert all(p.deviation["contact.peak_force.largest"] > 0.0 for p in known)
-    assert_same(abreast(ball, points, members=2), known)
+    assert_same(batched(ball, points, members=2), known)
 
 
 def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() -> None:

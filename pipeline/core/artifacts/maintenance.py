@@ -1,4 +1,4 @@
-"""The cache as a whole: what is in it, whether it is whole, what nobody needs any more."""
+"""Maintenance of the cache: its contents, their integrity, and artifacts that are no longer needed."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from flexclear.pipeline.core.artifacts.disk import digest_of, sha256
 from flexclear.pipeline.core.artifacts.store import FAMILY, PARTIAL, Record, Store, read_record
 from flexclear.pipeline.core.system import platforms
 
-#: what is next to artifacts and is none of their files
+#: suffixes of files next to artifacts that belong to none
 NO_ARTIFACT = (".json", ".lock", ".part", ".tmp")
 DAY = 86400.0
-#: a file of an artifact may be so long without its record [s]
+#: time for which a file of an artifact may lack its record [s]
 YOUNG = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
 class Artifact:
-    """A record that can be read, bytes of its files and of itself, and seconds since it was made."""
+    """A readable record, the size of its files and of itself [bytes], and the time since it was written [s]."""
 
     record: Record
     size: int
@@ -30,7 +30,7 @@ class Artifact:
 
 @dataclass(frozen=True, slots=True)
 class Inventory:
-    """What is in a store. damaged: sentences.  unreadable: records.  orphans: files that no record names."""
+    """Contents of a store. damaged: sentences. unreadable: records. orphans: files that no record names."""
 
     artifacts: tuple[Artifact, ...]
     damaged: tuple[str, ...]
@@ -39,7 +39,7 @@ class Inventory:
 
 
 def inventory(store: Store, *, whole: bool) -> Inventory:
-    """Everything below the cache folder; with `whole` every file is read and compared with its digest."""
+    """List all contents of the cache folder; with `whole` compare every file with its digest."""
     artifacts, damaged, unreadable, known = [], [], [], set()
     for path in _records(store):
         record = read_record(path)
@@ -51,17 +51,17 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
         fault = store.fault(record) if whole else None
         if fault is not None:
             damaged.append(fault)
-        there = [file.stat() for file in files if file.is_file()]
-        artifacts.append(Artifact(record, sum(s.st_size for s in there), time.time() - path.stat().st_mtime))
+        statuses = [file.stat() for file in files if file.is_file()]
+        artifacts.append(Artifact(record, sum(s.st_size for s in statuses), time.time() - path.stat().st_mtime))
     damaged += [f"{store.below(path)} is no record, or damaged" for path in unreadable]
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
 
 def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
-    """Artifacts that no folder of results shows, and that were made more than `older` seconds ago.
+    """Return artifacts that no folder of results shows, and that were written more than `older` seconds ago.
 
-    What the shown ones were made from stays as well: without it they would be made again. A sweep shows its families,
-    all of whose points stay, since it continues with them.
+    Inputs of shown artifacts stay as well: without them they would be computed again. A sweep shows its families, all
+    of whose points stay, since the sweep continues with them.
     """
     made = {artifact.record.digest: artifact.record for artifact in listed.artifacts}
     in_use, waiting = set(), list(_shown(store))
@@ -72,26 +72,26 @@ def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
             above = (digest for fact, digest in record.facts.items() if fact.startswith("input "))
             waiting += [made[digest] for digest in above if digest in made]
     of_sweeps = {stage for stage, key in in_use if key == FAMILY}
-    mine = [a for a in listed.artifacts if a.age > older and a.record.stage not in of_sweeps]
-    return [a for a in mine if (a.record.stage, a.record.key) not in in_use]
+    candidates = [a for a in listed.artifacts if a.age > older and a.record.stage not in of_sweeps]
+    return [a for a in candidates if (a.record.stage, a.record.key) not in in_use]
 
 
 def remove(store: Store, artifact: Artifact) -> None:
-    """Its record first, so that at no moment there is a record of files that are gone."""
+    """Remove an artifact, its record first, so that at no moment a record names files that are gone."""
     record = artifact.record
     with store.lock(record.stage, record.key):
         for name in ("json", *record.files):
-            take_away(store.path(record.stage, record.key, name))
+            remove_file(store.path(record.stage, record.key, name))
 
 
-def take_away(path: Path) -> None:
+def remove_file(path: Path) -> None:
     """Remove a file; a folder of its name is renamed."""
     platforms.set_aside(path)
     path.unlink(missing_ok=True)
 
 
 def shown_faults(store: Store, below: Path) -> list[str]:
-    """Shown files in a folder of results that differ from what was shown: sentences.
+    """Return sentences on the files in a folder of results that differ from the artifacts shown there.
 
     A shown file has the content of one of the artifacts whose records are in its folder's ``.facts``.
     """
@@ -108,7 +108,7 @@ def shown_faults(store: Store, below: Path) -> list[str]:
 
 
 def find(store: Store, what: str) -> Record | None:
-    """The record behind a key or its beginning, or behind a shown file."""
+    """Return the record with a key, or a unique beginning of a key, or of a shown file; None without a match."""
     path = Path(what)
     if path.is_file():
         for facts in (path.parent / ".facts").glob("*.json"):
@@ -127,9 +127,9 @@ def _same(path: Path, other: Path) -> bool:
 
 
 def _records(store: Store) -> list[Path]:
-    """Of all stages; those of a sweep's points have a folder for each family.
+    """Return the paths of the records of all stages; stages of sweeps have a folder for each family.
 
-    A memo of a whole command lies next to the stages, and a file of an artifact may be called ``<key>.index.json``.
+    The memo of a whole command lies next to the stages, and a file of an artifact may be called ``<key>.index.json``.
     """
     cache = store.root / "cache"
     return sorted(path for path in cache.rglob("*.json") if path.parent != cache and "." not in path.stem)
@@ -143,7 +143,7 @@ def _shown(store: Store) -> Iterator[Record]:
 
 
 def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
-    """Files of artifacts whose record is gone: a process died between them. Young ones may be about to get one."""
+    """Yield files of artifacts without a record, as of a process that died; young files may be about to get one."""
     for path in sorted((store.root / "cache").rglob("*")):
         ours = path.is_file() and path not in known and not path.name.endswith(NO_ARTIFACT)
         if ours and time.time() - path.stat().st_mtime > YOUNG:
