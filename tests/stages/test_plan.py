@@ -138,16 +138,6 @@ def test_vibrations_about_a_ramp_and_a_step_have_their_closed_form_amplitudes():
     np.testing.assert_allclose(step, np.broadcast_to(5.0 / omega**2, step.shape), rtol=1e-11)
 
 
-def test_a_force_that_ceases_at_once_leaves_the_vibration_that_it_had_built_up_until_then():
-    """After a time T under F: 2 F/omega^2 |sin(omega T/2)|; the break is recorded from both sides."""
-    first, omega = np.linspace(0.0, 0.2, 21), np.array([40.0, 900.0])
-    time = np.concatenate([first, first[-1] + np.linspace(0.0, 0.1, 11)])
-    amplitude = vibration(np.where(np.arange(32)[:, None] < 21, 5.0, 0.0) * np.ones(2), omega, time)
-    np.testing.assert_allclose(amplitude[:21], np.broadcast_to(5.0 / omega**2, (21, 2)), rtol=1e-11)
-    left = 10.0 / omega**2 * np.abs(np.sin(0.1 * omega))
-    np.testing.assert_allclose(amplitude[21:], np.broadcast_to(left, (11, 2)), rtol=1e-11)
-
-
 def test_the_recommended_elements_give_the_requested_error(tmp_path: Path):
     """The estimated error of a frequency on few elements is the true one; as many elements as recommended give the
     requested error."""

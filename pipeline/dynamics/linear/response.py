@@ -74,13 +74,15 @@ def response(
     unknown = Response(np.nan, np.nan, np.nan, {q.name: np.inf for q in chosen})
     if not bundles or not clearance_response.knows_all_joints(model):
         return unknown
+    once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both sides
+    time = time[once]
     held = [
         n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
     ]
     loads = joint_wrenches(motions, held)
-    forces = np.hstack([clearance_response.modal_forces(motions, n, b, loads) for n, b in bundles.items()])
+    forces = np.hstack([clearance_response.modal_forces(motions, n, b, loads)[once] for n, b in bundles.items()])
     joints, responses = constraints(model.mechanism), list[Response]()
-    for row in np.unique(np.linspace(0, len(time) - 1, RESPONSE_POSES).astype(int)):
+    for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
         assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
         if assembled is None:
@@ -194,7 +196,7 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
     f = forces @ assembled.modes[-forces.shape[1] :]
     still = f / omega**2
     amplitude = vibration(f, omega, time)
-    rate = np.vstack([slopes(still, time), np.zeros((1, len(omega)))])
+    rate = np.gradient(still, time, axis=0) if len(time) > 1 else np.zeros(still.shape)
     influence = {}
     for q in chosen:
         if q.kind in (*POSITIONS, *RATES) and q.owner in assembled.model.mechanism.link_of:
@@ -236,12 +238,6 @@ def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
     return int(excited[0]) if len(excited) else None
 
 
-def slopes(values: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Return the rates of values between rows, (rows - 1, n); none where a break is recorded from both sides."""
-    steps = np.diff(time)[:, None]
-    return np.divide(np.diff(values, axis=0), steps, out=np.zeros((len(steps), values.shape[1])), where=steps > 0.0)
-
-
 def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
     r"""Return amplitudes of the vibrations about the quasi-static motion, from rest, shape (rows, vibrations).
 
@@ -250,12 +246,12 @@ def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
     """
     still = f / omega**2
     steps = np.diff(time)
-    slope, jump = slopes(still, time), np.diff(still, axis=0) * (steps == 0.0)[:, None]
+    slope = np.diff(still, axis=0) / steps[:, None]
     z = -still[0] + 1j * slope[0] / omega  # d + i times minus its rate over omega, in the turning frame
     amplitude = np.empty(still.shape)
     amplitude[0] = np.abs(z)
     for k, step in enumerate(steps):
-        z = z * np.exp(1j * omega * step) - jump[k]
+        z = z * np.exp(1j * omega * step)
         if k + 1 < len(slope):
             z = z + 1j * (slope[k + 1] - slope[k]) / omega
         amplitude[k + 1] = np.abs(z)
