@@ -178,7 +178,7 @@ def _sensed(engine: Engine, rows: np.ndarray, body: str) -> Samples:
     """Position and velocity of a rigid body's centre of mass in rows of the record, as the integration left them."""
     model = engine.model
     link = model.mechanism.link_of[body]
-    frame, place = frames(engine, rows).links[:, link], model.links[link].places[body]
+    frame, place = frames(engine, rows)[:, link], model.links[link].places[body]
     arm = frame["axes"] @ (place.p + place.R @ np.array(model.scene.body[body].com))  # type: ignore[union-attr]
     position = frame["origin"] + arm + model.mechanism.origin
     return Samples(rows[:, 0], position, frame["velocity"] + np.cross(frame["omega"], arm))

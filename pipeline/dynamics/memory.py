@@ -76,12 +76,12 @@ def _sizes(declared: str) -> list[int]:
 
 def _stretches(declared: str) -> list[int]:
     """Return the next indices of h's header, for stretches of w: "name:length", or the name where `_floats` sets it."""
-    made = []
+    indices = []
     for name, _, length in (one.partition(":") for one in declared.split()):
         STRETCHES[name] = place = next(_place)
         LENGTHS[place] = (1, length)
-        made.append(place)
-    return made
+        indices.append(place)
+    return indices
 
 
 def _numbered(declared: str) -> dict[str, int]:
@@ -106,9 +106,9 @@ def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str =
     fields = {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
     begins = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
     make: Any = namedtuple
-    made = make(kind, [*place, *fields, "size"])
-    _ROWS[made] = np.dtype([(name, number, shape) for name, shape in fields.items()])
-    return made(*place.values(), *begins)
+    row = make(kind, [*place, *fields, "size"])
+    _ROWS[row] = np.dtype([(name, number, shape) for name, shape in fields.items()])
+    return row(*place.values(), *begins)
 
 
 def _table(array: str, declared: str, count: str = "") -> Any:

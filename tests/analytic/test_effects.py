@@ -116,12 +116,6 @@ def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_given() -> None:
     assert reported.joint_position.sel(coordinate="A").values[inside] == pytest.approx(known[inside], abs=1e-10)
 
 
-# Gears and racks: Willis' equation, equivalent inertia, reactions; what repeats is redundant -------------------------
-
-GEARS = "checks/gears"
-G = 9.81
-
-
 def test_a_planetary_train_turns_by_willis_equation() -> None:
     dataset = run(GEARS)
     speed = {name: dataset.joint_velocity.sel(coordinate=name).values for name in dataset.coordinate.values}

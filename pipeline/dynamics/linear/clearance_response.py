@@ -127,9 +127,9 @@ class OpeningMap:
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
         """Return the largest motion that an adjoint solution gives per metre of separation of a joint's points."""
-        constraint, mine, _ = self.joints[name]
+        constraint, range_of_rows, _ = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
-        first = rows[:, mine][:, :count] / self.length
+        first = rows[:, range_of_rows][:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
 
 
@@ -206,7 +206,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
 
 
 def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
-    """Return the wrenches of joints, paths and loads on a body's frames; moments about the kernels' origin."""
+    """Return the wrenches of joints, paths and loads on a body at its frames; moments about the kernels' origin."""
     model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
         moment, force = joints[joint]
@@ -261,8 +261,8 @@ def _carried(scene: Scene, name: str) -> dict[str, str]:
     pairs = [(a.partition(".")[0], b.partition(".")[0]) for a, b in fixed]
     beyond, carriers = [pair for pair in pairs if name not in pair], dict[str, str]()
     for ends, pair in zip(fixed, pairs, strict=True):
-        for here, there in ((0, 1), (1, 0)):
-            if pair[here] == name:
-                carriers |= dict.fromkeys(reached(pair[there], beyond), ends[here].partition(".")[2])
+        for near, far in ((0, 1), (1, 0)):
+            if pair[near] == name:
+                carriers |= dict.fromkeys(reached(pair[far], beyond), ends[near].partition(".")[2])
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
     return carriers | {f"{name}.{frame}": frame for frame in own}

@@ -140,10 +140,10 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
     """
     energy, fractions = motion * (mass @ motion), dict[str, float]()
     for i, link in enumerate(model.links[1:], start=1):
-        edge, mine = link.branch.edge, model.numbering.coordinates[i]
+        edge, coordinates = link.branch.edge, model.numbering.coordinates[i]
         name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
         if not link.drives:
-            fractions[name] = fractions.get(name, 0.0) + float(energy[mine].sum())
+            fractions[name] = fractions.get(name, 0.0) + float(energy[coordinates].sum())
         if link.flexible:
             fractions[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
     return max(fractions, key=lambda name: fractions[name])

@@ -165,7 +165,7 @@ def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
 
 
 def _body_numbers(mechanism: Mechanism, name: str) -> np.ndarray:
-    """Return a body's row of BODY_NUMBERS; a flexible body's inertia stays zero: its frame is no centre of mass."""
+    """Return a body's row of BODY_NUMBERS; mass and inertia are zero unless several rigid bodies share its link."""
     body, places = mechanism.scene.body[name], mechanism.links[mechanism.link_of[name]].places
     here = places[name]
     if not isinstance(body, RigidBody):

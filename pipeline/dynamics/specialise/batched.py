@@ -50,14 +50,14 @@ def batched(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     adjacent positions: `numbers` has room for all of f in all lanes.
     addresses: of all h, then of all f, w and n, then all indices of y and dy, shape (6 lanes,).
     """
-    made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
+    traced = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
 
     @intrinsic
     def note(typingctx: Any, h: Any, f: Any, numbers: Any, lane: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
             h, f, numbers, lane = values
             begins = dict[int, Any]()
-            for k, index in enumerate(_numbers(made())):
+            for k, index in enumerate(_numbers(traced())):
                 stretch, inside = wired.split(index)
                 if stretch not in begins:
                     begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
@@ -70,7 +70,7 @@ def batched(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     @intrinsic
     def run(typingctx: Any, addresses: Any, numbers: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            tape, (addresses, numbers) = made(), values
+            tape, (addresses, numbers) = traced(), values
             given = [_arguments(builder, addresses, lane, lanes) for lane in range(lanes)]
             side_by_side = builder.bitcast(numbers, ir.VectorType(ir.DoubleType(), lanes).as_pointer())
             row = {index: k for k, index in enumerate(_numbers(tape))}

@@ -99,12 +99,12 @@ class _Forward:
         kept = [(one, self.values, self.value) for one in old.carried]
         kept += [(one, self.changes, self.change) for one in old.carried if one.inside.kind == FLOAT]
         new = Loop(([],), [self.tape.carry(of(one.first)) for one, _, of in kept])
-        for (one, known, _), its in zip(kept, new.carried, strict=True):
-            known[one.inside], known[one.after] = its.inside, its.after
+        for (one, known, _), copy in zip(kept, new.carried, strict=True):
+            known[one.inside], known[one.after] = copy.inside, copy.after
         with self.tape.inside(new.blocks[0]):
             self.block(old.blocks[0])
-        for (one, _, of), its in zip(kept, new.carried, strict=True):
-            its.left = of(one.left)
+        for (one, _, of), copy in zip(kept, new.carried, strict=True):
+            copy.left = of(one.left)
         new.condition = self.value(old.condition)
         self.tape.block.append(new)
 

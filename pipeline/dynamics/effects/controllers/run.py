@@ -41,8 +41,8 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
         internal = y[len(y) - model.arrays.size(m.N_INTERNAL) :]
         for row in due:
             error = float(laws[row["law0"]]) - values(gauges[[row["measured"]]], sites, internal)[0]
-            mine, states = numbers["value"][row["number0"] :][:7], internal[int(row["internal0"]) :][:3]
-            states[:] = sample_error(mine, states, error, first=t == engine.start)
+            gains, states = numbers["value"][row["number0"] :][:7], internal[int(row["internal0"]) :][:3]
+            states[:] = sample_error(gains, states, error, first=t == engine.start)
         return y
 
     return sample

@@ -22,7 +22,7 @@ def make_stops(forms: tuple[Any, ...]) -> Callable:
 
     @kernel
     def stop(d, c):
-        """Store gap and rate of contact c, an end of a coordinate, and apply its force, or torque, when closed."""
+        """Store gap and rate of contact c, an end of a coordinate, and apply its force or torque when closed."""
         contact, numbers, touch = d.contacts[c], d.contact_numbers[c], d.touch[c]
         value, rate, moment, force = counted(d, contact.surfaces)
         limit, sense = numbers.shape[0], numbers.shape[1]

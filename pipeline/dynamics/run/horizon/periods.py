@@ -218,7 +218,7 @@ def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: f
 def rescaled(
     part: Engine, scales: np.ndarray, here: Moment, neighbour: Moment | None, separation: float
 ) -> tuple[Moment, tuple[float, int]]:
-    """Return the neighbour at its distance again, the logarithm of its growth, and 1 if the growth was not linear.
+    """Return the neighbour at its distance again, the logarithm of its growth, and 1 if it failed or was not linear.
 
     Where the closed contacts of the two differ, both stay as they are until they agree: a state between them would have
     surfaces that overlap without an impact.
