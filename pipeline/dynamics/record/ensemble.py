@@ -137,7 +137,7 @@ def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
     """
     model = engine.model
     engine.attempt(start, engine.start)
-    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model)
+    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model.mechanism)
     clearance = min((joint.clearance for joint in model.scene.contacts().values()), default=0.0)
     pressed = max(least, depths[depths > 0.0].min(initial=np.inf))
     return Ensemble(perturbation=min(max(least, FRACTION_OF_CLEARANCE * clearance), FRACTION_OF_CLEARANCE * pressed))

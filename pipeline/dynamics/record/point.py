@@ -149,7 +149,7 @@ class Runner:
         jacobian = offset_jacobian(engine, start)
         given = model.scene.ensemble or (None if self.scaled else Ensemble())
         offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.members)
-        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model)
+        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model.mechanism)
         return [perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3)) for moved in offsets]
 
 
