@@ -158,7 +158,7 @@ class Peer:
 
 
 def pinocchio(loops: int) -> Peer:
-    """Return a model for `constraintDynamics`, whose joints are added depth-first; point constraints close the loops."""
+    """Return a model for `constraintDynamics`, with joints added depth-first and a point constraint for each loop."""
     import pinocchio as pin
 
     model = pin.Model()
