@@ -108,7 +108,7 @@ def where(measured: Mapping[str, list[Session]]) -> str:
 def session_words(session: Session) -> str:
     """Return date, machine and versions of a session in words."""
     versions = "".join(f", {name} {number}" for name, number in session.versions.items())
-    machine = f"{session.measured} on {session.cpu or 'a machine that nobody noted'}{versions}"
+    machine = f"{session.measured} on {session.cpu or 'an unrecorded machine'}{versions}"
     return f"{machine} ({session.note})" if session.note else machine
 
 

@@ -122,8 +122,8 @@ def show(records: list[Record]) -> dict[str, str]:
     if influences:
         parts["influences"] += "\n\n" + _answers(influences)
     lines = [
-        f"- {r['scene']}: an evaluation takes {r['evaluation_us']:.3g} us while the contact is open; looking at its "
-        f"gap is {_share(r['share'])} of that."
+        f"- {r['scene']}: an evaluation takes {r['evaluation_us']:.3g} us while the contact is open; checking its "
+        f"gap takes {_share(r['share'])} of that."
         for r in records
         if "evaluation_us" in r
     ]

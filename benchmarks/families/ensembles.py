@@ -118,7 +118,7 @@ def show(records: list[Record]) -> str:
         "one run, wall [s]": wall("run"),
         f"{MEMBERS} members one by one, wall on 2 workers [s]": wall("alone, 2 workers"),
         "several at once, wall on 2 workers [s]": wall("together, 2 workers"),
-        "as many runs": lambda r: short(r["together, 2 workers"]["wall"]["s"] / r["run"]["wall"]["s"]),
+        "cost in runs": lambda r: short(r["together, 2 workers"]["wall"]["s"] / r["run"]["wall"]["s"]),
         "one by one, processor [s]": cpu("alone"),
         "at once, processor [s]": cpu("together"),
         "factor": lambda r: f"{r['alone']['cpu']['s'] / r['together']['cpu']['s']:.2f}",

@@ -308,8 +308,8 @@ def show(records: list[Record]) -> str:
         "our run",
         "our position [um]",
         "Exudyn / ours",
-        "the same recorded",
-        "its error",
+        "equal samples",
+        "error of these",
         "integration alone",
     )
     columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "ours", "ours, no worse [s]", "ratio")

@@ -116,7 +116,7 @@ def _members(rows: list[Record]) -> str:
         f"and height / leg = {upright:.4f}, legs {np.degrees(np.arccos(upright)):.1f} degrees from the "
         f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * layouts.STEP:g} mm are left: {spans}. "
         f"{extent['on_the_plate'] or 'None'} of them has all four joint centres over the plate, whatever way that is "
-        f"turned.\n\nTaken, as the least condition number over the stroke:\n\n"
+        f"turned.\n\nChosen: the layout with the least condition number over the stroke.\n\n"
         + table(
             [taken],
             {
@@ -124,7 +124,7 @@ def _members(rows: list[Record]) -> str:
                 "condition": lambda r: f"{r['condition']:.2f}",
                 "lift [mm]": _mm("lift"),
                 "tilt [deg]": lambda r: f"{np.degrees(r['tilt']):.2f}",
-                "legs apart by [mm]": _mm("room", 0),
+                "distance of legs [mm]": _mm("room", 0),
             },
         )
     )

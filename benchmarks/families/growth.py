@@ -241,7 +241,7 @@ def show(records: list[Record]) -> str:
     absent: Columns = {
         "absent effect": lambda r: f"{r['case']}, against {r['scene']}",
         "removed [us]": lambda r: f"{r['stripped_us']:.2f}",
-        "never there [us]": lambda r: f"{r['without_us']:.2f}",
+        "never present [us]": lambda r: f"{r['without_us']:.2f}",
         "ratio": lambda r: f"{r['ratio']:.3f}",
         "spread": lambda r: percent(r["spread"]),
         "same compiled code": lambda r: "yes" if r["same_code"] else "no",
@@ -284,8 +284,8 @@ def _columns(records: list[Record], what: str) -> Columns:
     return columns | {
         "kernels [us]": lambda r: spread(r, "us", 2),
         "exponent": exponent(lambda r: r["us"]),
-        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
-        "its exponent": exponent(lambda r: r.get("straight", {}).get("us")),
+        "specialised [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "exponent ": exponent(lambda r: r.get("straight", {}).get("us")),
     }
 
 

@@ -109,13 +109,13 @@ def show(records: list[Record]) -> str:
 def _columns(what: str) -> Columns:
     """Return the columns over numbers of loops or links; links add the kernels' method and a run's evaluations."""
     chains = what == "links"
-    way: Columns = {"by": lambda r: r["way"]} if chains else {}
-    cost: Columns = {"evaluations of 0.2 s": lambda r: str(r["evaluations"])} if chains else {}
+    way: Columns = {"method": lambda r: r["way"]} if chains else {}
+    cost: Columns = {"evaluations in 0.2 s": lambda r: str(r["evaluations"])} if chains else {}
     return {
         "program": lambda r: r["by"],
         what: lambda r: str(r[what]),
         "theirs [us]": lambda r: spread(r["theirs"], "us", 1),
-        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "specialised [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
         "ratio": lambda r: f"{r['straight_ratio']:.1f}" if "straight" in r else "",
         "kernels [us]": lambda r: spread(r["ours"], "us", 2),
         "ratio ": lambda r: f"{r['ratio']:.1f}",

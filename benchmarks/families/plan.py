@@ -169,8 +169,8 @@ def show(records: list[Record]) -> dict[str, str]:
         f"{len(done)} scenes: {said[MET]} met, {said[MET_TO_HORIZON]} met to the horizon, {said[MISSED]} missed, "
         f"{said[UNDECIDED]} not decided. Of the {decided} decided ones {within} ({within / max(decided, 1):.0%}) are "
         f"within what is requested{_worst(done)}. Median saving {np.median(saved):.3g} times "
-        f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). Plans that are the "
-        f"scene as it is: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the "
+        f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). Plans that keep "
+        f"the scene: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the "
         f"full run or one second in {len(cheap)}, median {np.median([r['plan_s'] for r in done]):.2g} s."
     )
     by_mechanism: Columns = {
@@ -202,7 +202,7 @@ def show(records: list[Record]) -> dict[str, str]:
         "clearance [um]": lambda r: short(1e6 * r["clearance"]),
         "speed": lambda r: short(r["speed"]),
         "rod": lambda r: r["rod"],
-        "wanted": lambda r: ", ".join(f"{n} {_asked(of)}" for n, of in r["wanted"].items()),
+        "requested": lambda r: ", ".join(f"{n} {_asked(of)}" for n, of in r["wanted"].items()),
         "kept": lambda r: ", ".join(r["kept"]) or "nothing",
         "verdict": lambda r: r["judged"],
         "members": lambda r: str(r["members"]),

@@ -80,7 +80,7 @@ COLUMNS: Columns = {
     "integration [s]": lambda r: spread(r["integration"], "s", 4),
     "simulate stage [s]": lambda r: spread(r["stage"], "s", 3),
     "evaluations": lambda r: str(r["evaluations"]),
-    "us per evaluation, all in": lambda r: f"{r['us_per_evaluation']:.2f}",
+    "integration per evaluation [us]": lambda r: f"{r['us_per_evaluation']:.2f}",
 }
 
 
@@ -137,8 +137,8 @@ COLD_COLUMNS: Columns = {
     "nothing compiled, wall [s]": lambda r: short(r["wall_s"]),
     "processor [s]": lambda r: short(r["processor_s"]),
     "kernels on disk, wall [s]": lambda r: short(r["warm_wall_s"]),
-    "its processor [s]": lambda r: short(r["warm_processor_s"]),
-    "another wiring, wall [s]": lambda r: short(r["another_wall_s"]),
+    "processor [s] ": lambda r: short(r["warm_processor_s"]),
+    "another topology, wall [s]": lambda r: short(r["another_wall_s"]),
     "code [kB]": lambda r: str(r["kilobytes"]),
 }
 

@@ -24,7 +24,7 @@ TEXT = """{seeds}Parameters and results of every case, to the last digit: [its l
   than {limit:g} counts as wrong); largest opening of a loop {closure:.1e} m (more than {open:g} counts as wrong).
 - {compared} finished runs were repeated at a hundred times tighter tolerance: up to the horizon the platform's
   velocity differs by at most {deviation:.1e} of its largest, median {median:.1e} (more than {far:g} counts as wrong).
-- Dearest case: {evaluations} evaluations, {seconds:.0f} s of processor time; all cases {minutes:.1f} minutes.
+- Most expensive case: {evaluations} evaluations, {seconds:.0f} s of processor time; all cases {minutes:.1f} minutes.
 - Methods: {methods}.
 
 {reasons}
@@ -76,7 +76,7 @@ def _reasons(records: Sequence[Record]) -> str:
         for r in records
         if r["verdict"] != FINISHED
     ]
-    return f"What did not finish said:\n\n{''.join(lines)}" if lines else ""
+    return f"Messages of the cases that did not finish:\n\n{''.join(lines)}" if lines else ""
 
 
 def _place(record: Record) -> str:

@@ -319,7 +319,7 @@ def _verdict(good: int, of: int, own: bool | None) -> str:
         return "**holds**"
     if good == 0 and own is not True:
         return "**does not hold**"
-    return "hangs on the layout"
+    return "depends on the layout"
 
 
 def _numbers(claim: Claim, outcomes: dict[int, tuple[bool, str]]) -> str:
