@@ -166,8 +166,8 @@ def show(records: list[Record]) -> dict[str, str]:
     for record in records:
         if "ratio" in record:
             said.append(
-                f"Two workers compute {record['points']} points with clearance {record['ratio']:.2f} times as fast as one, "
-                f"at a load average of {record['load']:.1f} for the whole machine."
+                f"Two workers compute {record['points']} points with clearance {record['ratio']:.2f} times as fast as "
+                f"one, at a load average of {record['load']:.1f} for the whole machine."
             )
         if "megabytes" in record:
             few, many = (
