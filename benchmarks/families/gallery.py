@@ -1,4 +1,4 @@
-"""Mechanisms of many kinds, each with a question that a run of its scene answers, and a picture."""
+"""Gallery of mechanisms of many kinds, each with a question that a run of its scene answers, and a picture."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from flexclear.pipeline.post.single_run.series import derive
 from flexclear.stages import rendering
 
 PICTURES = DOCS / "gallery"
-#: of the pictures: pixels, how much finer they are drawn first, and colours, so that a page of them stays small
+#: pictures: size [pixels], factor of the size at which they are drawn first, and number of colours, for small files
 WIDTH, HEIGHT, FINER, COLOURS = 640, 480, 2, 256
 Bundles = Mapping[str, xr.Dataset]
 
@@ -31,9 +31,9 @@ Bundles = Mapping[str, xr.Dataset]
 class Entry:
     """A mechanism of the gallery.
 
-    answer: what a run, the reduced bodies and the scene say to the question, in words with numbers.
-    change: of the scene, so that the run is short.  linear: the answer is about vibrations, whose dataset it gets.
-    at: time of the picture as a share of the run.
+    answer: returns the answer to the question, in words with numbers, from a run and its scene.
+    change: edits of the scene that shorten the run.  linear: the answer reads the vibrations instead of a run.
+    moving: the vibrations are those of a steady motion.  at: time of the picture as a fraction of the run.
     """
 
     scene: str
@@ -295,30 +295,30 @@ ENTRIES = {
 
 
 def cases() -> list[Case]:
-    """A case for each entry."""
+    """Return a case for each entry."""
     return [Case(name) for name in ENTRIES]
 
 
 def scene_of(entry: Entry) -> Scene:
-    """Its scene, with its changes."""
+    """Return the scene of an entry, with its changes."""
     return load_scene(find_scene(entry.scene), entry.change)
 
 
 def solved(entry: Entry, scene: Scene, reduced: Bundles) -> xr.Dataset:
-    """What its answer is read from."""
+    """Return the dataset from which an entry's answer is read."""
     if entry.linear:
         return analyses.frequencies(scene, reduced, silent, moving=entry.moving)
     return dynamics.simulate(scene, reduced, silent)
 
 
 def measure(chosen: Sequence[Case], jobs: int) -> Measured:
-    """Question, answer, warm time of one run, and the picture, which is stored next to the page."""
+    """Yield question, answer and warm time of one run; store the picture next to the page."""
     PICTURES.mkdir(exist_ok=True)
     for case in chosen:
         entry = ENTRIES[case.name]
         scene = scene_of(entry)
         reduced = bundles(scene)
-        found = solved(entry, scene, reduced)  # once before, so that what is compiled is there
+        found = solved(entry, scene, reduced)  # a first run, which compiles
         begun = time.perf_counter()
         found = solved(entry, scene, reduced)
         seconds = time.perf_counter() - begun
@@ -348,7 +348,7 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
 
 
 def show(records: list[Record]) -> str:
-    """A paragraph and a picture for each."""
+    """Return a paragraph and a picture for each record."""
     parts = []
     for record in records:
         name = record["case"]

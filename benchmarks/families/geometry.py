@@ -1,6 +1,6 @@
-"""Which layouts of the mechanism have the sensitivities of the paper's Table 8, and what they predict besides.
+"""Layouts of the mechanism with the sensitivities of the paper's Table 8, and their other predictions.
 
-Runs with rigid rods over what the paper leaves open, and ensembles with flexible ones.
+Runs with rigid rods vary what the paper leaves open; ensembles have flexible rods.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.workplace import open_workplace
 
-#: layouts of the family whose runs are made: every so manieth of a coarser grid
+#: coarser grid [m], and stride at which layouts on this grid are simulated
 COARSE, SHOWN = 0.02, 5
 
 
 def members_rows() -> Iterator[Record]:
-    """The family on its grid: one record with its extent, and one for the layout that is taken."""
+    """Yield one record with the family's extent on its grid, and one for the chosen layout."""
     found = layouts.family()
     record: Record = {"members": len(found), "on_the_plate": sum(layouts.on_the_plate(m.layout) for m in found)}
     for name in ("ax", "ay", "bx", "by", "height", "leg"):
@@ -43,7 +43,7 @@ def members_rows() -> Iterator[Record]:
 
 
 def velocity_rows() -> Iterator[Record]:
-    """Runs with clearance of some of the family, the other choices as in the scenes; and of the first layout."""
+    """Yield runs with clearance of some members and of the first layout; other choices are those of the scenes."""
     for member in sorted(layouts.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
         yield _member(member) | rigid(member.layout, Open())
     first = Member(layouts.FIRST, answer(layouts.FIRST))
@@ -51,7 +51,7 @@ def velocity_rows() -> Iterator[Record]:
 
 
 def open_rows() -> Iterator[Record]:
-    """The layout that is taken, over what else the paper leaves open."""
+    """Yield runs of the chosen layout over the other choices that the paper leaves open."""
     layout = layouts.chosen(layouts.family()).layout
     for restitution, gravity, start in product(RESTITUTION, (False, True), STARTS):
         choice = Open(restitution, gravity, start)
@@ -60,7 +60,7 @@ def open_rows() -> Iterator[Record]:
 
 
 def flexible_rows() -> Iterator[Record]:
-    """The layout that is taken, with a flexible rod and clearance."""
+    """Yield ensembles of the chosen layout with a flexible rod and clearance."""
     layout = layouts.chosen(layouts.family()).layout
     for name in FLEXIBLE:
         yield {"set": name, "count": MEMBERS} | flexible(layout, name)
@@ -79,7 +79,7 @@ ROWS: dict[str, Callable[[], Iterator[Record]]] = {
 
 
 def show(records: list[Record]) -> dict[str, str]:
-    """The parts of the page, of the groups of rows that are there."""
+    """Return the parts of the page for the groups of rows that exist."""
     rows = {name: of for name in TABLES if (of := [r for r in records if r["case"] == name])}
     return {name: TABLES[name](of) for name, of in rows.items()}
 
@@ -104,7 +104,7 @@ ERRORS: Columns = {
 
 
 def _members(rows: list[Record]) -> str:
-    """The closed form in numbers, the family's extent, the member that is taken."""
+    """Return the closed form in numbers, the family's extent and the chosen member."""
     (extent, taken), upright = rows, 1.0 / (4.0 * DZ)
     spans = "; ".join(
         f"{words} {1e3 * extent[f'{name}_least']:.0f} to {1e3 * extent[f'{name}_most']:.0f} mm"
@@ -116,7 +116,7 @@ def _members(rows: list[Record]) -> str:
         f"and height / leg = {upright:.4f}, legs {np.degrees(np.arccos(upright)):.1f} degrees from the "
         f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * layouts.STEP:g} mm are left: {spans}. "
         f"{extent['on_the_plate'] or 'None'} of them has all four joint centres over the plate, whatever way that is "
-        f"turned.\n\nTaken, as the least condition number over the stroke:\n\n"
+        f"turned.\n\nChosen: the layout with the least condition number over the stroke.\n\n"
         + table(
             [taken],
             {
@@ -124,14 +124,14 @@ def _members(rows: list[Record]) -> str:
                 "condition": lambda r: f"{r['condition']:.2f}",
                 "lift [mm]": _mm("lift"),
                 "tilt [deg]": lambda r: f"{np.degrees(r['tilt']):.2f}",
-                "legs apart by [mm]": _mm("room", 0),
+                "distance of legs [mm]": _mm("room", 0),
             },
         )
     )
 
 
 def _velocity(rows: list[Record]) -> str:
-    """Runs of members of the family, and how near they come to the velocity of Table 8."""
+    """Return the runs of the family's members, and how near their velocity comes to Table 8."""
     of = [r for r in rows if "first" not in r and "velocity" in r]
     found = [1e3 * r["velocity"] for r in of]
     columns: Columns = {
@@ -166,7 +166,7 @@ def _open(rows: list[Record]) -> str:
 
 
 def _flexible(rows: list[Record]) -> str:
-    """Ensembles next to Table 9."""
+    """Return the ensembles next to Table 9."""
     columns: Columns = {
         "mode set": lambda r: r["set"],
         "angle [mrad]": _spread("angle", 1e3, 3),
@@ -195,30 +195,30 @@ TABLES = {"members": _members, "velocity": _velocity, "open": _open, "flexible":
 
 #: coefficients of restitution, none of which the paper prints
 RESTITUTION = (0.5, 0.7, 0.9)
-#: the ball starts in the middle of its socket, or so far off it [m]: nearly at rest at the bottom
+#: the ball starts in the centre of its socket, or off centre by this distance [m]: nearly at rest at the bottom
 STARTS = {"concentric": 0.0, "at the bottom": 0.45e-3}
 GRAVITY = {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}
-#: of each ensemble
+#: members of each ensemble
 MEMBERS = 4
 FLEXIBLE = {"free-free": "far_csj_free", "fixed-fixed": "far_csj_fixed", "Craig-Bampton": "far_csj_cb"}
 
 
 @dataclass(frozen=True)
 class Open:
-    """A choice of what the paper leaves open besides the layout."""
+    """One choice of the data, besides the layout, that the paper leaves open."""
 
     restitution: float = 0.9
     gravity: bool = False
     start: str = "concentric"
 
     def edits(self) -> dict[str, Any]:
-        """As edits of a scene with clearance."""
+        """Return the choice as edits of a scene with clearance."""
         found: dict[str, Any] = {"joint.A1.normal.restitution": self.restitution}
         return found | ({"load": {"gravity": GRAVITY}} if self.gravity else {})
 
 
 def rigid(layout: Layout, choice: Open) -> Record:
-    """Largest deviations from the ideal mechanism, largest force and acceleration of a run with clearance."""
+    """Return the largest deviations from the ideal mechanism, force and acceleration of a run with clearance."""
     load = {"load": {"gravity": GRAVITY}} if choice.gravity else {}
     try:
         ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout, load), {}, silent)
@@ -230,7 +230,7 @@ def rigid(layout: Layout, choice: Open) -> Record:
 
 
 def flexible(layout: Layout, name: str) -> Record:
-    """Means over an ensemble of each member's largest deviations from the ideal mechanism, and their spread."""
+    """Return means and standard deviations over an ensemble of each member's largest deviations from the ideal one."""
     requested = layouts.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
     ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout), {}, silent)
     members = analyses.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)

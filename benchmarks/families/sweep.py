@@ -1,4 +1,4 @@
-"""What a point of a sweep costs beyond its kernels, how workers share points, and what a worker keeps in memory."""
+"""Cost of a sweep's point beyond its kernels, speed-up by two workers, and memory of a worker."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from flexclear.stages.simulation import params
 from flexclear.stages.sweeps.sweep_engine import Job, engine
 from flexclear.stages.sweeps.sweep_points import Family as Points
 
-#: points that are timed of each kind, after two that are not
+#: timed points of each kind; two earlier points are not timed
 POINTS = 24
 
 
 class Kind(NamedTuple):
-    """A scene, what is kept of it, the place that is varied and its range; words: for the page."""
+    """A scene, its recorded quantities, the varied key path and its range; words: description on the page."""
 
     scene: str
     words: str
@@ -55,9 +55,9 @@ KINDS = {
         "checks/pendulum", "length, final position", ("bob.position.final",), "body.bob.com.0", (-2.0, -1.0), {}
     ),
 }
-#: points of the sweep that one and two workers share, and how often
+#: points of the sweep that one and two workers compute, and number of repeats
 SHARED, TURNS = 80, 3
-#: numbers of points after which the memory of a worker is looked at
+#: numbers of points after which the memory of a worker is read
 LOOKS = (500, 5000)
 
 
@@ -67,7 +67,7 @@ def _measured(case: Case) -> list[Record]:
 
 
 def _point(kind: Kind) -> Record:
-    """Processor time of a point, and that of its kernels."""
+    """Return the processor times of a point and of its kernels."""
     run, values = _runner(kind), np.linspace(*kind.ends, POINTS + 2)
     every, kernels = [], []
     with _timed_kernels() as spent:
@@ -89,7 +89,7 @@ def _point(kind: Kind) -> Record:
 
 
 def _runner(kind: Kind) -> Callable[[float], None]:
-    """Runs a point as a worker does."""
+    """Return a function that runs a point as a worker does."""
     scene = with_numbers(load_scene(TREE / "flexclear" / "scenes" / f"{kind.scene}.toml"), kind.set)
     runner = Runner({}, [parse_recorded(name, scene.owners()) for name in kind.keep])
 
@@ -103,7 +103,7 @@ def _runner(kind: Kind) -> Callable[[float], None]:
 
 @contextmanager
 def _timed_kernels() -> Iterator[list[float]]:
-    """Adds up the processor time [s] of compiled functions that are called meanwhile."""
+    """Sum the processor time [s] of the compiled functions that are called inside this context."""
     spent, plain = [0.0], {name: getattr(Engine, name) for name in ("evaluate", "advance", "observe")}
 
     def timed(function: Callable[..., None]) -> Callable[..., None]:
@@ -124,7 +124,7 @@ def _timed_kernels() -> Iterator[list[float]]:
 
 
 def _workers() -> Record:
-    """Rate of two workers over that of one, in turns; started and compiled beforehand."""
+    """Return the rate of two workers over that of one, measured in turns; both are started and compiled beforehand."""
     kind = KINDS["clearance, peak"]
     scene = load_scene(TREE / "flexclear" / "scenes" / f"{kind.scene}.toml")
     family = Points("family", params(scene), bundles(scene), kind.keep, 0, False)
@@ -143,7 +143,7 @@ def _workers() -> Record:
 
 
 def _memory() -> Record:
-    """Resident memory of a worker [MB] after some and after many points."""
+    """Return the resident memory of a worker [MB] after some and after many points."""
     run, found = _runner(KINDS["stroke, final"]), []
     ends = np.linspace(*KINDS["stroke, final"].ends, LOOKS[-1])
     for k, end in enumerate(ends, start=1):
@@ -154,7 +154,7 @@ def _memory() -> Record:
 
 
 def show(records: list[Record]) -> dict[str, str]:
-    """The table of points, and sentences about workers and memory."""
+    """Return the table of points, and sentences about workers and memory."""
     points = [record for record in records if "all_ms" in record]
     columns: dict[str, Callable[[Record], str]] = {
         "points": lambda r: f"`{r['scene']}`, {r['words']}",
@@ -166,8 +166,8 @@ def show(records: list[Record]) -> dict[str, str]:
     for record in records:
         if "ratio" in record:
             said.append(
-                f"Two workers do {record['points']} points with clearance {record['ratio']:.2f} times as fast as one, "
-                f"with {record['load']:.1f} processes of the whole machine wanting its cores meanwhile."
+                f"Two workers compute {record['points']} points with clearance {record['ratio']:.2f} times as fast as "
+                f"one, at a load average of {record['load']:.1f} for the whole machine."
             )
         if "megabytes" in record:
             few, many = (

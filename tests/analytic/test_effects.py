@@ -48,16 +48,6 @@ def test_a_slide_between_lossless_ends_repeats_itself_by_half_sines() -> None:
     )
 
 
-def test_the_force_of_an_end_pushes_the_second_body_back_along_or_about_the_axis() -> None:
-    dataset = run(STOPS)
-    for end, sense in (("A.upper", -1.0), ("A.lower", 1.0), ("C.upper", -1.0), ("D.lower", 1.0)):
-        mine = dataset.sel(contact=end)
-        expected = np.outer(sense * mine.contact_normal_force.values, [0.0, 0.0, 1.0])
-        assert np.abs(expected).max() > 0.0
-        # all axes are the world's z, rotors turned about it
-        assert mine.contact_force.values == pytest.approx(expected, rel=1e-12, abs=1e-12)
-
-
 def test_a_linear_damper_gives_the_restitution_that_was_asked_for() -> None:
     dataset = run(STOPS)
     found = impacts(dataset, contact="B.upper")
@@ -114,6 +104,22 @@ def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_given() -> None:
     known = -0.02 + 0.02 * np.cos(omega * t) + np.sin(omega * t) / omega
     inside = known > -0.02
     assert reported.joint_position.sel(coordinate="A").values[inside] == pytest.approx(known[inside], abs=1e-10)
+
+
+def test_the_force_of_an_end_pushes_the_second_body_back_along_or_about_the_axis() -> None:
+    dataset = run(STOPS)
+    for end, sense in (("A.upper", -1.0), ("A.lower", 1.0), ("C.upper", -1.0), ("D.lower", 1.0)):
+        mine = dataset.sel(contact=end)
+        expected = np.outer(sense * mine.contact_normal_force.values, [0.0, 0.0, 1.0])
+        assert np.abs(expected).max() > 0.0
+        # all axes are the world's z, rotors turned about it
+        assert mine.contact_force.values == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+# Gears and racks: Willis' equation, equivalent inertia, reactions; what repeats is redundant -------------------------
+
+GEARS = "checks/gears"
+G = 9.81
 
 
 def test_a_planetary_train_turns_by_willis_equation() -> None:
