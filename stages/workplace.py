@@ -12,6 +12,7 @@ import re
 import time
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -178,7 +179,8 @@ def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
     end = math.inf if limit is None else time.monotonic() + seconds(limit, "--limit")
     sources = sources_of(TREE, root / "cache" / "imports.json")
     why = f"the time that --limit {limit} gives is over"
-    return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (end, why))
+    # cached: the same damaged file is found each time that a task asks for it, and reported once
+    return Workplace(Store(root, say=cache(monitor.say)), sources, monitor, jobs, (end, why))
 
 
 def check(outcome: Outcome) -> None:

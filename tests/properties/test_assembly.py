@@ -99,6 +99,17 @@ def test_a_coordinate_of_an_undriven_loop_places_all_its_bodies() -> None:
     assert found["rocker"] == pytest.approx(rocker, abs=1e-10)
 
 
+def test_joints_that_fit_nowhere_are_refused_without_poses_that_nobody_gave() -> None:
+    """Three links of a millimetre close no loop; the first attempt closes all joints but one."""
+    table = loose(0.9)
+    for name in ("crank", "coupler", "rocker"):
+        table["body"][name]["frames"]["far"] = frame((1e-3, 0.0, 0.0))
+    with pytest.raises(InputError, match="cannot be assembled by its joints") as caught:
+        start_of(table)
+    assert "poses given" not in str(caught.value)
+    assert str(caught.value).partition("angles): ")[2].partition("\n")[0].count(",") == 0
+
+
 def test_bodies_that_have_a_pose_stay_where_they_are() -> None:
     table, placed = loose(0.9, joint={"j3": {"near": 1.5}}), driven(0.9, 0.9)
     table["body"]["crank"]["pose"] = placed["body"]["crank"]["pose"]

@@ -14,12 +14,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.commands.new import write
 from flexclear.pipeline.core.artifacts import disk, netcdf
 from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.artifacts.labelled import of
 from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
 from flexclear.pipeline.core.system.errors import ResourceError
 from tests.processes import printed
+from tests.stages.conftest import Command
 
 KEY = "k" * 32
 
@@ -89,6 +91,19 @@ def test_every_flipped_bit_is_detected(store: Store, said: list[str]):
     assert len(said[0].splitlines()) == 1
     path.write_bytes(whole)
     assert store.find("simulate", KEY) == record
+
+
+def test_a_command_reports_a_damaged_file_once(tmp_path: Path, fresh: Path, command: Command):
+    """Two runs in two processes: each is looked for before it is waiting, and again before it begins."""
+    one = write("pendulum", tmp_path)[0]
+    other = one.with_name("heavy.toml")
+    other.write_text(one.read_text().replace('mass = "1 kg"', 'mass = "2 kg"'))
+    command("run", one, other, "--jobs", "1", "-q")
+    for stored in (fresh / "cache" / "simulate").glob("*.nc"):
+        stored.chmod(0o644)
+        stored.write_bytes(stored.read_bytes()[:-1] + b"?")
+    reported = command("run", one, other, "--jobs", "2", "-q").err
+    assert reported.count("is corrupt") == reported.count("it is made again") == 2
 
 
 @pytest.mark.parametrize("file", ["nc", "vtu", "json"])

@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import NO_LAWS
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.placing import ambiguity, assemblies
+from flexclear.pipeline.dynamics.model.placing import ambiguity, assemblies, guess, targets
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
 #: residuals of joints below this fraction of the mechanism's size come from rounded input
@@ -76,7 +76,7 @@ def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], 
         driven = any(joint.values for joint in joints)
         if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
             raise _out_of_reach(mechanism, joints)
-        raise _impossible(mechanism, joints, [link.start for link in mechanism.links])
+        raise _impossible(mechanism, joints, guess(mechanism, joints, placed, targets(joints, starts)[1]))
     return replace(with_starts(mechanism, candidates[0].poses), choice=ambiguity(mechanism, joints, candidates, starts))
 
 
@@ -179,10 +179,12 @@ def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Plac
     listed = ", ".join(
         f"{name} {value:.3g}" for name, value in left.items() if value > CLOSED_EXACTLY * mechanism.length
     )
+    posed = len(given_start.given_links(mechanism)) > 1
+    where = "close to the poses given; residuals there" if posed else "by its joints; residuals of the first attempt"
     slight = misfit(mechanism, joints, poses).worst < MEANT_TO_FIT
     return InputError(
         f"[joint.{worst}.between]",
-        f"the mechanism cannot be assembled close to the poses given; residuals there (m, or sines of angles): {listed}"
+        f"the mechanism cannot be assembled {where} (m, or sines of angles): {listed}"
         + ("; several joints ask for nearly, but not exactly, the same" if slight else ""),
         "write lengths, frames and poses with more digits, or replace a joint by one that leaves more motion"
         if slight
