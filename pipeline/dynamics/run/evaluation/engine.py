@@ -180,7 +180,7 @@ class Engine:
 
     def table(self, table: Any) -> np.ndarray:
         """Return a table of the work array with named fields, not copied, shape (rows,)."""
-        return m.named(table, self.view(table.place))
+        return m.named(table, self.view(table.at))
 
     @property
     def control(self) -> np.ndarray:
