@@ -15,6 +15,7 @@ and the other three numbers of a layout, ay, bx, by, are free. Table 8 prints th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations, product
 from typing import Any
 
@@ -116,9 +117,10 @@ def jacobians(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> np.nda
     return np.concatenate([n[:, :, 2:], np.cross(r, n)], axis=2)
 
 
-def answer(layout: Layout, stroke: float = STROKE) -> Answer:
+@cache
+def answer(layout: Layout) -> Answer:
     """Return the response of a layout; raise ValueError where the legs do not reach over the stroke."""
-    heights, angles = poses(layout, np.linspace(0.0, stroke, PLACES))
+    heights, angles = poses(layout, np.linspace(0.0, STROKE, PLACES))
     J = jacobians(layout, heights, angles)
     moves = np.abs(np.linalg.inv(J)[:, :, 0]).max(axis=0)
     condition = np.linalg.cond(J @ np.diag([1.0, 1.0 / SCALE, 1.0 / SCALE, 1.0 / SCALE])).max()
@@ -170,14 +172,6 @@ FIRST = Layout(0.086603, 0.05, 0.1, 0.173205, 0.35)
 AGREES = 1e-3
 
 
-@dataclass(frozen=True)
-class Member:
-    """A layout of the family and its response."""
-
-    layout: Layout
-    answer: Answer
-
-
 def fitted(ay: float, bx: float, by: float) -> Layout:
     """Return the layout with Table 8's sensitivities at the start and these three free numbers [m]."""
     ax, upright = DZ / DANGLE, 1.0 / (4.0 * DZ)
@@ -195,7 +189,7 @@ def admissible(layout: Layout) -> bool:
     )
 
 
-def family(step: float = STEP) -> list[Member]:
+def family(step: float = STEP) -> list[Layout]:
     """Return the admissible layouts on the grid with Table 8's sensitivities over the stroke and room for the legs."""
     axes = [np.arange(round(low / step), round(high / step) + 1) * step for low, high in GRID.values()]
     found = []
@@ -209,13 +203,18 @@ def family(step: float = STEP) -> list[Member]:
             continue
         off = max(abs(reached.dz / DZ - 1.0), abs(reached.dangle / DANGLE - 1.0))
         if off < AGREES and reached.condition <= WORST_CONDITION and reached.room >= CYLINDERS:
-            found.append(Member(layout, reached))
+            found.append(layout)
     return found
 
 
-def chosen(members: list[Member]) -> Member:
+def by_condition(members: list[Layout]) -> list[Layout]:
+    """Return the members by rising condition number over the stroke."""
+    return sorted(members, key=lambda layout: answer(layout).condition)
+
+
+def chosen(members: list[Layout]) -> Layout:
     """Return the member with the least condition number over the stroke, which is farthest from a singular layout."""
-    return min(members, key=lambda member: member.answer.condition)
+    return by_condition(members)[0]
 
 
 def on_the_plate(layout: Layout) -> bool:

@@ -43,8 +43,7 @@ def outcomes(cases: Sequence[Case], jobs: int, work: Work, limit: int) -> Iterat
     def record(case: Case) -> Record:
         number = idle.get()
         try:
-            workers[number].give(case.of)
-            found: Record = workers[number].take()
+            found: Record = workers[number].ask(case.of)
         except LostError as lost:
             found = {"verdict": WRONG, "reason": str(lost), "seconds": lost.seconds}
             workers[number] = Worker(work, limit)
@@ -80,14 +79,10 @@ class Worker:
         self.process.start()
         other.close()
 
-    def give(self, parameters: Any) -> None:
-        """Send a piece of work to the process; if the process has ended, `take` raises LostError."""
-        with suppress(BrokenPipeError):
+    def ask(self, parameters: Any) -> Any:
+        """Return the result of a piece of work; raise LostError when the process hangs or has died."""
+        with suppress(BrokenPipeError, EOFError, ConnectionResetError):
             self.line.send(parameters)
-
-    def take(self) -> Any:
-        """Wait for the result of the work and return it; raise LostError when the process hangs or has died."""
-        with suppress(EOFError, ConnectionResetError):
             if self.line.poll(PATIENCE * self.limit):
                 return self.line.recv()
             self.dismiss()

@@ -79,10 +79,6 @@ class Run:
     outcome: Outcome
     error: Error | None
 
-    def reaches(self, level: float) -> bool:
-        """Return True when the velocity error is within a fraction of the largest speed."""
-        return self.error is not None and self.error.relative <= level
-
 
 OWN_LAW = "its friction is linear up to one speed and constant above; errors against its own finest run"
 COMPARISONS = {
@@ -127,7 +123,8 @@ class Peer:
         """Make a run at a fixed step [s], sampled at an interval [s]; arguments as of `exudyn_model.solve`."""
         used = self.worker is not None
         try:
-            found = self._asked((self.here, self.body, method, step, sampling))
+            self.worker = self.worker or Worker(work, LIMIT)
+            found: Outcome = self.worker.ask((self.here, self.body, method, step, sampling))
         except LostError as lost:
             self.close()
             if used and not lost.seconds:  # leftovers of earlier runs may have killed the process
@@ -136,11 +133,6 @@ class Peer:
         if found.samples is None:
             self.close()
         return found
-
-    def _asked(self, parameters: tuple[Any, ...]) -> Outcome:
-        self.worker = self.worker or Worker(work, LIMIT)
-        self.worker.give(parameters)
-        return self.worker.take()
 
     def close(self) -> None:
         """End the process."""
@@ -244,7 +236,9 @@ def front(runs: Sequence[tuple[float, ...]]) -> list[int]:
 
 def _candidates(done: list[Run], level: float) -> list[Run]:
     """Return the two fastest runs that reach a level, since single times scatter; else the longest run, as a bound."""
-    reaching = sorted((run for run in done if run.reaches(level)), key=lambda run: run.outcome.seconds)
+    reaching = sorted(
+        (run for run in done if run.error and _reaches(level, run.error)), key=lambda run: run.outcome.seconds
+    )
     return reaching[:2] or sorted(done, key=lambda run: -run.outcome.seconds)[:1]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.families.geometry import JOINTS
 from benchmarks.family import Record as Row
-from benchmarks.page import Columns, table
+from benchmarks.page import Columns, mean, table
 from benchmarks.reference_conditions.design import FULL, PLACES, RIGID
 from flexclear.pipeline.post.plotting.table import pipe_table
 
@@ -162,8 +162,8 @@ def _apart(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
     good = all(_differ(free, fixed, name) for name in ("peak_force", "acceleration"))
     return good, (
-        f"peak force {_mean(free, 'peak_force')} N and {_mean(fixed, 'peak_force')} N, "
-        f"acceleration {_mean(free, 'acceleration')} m/s² and {_mean(fixed, 'acceleration')} m/s²"
+        f"peak force {mean(free, 'peak_force')} N and {mean(fixed, 'peak_force')} N, "
+        f"acceleration {mean(free, 'acceleration')} m/s² and {mean(fixed, 'acceleration')} m/s²"
     )
 
 
@@ -177,7 +177,7 @@ def _fixed_is_right(rows: Rows) -> tuple[bool, str]:
     off_by = {w: getattr(rows, w)("clearance")["peak_force"] - best["peak_force"] for w in ("free", "fixed")}
     return abs(off_by["fixed"]) < abs(off_by["free"]), (
         f"peak force off by {off_by['free']:+.0f} N (free-free) and {off_by['fixed']:+.0f} N (fixed-fixed) of "
-        f"{_mean(best, 'peak_force')} N, which itself changed by {unsettled(rows):.0f} N with the last coordinates"
+        f"{mean(best, 'peak_force')} N, which itself changed by {unsettled(rows):.0f} N with the last coordinates"
     )
 
 
@@ -190,7 +190,7 @@ def unsettled(rows: Rows) -> float:
 def _softens(rows: Rows) -> tuple[bool, str]:
     best, rigid = rows.best(), rows.named("clearance", RIGID)
     fall = 1.0 - best["peak_force"] / rigid["peak_force"]
-    return fall > AGREE, f"peak force {rigid['peak_force']:.0f} N rigid, {_mean(best, 'peak_force')} N flexible"
+    return fall > AGREE, f"peak force {rigid['peak_force']:.0f} N rigid, {mean(best, 'peak_force')} N flexible"
 
 
 def _enlarges(rows: Rows) -> tuple[bool, str]:
@@ -213,10 +213,6 @@ def _percent(fraction: float) -> str:
     if not np.isfinite(fraction):
         return "-"
     return f"{100.0 * fraction:.3g} %" if fraction >= SHOWN else f"under {100.0 * SHOWN:g} %"
-
-
-def _mean(row: Row, name: str) -> str:
-    return f"{row[name]:.0f} ± {row[f'{name}_std']:.0f}"
 
 
 CLAIMS = (
@@ -356,6 +352,4 @@ def _peaks(rows: list[Row]) -> str:
 
 
 def _peak(name: str, line: Row) -> str:
-    row = line[name]
-    mean = f"{row['peak_force']:.0f}"
-    return mean if row["members"] == 1 else f"{mean} ± {row['peak_force_std']:.0f}"
+    return mean(line[name], "peak_force")
