@@ -126,20 +126,20 @@ def answer(layout: Layout) -> Answer:
     condition = np.linalg.cond(J @ np.diag([1.0, 1.0 / SCALE, 1.0 / SCALE, 1.0 / SCALE])).max()
     # in a pose turned about y alone the angle asin R[0, 2] changes at the rate of the rotation about y
     motion = float(moves[0]), float(moves[2]), float(np.ptp(heights)), float(np.abs(angles).max())
-    return Answer(*motion, float(condition), _room(layout, heights, angles))
+    return Answer(*motion, float(condition), _clear_distance(layout, heights, angles))
 
 
-def _room(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> float:
+def _clear_distance(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> float:
     """Return the least distance between the axes of two legs, or of a leg and the central chain [m]."""
     up = np.array([0.0, 0.0, 1.0])
     tops = turned(layout, angles) + up * heights[:, None, None]
     below, above = np.broadcast_to(-up, (len(heights), 3)), up * heights[:, None]
     feet = np.broadcast_to(layout.B, tops.shape)
     bars = [(feet[:, k], tops[:, k]) for k in range(4)] + [(below, above)]
-    return min(_apart(*one, *other) for one, other in combinations(bars, 2))
+    return min(_distance(*one, *other) for one, other in combinations(bars, 2))
 
 
-def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
+def _distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
     """Return the least distance of segments a-b and c-d, pairs of rows (n, 3): inside both, or from an end of one."""
     u, v, w = b - a, d - c, a - c
     uu, uv, vv, uw, vw = (np.sum(x * y, axis=1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
@@ -243,7 +243,7 @@ def edits(layout: Layout, *, flexible: bool = False, along: float = 0.0, aside: 
         found |= _leg(layout, k, flexible=flexible and k == 0, along=along, aside=aside if k == 0 else 0.0)
     found["body.ground.frames.Z.position"] = [0.0, 0.0, layout.height - CENTRAL_END]
     found["body.central_rod.pose.position"] = [0.0, 0.0, layout.height - CENTRAL_ROD]
-    return {place: _plain(value) for place, value in found.items()}
+    return {place: _floats(value) for place, value in found.items()}
 
 
 def _leg(layout: Layout, k: int, *, flexible: bool, along: float, aside: float) -> dict[str, Any]:
@@ -276,10 +276,10 @@ def deviation_row(effect: Deviation) -> dict[str, float]:
     return {"angle": effect.angle, "displacement": effect.displacement, "velocity": effect.velocity}
 
 
-def _plain(value: Any) -> Any:
+def _floats(value: Any) -> Any:
     """Return numbers as plain floats, which TOML and JSON can hold."""
     if isinstance(value, dict):
-        return {key: _plain(v) for key, v in value.items()}
+        return {key: _floats(v) for key, v in value.items()}
     return [float(v) for v in value] if isinstance(value, list | tuple) else float(value)
 
 

@@ -19,7 +19,6 @@ from typing import Any
 
 import psutil
 
-from benchmarks import processes
 from benchmarks.family import WRONG, Case, Record
 
 Work = Callable[[Any, Callable[[], None]], Any]
@@ -89,9 +88,9 @@ class Worker:
             raise LostError(f"did not answer within {PATIENCE * self.limit} s")
         self.process.join()
         code = self.process.exitcode or 0
-        if processes.ended_by(code) == "SIGXCPU":
+        if ended_by(code) == "SIGXCPU":
             raise LostError(f"did not end within {self.limit} s of processor time", float(self.limit))
-        raise LostError(f"its process died ({processes.ended_by(code) or f'exit code {code}'})")
+        raise LostError(f"its process died ({ended_by(code) or f'exit code {code}'})")
 
     def dismiss(self) -> None:
         """Terminate the process, also in the middle of its work."""
@@ -106,8 +105,8 @@ def _serve(line: connection.Connection, work: Work, limit: int) -> None:
     with suppress(EOFError, BrokenPipeError):  # the parent process has ended
         while True:
             parameters = line.recv()
-            processes.limit_seconds(None)
-            line.send(work(parameters, lambda: processes.limit_seconds(limit)))
+            limit_seconds(None)
+            line.send(work(parameters, lambda: limit_seconds(limit)))
 
 
 def as_installed(folder: Path) -> dict[str, str]:

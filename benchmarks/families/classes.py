@@ -342,9 +342,9 @@ def examined(name: str) -> Record:
 
 def show(records: list[Record]) -> str:
     """Return a table, and the messages of the cases that did not finish."""
-    said = [f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split())}" for r in records if r["reason"]]
+    messages = [f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split())}" for r in records if r["reason"]]
     return table(records, COLUMNS) + (
-        "\n\nMessages of the cases that did not finish:\n\n" + "\n".join(said) + "\n" if said else ""
+        "\n\nMessages of the cases that did not finish:\n\n" + "\n".join(messages) + "\n" if messages else ""
     )
 
 

@@ -67,8 +67,8 @@ def _growing(cases: Sequence[Case]) -> Measured:
 
 
 def _with_members(here: Mechanism, members: int) -> Callable[[], Any]:
-    asked = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
-    scene = here.scene.model_copy(update={"ensemble": asked})
+    settings = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
+    scene = here.scene.model_copy(update={"ensemble": settings})
     return lambda: analyses.ensemble(scene, here.bundles, silent)
 
 

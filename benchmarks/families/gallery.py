@@ -73,8 +73,8 @@ def _scott_russell(run: xr.Dataset, scene: Scene) -> str:
     point = run["frame_position"].sel(frame="rod.point")
     way = float(abs(point.sel(axis="y")[-1] - point.sel(axis="y")[0]))
     off = float(abs(point.sel(axis="x")).max())
-    apart = "less than 1e-12" if off < 1e-12 else f"{off:.0e}"
-    return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {apart} m."
+    deviation = "less than 1e-12" if off < 1e-12 else f"{off:.0e}"
+    return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {deviation} m."
 
 
 def _shear_pin(run: xr.Dataset, scene: Scene) -> str:

@@ -77,14 +77,11 @@ def _unsettled(rows: list[Row], place: int) -> float:
 
 def _enough(rows: list[Row]) -> int | None:
     """Return the least count from which on Craig-Bampton sets have the right peak force at every position, or None."""
-    measured = {place: {r["count"] for r in rows if _is_craig_bampton(r, place)} for place in PLACES}
-    known = [n for n in (COUNT, *MOST_COMPLETE) if all(max(counts) >= n for counts in measured.values())]
+    sets = [r for r in rows if r["condition"] == "craig-bampton"]
+    most = min(max(r["count"] for r in sets if r["place_mm"] == place) for place in PLACES)
+    known = [n for n in (COUNT, *MOST_COMPLETE) if n <= most]
     good = [all(_peak_error(rows, p, "craig-bampton", n) < claims.AGREE for p in PLACES) for n in known]
     return next((n for k, n in enumerate(known) if all(good[k:])), None)
-
-
-def _is_craig_bampton(row: Row, place: int) -> bool:
-    return (row["condition"], row["place_mm"]) == ("craig-bampton", place)
 
 
 def _peaks(rows: list[Row], place: int) -> str:

@@ -159,10 +159,10 @@ def show(records: list[Record]) -> dict[str, str]:
         "kernels": lambda r: f"{r['kernels_ms']:.1f}",
         "the rest": lambda r: f"{r['rest_ms']:.1f} ± {percent(r['spread'])}",
     }
-    said = []
+    sentences = []
     for record in records:
         if "ratio" in record:
-            said.append(
+            sentences.append(
                 f"Two workers compute {record['points']} points with clearance {record['ratio']:.2f} times as fast as "
                 f"one, at a load average of {record['load']:.1f} for the whole machine."
             )
@@ -170,8 +170,8 @@ def show(records: list[Record]) -> dict[str, str]:
             few, many = (
                 f"{value:.0f} MB after {n}" for value, n in zip(record["megabytes"], record["looks"], strict=True)
             )
-            said.append(f"A worker takes {few} points of the ideal mechanism, and {many}.")
-    return {"points": table(points, columns), "workers": "\n".join(said)}
+            sentences.append(f"A worker takes {few} points of the ideal mechanism, and {many}.")
+    return {"points": table(points, columns), "workers": "\n".join(sentences)}
 
 
 FAMILY = Family(

@@ -125,18 +125,18 @@ def _listed(places: list[int]) -> str:
     return " and ".join(f"{place} mm" for place in places)
 
 
-def _alike(rows: Rows) -> tuple[bool, str]:
+def _consistent(rows: Rows) -> tuple[bool, str]:
     full = rows.named("far", FULL)
-    apart = {name: abs(rows.free()[name] - rows.fixed()[name]) / full[name] for name in EFFECTS}
-    worst = max(apart, key=lambda n: apart[n])
+    difference = {name: abs(rows.free()[name] - rows.fixed()[name]) / full[name] for name in EFFECTS}
+    worst = max(difference, key=lambda n: difference[n])
     found = [_percent(row["velocity"] / full["velocity"]) for row in (rows.free(), rows.fixed())]
-    return apart[worst] < AGREE, (
-        f"they differ by {_percent(apart[worst])} of the full rod's effect ({worst}); of its effect on the velocity "
-        f"they find {found[0]} (free-free) and {found[1]} (fixed-fixed)"
+    return difference[worst] < AGREE, (
+        f"they differ by {_percent(difference[worst])} of the full rod's effect ({worst}); of its effect on the "
+        f"velocity they find {found[0]} (free-free) and {found[1]} (fixed-fixed)"
     )
 
 
-def _suited(which: str) -> Callable[[Rows], tuple[bool, str]]:
+def _right(which: str) -> Callable[[Rows], tuple[bool, str]]:
     def test(rows: Rows) -> tuple[bool, str]:
         found = off(getattr(rows, which)(), rows.named("far", FULL))
         return max(found.values()) < AGREE, "off by " + ", ".join(f"{_percent(s)} ({n})" for n, s in found.items())
@@ -154,11 +154,11 @@ def _dominates(rows: Rows) -> tuple[bool, str]:
 
 def _insensitive(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
-    apart = {name: abs(free[name] - fixed[name]) / fixed[name] for name in ("angle", "displacement", "velocity")}
-    return max(apart.values()) < AGREE, ", ".join(f"{name} {_percent(a)}" for name, a in apart.items())
+    difference = {name: abs(free[name] - fixed[name]) / fixed[name] for name in ("angle", "displacement", "velocity")}
+    return max(difference.values()) < AGREE, ", ".join(f"{name} {_percent(a)}" for name, a in difference.items())
 
 
-def _apart(rows: Rows) -> tuple[bool, str]:
+def _sensitive(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
     good = all(_differ(free, fixed, name) for name in ("peak_force", "acceleration"))
     return good, (
@@ -168,8 +168,8 @@ def _apart(rows: Rows) -> tuple[bool, str]:
 
 
 def _differ(a: Row, b: Row, name: str) -> bool:
-    apart, spread = abs(a[name] - b[name]), max(a[f"{name}_std"], b[f"{name}_std"])
-    return bool(apart > AGREE * abs(b[name]) and apart > DIFFER * spread)
+    difference, spread = abs(a[name] - b[name]), max(a[f"{name}_std"], b[f"{name}_std"])
+    return bool(difference > AGREE * abs(b[name]) and difference > DIFFER * spread)
 
 
 def _fixed_is_right(rows: Rows) -> tuple[bool, str]:
@@ -219,14 +219,14 @@ CLAIMS = (
     Claim(
         "With ideal joints, free-free and fixed-fixed modes give consistent answers (Table 7).",
         f"The effects of the rod's flexibility differ by less than {100.0 * AGREE:g} % of that of the full rod.",
-        _alike,
+        _consistent,
     ),
     Claim(
         "With ideal joints, free-free modes are suitable.",
         f"Largest effects on angle, height, velocity and force at A1 are within {100.0 * AGREE:g} % of the full rod's.",
-        _suited("free"),
+        _right("free"),
     ),
-    Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _suited("fixed")),
+    Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _right("fixed")),
     Claim(
         "Next to clearance, the rod's flexibility hardly moves the platform (Tables 7 and 8).",
         f"Angle and displacement change by less than {100.0 * SMALL:g} % of what clearance does to them.",
@@ -240,7 +240,7 @@ CLAIMS = (
     Claim(
         "With clearance, contact force and acceleration do depend on it.",
         f"Means differ by more than {100.0 * AGREE:g} %, and than {DIFFER:g} standard deviations of the members.",
-        _apart,
+        _sensitive,
     ),
     Claim(
         "The reference condition to impose is fixed-fixed.",
