@@ -19,7 +19,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_code
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
@@ -43,7 +43,7 @@ class Mechanism:
 
     def general_engine(self) -> Engine:
         """Return the engine with the kernels for every topology, which scenes too long for specialised code use."""
-        with patch.object(straight_code, "INTERPRETED", True):
+        with patch.object(specialised_code, "INTERPRETED", True):
             return self.engine()
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:

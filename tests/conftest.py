@@ -1,6 +1,7 @@
 """What tests of all kinds share: reproducible Hypothesis, results kept out of the project."""
 
 import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -13,19 +14,20 @@ settings.register_profile("ci", derandomize=True, deadline=None, suppress_health
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 
-#: files that take longest, the longest first: one that is begun last is run on alone
-LONGEST = (
-    *("stages/test_plan.py", "stages/test_gallery.py", "analytic/test_accuracy.py", "stages/test_page_examples.py"),
-    *("properties/test_articulated.py", "properties/test_specialised.py", "properties/test_derivative.py"),
-    *("stages/test_benchmark_families.py", "stages/test_workflow.py", "stages/test_sweep_workers.py"),
-    *("stages/test_own_scene.py", "stages/test_sweep.py", "stages/test_fingerprint.py", "stages/test_doctor.py"),
+#: files of few tests that take long
+LONG = (
+    *("stages/test_workflow.py", "stages/test_sweep_workers.py", "stages/test_gallery.py", "stages/test_plan.py"),
+    *("architecture/test_quick_commands.py", "architecture/test_extending.py", "stages/test_fingerprint.py"),
+    *("analytic/test_accuracy.py", "analytic/test_horizon_ensembles.py", "architecture/test_lowering.py"),
+    *("stages/test_same_bytes.py", "stages/test_page_examples.py"),
 )
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files are given to workers in this order (`--no-loadscope-reorder`; else by their numbers of tests)."""
-    places = {ROOT / "tests" / name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: places.get(item.path, len(places)))
+    """Workers get files in this order (`--no-loadscope-reorder`): what is begun last is short, so none waits."""
+    tests = Counter(item.path for item in items)
+    first = {ROOT / "tests" / name for name in LONG}
+    items.sort(key=lambda item: (item.path not in first, -tests[item.path]))
 
 
 @pytest.fixture(scope="session")

@@ -54,9 +54,9 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
         try:
             done = integrate(edited, bundles, progress, judges)
         except StoppedError as stopped:
-            there = stopped.partial
+            partial = stopped.partial
             # the partial result of another run, such as that of the start, is not part of this run
-            stopped.partial = incomplete(recorded(there), str(stopped)) if isinstance(there, Run) else None
+            stopped.partial = incomplete(recorded(partial), str(stopped)) if isinstance(partial, Run) else None
             raise
         for sentence in warnings(done):
             progress(None, f"warning: {sentence}")

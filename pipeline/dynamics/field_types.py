@@ -89,12 +89,12 @@ def _of_arrays(context: Any) -> Any:
 
 @lower_builtin(data, types.Any, types.Any, types.Any, types.Any)
 def _construct(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    made = cgutils.create_struct_proxy(DATA)(context, builder)
+    proxy = cgutils.create_struct_proxy(DATA)(context, builder)
     for (name, _), kind, value in zip(POINTERS.items(), signature.args, values, strict=True):
         if isinstance(kind, types.Array):
             value = context.make_array(kind)(context, builder, value).data
-        setattr(made, name, value)
-    return made._getvalue()
+        setattr(proxy, name, value)
+    return proxy._getvalue()
 
 
 @infer_getattr
@@ -132,9 +132,9 @@ def _at(context: Any, builder: Any, pointer: Any, offset: int) -> Any:
 
 
 def _wrapped(context: Any, builder: Any, kind: Any, pointer: Any) -> Any:
-    made = cgutils.create_struct_proxy(kind)(context, builder)
-    made.begin = pointer
-    return made._getvalue()
+    proxy = cgutils.create_struct_proxy(kind)(context, builder)
+    proxy.begin = pointer
+    return proxy._getvalue()
 
 
 def _single(context: Any, builder: Any, d: Any, name: str) -> Any:
@@ -155,7 +155,7 @@ def _read_data(context: Any, builder: Any, kind: Any, value: Any, name: str) -> 
         return builder.load(_single(context, builder, d, name))
     if name in m.LISTS:
         return builder.gep(d.n, [builder.load(_at(context, builder, d.n, m.LISTS[name]))])
-    index = m.NAMED[name].place if name in m.NAMED else {**m.SIZES, **m.INDICES, **m.STRETCHES}[name]
+    index = m.NAMED[name].at if name in m.NAMED else {**m.SIZES, **m.INDICES, **m.STRETCHES}[name]
     entry = builder.load(_at(context, builder, d.h, index))
     if name in m.SIZES or name in m.INDICES:
         return entry
@@ -186,10 +186,10 @@ def _read_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
 @lower_getattr_generic(Row)
 def _read_field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     begin = cgutils.create_struct_proxy(kind)(context, builder, value=value).begin
-    (offset, shape), made = kind.fields[name], kind.kind(name)
+    (offset, shape), result = kind.fields[name], kind.kind(name)
     if shape in m.TUPLES:
-        entries = [builder.load(_at(context, builder, begin, offset + k)) for k in range(made.count)]
-        return context.make_tuple(builder, made, entries)
+        entries = [builder.load(_at(context, builder, begin, offset + k)) for k in range(result.count)]
+        return context.make_tuple(builder, result, entries)
     entry = _at(context, builder, begin, offset)
     return entry if shape else builder.load(entry)
 

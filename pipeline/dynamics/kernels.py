@@ -37,9 +37,9 @@ def lowering() -> Any:
     if not release_is_tested():
         return None
     try:
-        from flexclear.pipeline.dynamics import lowering as made
+        from flexclear.pipeline.dynamics import lowering as module
 
-        return made if made.works() else None
+        return module if module.works() else None
     except Exception:  # whatever Numba raises for unknown features
         return None
 
@@ -82,5 +82,5 @@ def _compiled(function: Callable) -> Any:
     from numba import njit
 
     import_module("flexclear.pipeline.dynamics.field_types")  # named fields, which kernels use
-    made = lowering()
-    return njit(**options, **({"pipeline_class": made.KernelCompiler} if made else {}))(function)
+    module = lowering()
+    return njit(**options, **({"pipeline_class": module.KernelCompiler} if module else {}))(function)

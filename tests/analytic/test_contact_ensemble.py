@@ -19,8 +19,9 @@ from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.adaptive import LEAST_NORM
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.record import ensemble
-from flexclear.pipeline.dynamics.record.ensemble import arms, difference_of_starts
+from flexclear.pipeline.dynamics.record.ensemble import difference_of_starts
 from flexclear.pipeline.dynamics.run import trajectory
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -224,7 +225,7 @@ def made(scene: Scene) -> tuple[Engine, float]:
 def test_an_angle_differs_by_as_much_whatever_the_size(size: float) -> None:
     engine, difference = made(Scene.model_validate(swinging_bar(size)))
     # 2.5e-8 of the size, in rad
-    assert difference / arms(engine.model)[0] == pytest.approx(2.5e-8, rel=1e-12)
+    assert difference / arms(engine.model.mechanism)[0] == pytest.approx(2.5e-8, rel=1e-12)
 
 
 def test_a_ball_differs_by_a_thousandth_of_its_clearance() -> None:

@@ -106,6 +106,16 @@ def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_given() -> None:
     assert reported.joint_position.sel(coordinate="A").values[inside] == pytest.approx(known[inside], abs=1e-10)
 
 
+def test_the_force_of_an_end_pushes_the_second_body_back_along_or_about_the_axis() -> None:
+    dataset = run(STOPS)
+    for end, sense in (("A.upper", -1.0), ("A.lower", 1.0), ("C.upper", -1.0), ("D.lower", 1.0)):
+        mine = dataset.sel(contact=end)
+        expected = np.outer(sense * mine.contact_normal_force.values, [0.0, 0.0, 1.0])
+        assert np.abs(expected).max() > 0.0
+        # all axes are the world's z, rotors turned about it
+        assert mine.contact_force.values == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
 # Gears and racks: Willis' equation, equivalent inertia, reactions; what repeats is redundant -------------------------
 
 GEARS = "checks/gears"

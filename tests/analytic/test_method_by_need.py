@@ -157,7 +157,7 @@ def test_what_a_run_took_decides_about_the_next() -> None:
 
 def test_two_runs_tell_how_evaluations_grow_with_the_tolerance() -> None:
     """Those of contacts hardly do: where they are most of them, the estimate's order says little."""
-    costs = Costs(Rates(6e4, 20.0), 0.18, ("dop853", "exponential", "radau"), touching=True)
+    costs = Costs(Rates(6e4, 20.0), 0.18, ("dop853", "exponential", "radau"), has_contacts=True)
     costs.learn(1e-3, "exponential", xr.Dataset(attrs={"method": "exponential", "evaluations": 20_000}))
     assert costs.best(1e-6) == "dop853"
     costs.learn(1e-5, "exponential", xr.Dataset(attrs={"method": "exponential", "evaluations": 21_000}))

@@ -186,7 +186,7 @@ def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_
     assert "assembled in 2 ways" in choice
     assert begun.start is not None
     engine, y = ideal._started(ideal.placed(scene), bundles(scene), lambda fraction, text: None)
-    loaded = ideal._loaded(engine, y)
+    loaded = ideal._deform_statically(engine, y)
     # pressing bends the rod by rounding of its length
     assert begun.start.modal["rod"].coordinate == pytest.approx(loaded[ideal._modes(engine)], abs=1e-12)
     crank, rod = (begun.body[name].pose for name in ("crank", "rod"))
@@ -206,11 +206,11 @@ def test_flexible_bodies_begin_an_ideal_start_as_its_loads_hold_them() -> None:
     scene = edited(load_scene(template), {"start": {"at": "ideal"}})
     engine, y = ideal._started(ideal.placed(scene), bundles(scene), lambda fraction, text: None)
     speeds = ideal._modal_speeds(engine)
-    straight = ideal._pulled(engine, y, speeds)
-    loaded = ideal._loaded(engine, y)
+    straight = ideal._accelerations(engine, y, speeds)
+    loaded = ideal._deform_statically(engine, y)
     assert np.abs(loaded[ideal._modes(engine)]).max() > 0.0
     # differences over 1e-7 of the size are good to 1e-9 of the stiffness; loops keep what they hold
-    assert np.abs(ideal._pulled(engine, loaded, speeds)).max() < 1e-6 * np.abs(straight).max()
+    assert np.abs(ideal._accelerations(engine, loaded, speeds)).max() < 1e-6 * np.abs(straight).max()
 
 
 def test_a_start_as_without_clearance_needs_a_joint_that_has_an_ideal_counterpart() -> None:

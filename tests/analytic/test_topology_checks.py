@@ -11,7 +11,7 @@ from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.record.dataset import dataset as dataset_of
+from flexclear.pipeline.dynamics.record.dataset import recorded
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.run import integrate
 from tests.analytic import four_bars
@@ -193,7 +193,7 @@ def test_the_motion_does_not_depend_on_which_rows_are_solved_for(monkeypatch: py
     often = integrate(scene, {}, lambda fraction, text: None)
     changes = [[time for time, _ in run.trajectory.selections] for run in (once, often)]
     assert changes[0] != changes[1]
-    same_motion(dataset_of(often), dataset_of(once), 1e-9)
+    same_motion(recorded(often).to_xarray(), recorded(once).to_xarray(), 1e-9)
 
 
 def test_rows_are_chosen_anew_before_the_present_ones_depend_on_each_other(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ import pytest
 from flexclear.commands import scenes
 from flexclear.commands.__main__ import main
 from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.post.single_run import series
 from flexclear.stages.sweeps import sweep_engine
@@ -225,6 +226,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     made.add("ideal", SCENE + JOINT)
     made.add("contact", CONTACT)
     return made
+
+
+@pytest.fixture
+def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work is done in this process: to start others takes longer than most of what is tested."""
+    monkeypatch.setattr(cores, "cores", lambda: 1)
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics import simulate
 from flexclear.pipeline.post.single_run.series import derive
 
@@ -69,6 +70,7 @@ def crank(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setenv("FLEXCLEAR_RESULTS", str(folder / "results"))
+        patch.setattr(cores, "cores", lambda: 1)  # other processes take seconds to start
         scene, _ = write("slider-crank", folder)
         scene.write_text(scene.read_text().replace('end = "0.13 s"', 'end = "25 ms"'))
         assert main(["run", "-q", str(scene)]) == 0

@@ -16,7 +16,7 @@ def blocks(page: Path, language: str) -> list[str]:
 
 
 @pytest.fixture
-def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, one_process: None) -> Path:
     """An empty folder to work in, with results of its own."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))

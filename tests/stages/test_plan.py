@@ -24,6 +24,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import uncoupled
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, bounds, opening_map
 from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
@@ -46,9 +47,13 @@ GRAVITY = 9.81
 
 @pytest.fixture(autouse=True, scope="module")
 def _results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Results that tests share, so that each body is made once; who looks into them has its own, `fresh`."""
+    """Results that tests share, so that each body is made once, in this process: others take seconds to start.
+
+    Who looks into results has its own, `fresh`.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FLEXCLEAR_RESULTS", str(tmp_path_factory.mktemp("results")))
+        patch.setattr(cores, "cores", lambda: 1)
         yield
 
 

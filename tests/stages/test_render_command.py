@@ -19,7 +19,7 @@ SCENE = "checks/clamped_rod"
 
 
 @pytest.fixture
-def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, one_process: None) -> Path:
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     return tmp_path / "results"
 

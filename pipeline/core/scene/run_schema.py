@@ -41,7 +41,7 @@ gear_force? | time gear | N, N m | force of the gear along its second coordinate
 contact_gap? | time contact | m, rad | clearance minus eccentricity; negative in contact
 contact_penetration? | time contact | m, rad | max(0, -gap)
 contact_rate? | time contact | m s-1, rad s-1 | rate of penetration
-contact_force? | time contact axis | N, N m | contact force on the ball, world axes
+contact_force? | time contact axis | N, N m | force, or torque of an angle's end, on the ball or second body, world axes
 contact_normal_force? | time contact | N, N m | normal contact force, >= 0
 contact_friction_power? | time contact | W | minus the power that friction takes, <= 0
 contact_sliding_speed? | time contact | m s-1 | sliding speed at the contact; 0 without friction or contact

@@ -52,9 +52,9 @@ def deepest(events: np.ndarray, touch: np.ndarray) -> tuple[np.ndarray, np.ndarr
     depths = np.fmax.reduce(-touch["gap"], axis=0, initial=0.0)
     forces = np.fmax.reduce(touch["normal_force"], axis=0, initial=0.0)
     for c in range(touch.shape[1]):
-        mine = events[events["contact"] == c]
-        depths[c] = np.fmax.reduce(mine["peak_depth"], initial=depths[c])
-        forces[c] = np.fmax.reduce(mine["peak_force"], initial=forces[c])
+        own = events[events["contact"] == c]
+        depths[c] = np.fmax.reduce(own["peak_depth"], initial=depths[c])
+        forces[c] = np.fmax.reduce(own["peak_force"], initial=forces[c])
     return depths, forces
 
 

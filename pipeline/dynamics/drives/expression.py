@@ -60,8 +60,8 @@ def pieces(law: Expression, dimension: str) -> Pieces:
         raise ValueError(f"'{law.value}': {error}") from None
     if len(course.pieces) == 1:
         return Pieces(course.pieces, span)
-    made = (piece.moved(start) for start, piece in zip(course.starts, course.pieces, strict=True))
-    return Pieces(tuple(made), span)
+    moved = (piece.moved(start) for start, piece in zip(course.starts, course.pieces, strict=True))
+    return Pieces(tuple(moved), span)
 
 
 def _applied(operator: str, operands: list[Course], span: tuple[float, float]) -> Course:

@@ -101,8 +101,8 @@ class Pieces:
 
 def pieces_of(law: object, dimension: str) -> Pieces:
     """Return the pieces of any law; raise ValueError, in words, for values of another dimension."""
-    made: Pieces = lookup(PACKAGE, law.type, where="law")(law, dimension)  # type: ignore[attr-defined]
-    return made
+    result: Pieces = lookup(PACKAGE, law.type, where="law")(law, dimension)  # type: ignore[attr-defined]
+    return result
 
 
 def polynomials(starts: Iterable[float], coefficients: Iterable[Sequence[float]]) -> tuple[Piece, ...]:

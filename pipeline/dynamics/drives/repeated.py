@@ -24,8 +24,8 @@ def pieces(law: Repeated, dimension: str) -> Pieces:
     after = [p for p in inner.pieces if p.start > start]
     first = [inner.at(start).moved(start), *(p for p in after if p.start < end - 1e-9 * law.period)]
     last = [first[0], *after]
-    made = [*before]
+    repeated = [*before]
     for k in range(law.times):
-        made += [p.later(k * law.period) for p in (last if k == law.times - 1 else first)]
+        repeated += [p.later(k * law.period) for p in (last if k == law.times - 1 else first)]
     shift = (law.times - 1) * law.period
-    return Pieces(tuple(made), (inner.span[0], inner.span[1] + shift if inner.span[1] < inf else inf))
+    return Pieces(tuple(repeated), (inner.span[0], inner.span[1] + shift if inner.span[1] < inf else inf))

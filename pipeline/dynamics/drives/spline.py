@@ -30,8 +30,8 @@ def through(time: Sequence[float], value: Sequence[float], degree: int, ends: En
         drawn = CubicSpline(t, x, bc_type=ends)
         starts, rows = t[:-1], drawn.c[::-1].T
     else:
-        made: Any = make_interp_spline(t, x, k=5, bc_type=_ends(ends))
-        fifth = PPoly.from_spline(made)
+        quintic: Any = make_interp_spline(t, x, k=5, bc_type=_ends(ends))
+        fifth = PPoly.from_spline(quintic)
         keep = np.diff(fifth.x) > 0.0  # the knots at both ends are repeated
         starts, rows = fifth.x[:-1][keep], fifth.c[::-1].T[keep]
     return Pieces(polynomials(starts, rows), (float(t[0]), float(t[-1])))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ BEARING = m.NAMED["bearing"]
 #: variables of a run's dataset with their dimensions, and coordinates
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 Series = tuple[Variables, dict[str, object]]
-#: tolerance with which the loops of rows are not closed, and only frames are stored
+#: tolerance with which the loops of rows are not closed, and only frames of links are stored
 AS_RECORDED = -1.0
 #: one of so many rows is closed first; its change predicts those of the rows between, if the rows' distances in time
 #: differ by at most this fraction
@@ -88,7 +88,8 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
         "frame_position": (3, size(m.N_FRAMES)),
         "residual": (None, 1),
         "status": (None, 1),
-        **_frames(size),
+        **_links(size),
+        "sites": (m.SITE_FRAMES, size(m.N_SITES)),
         "state": (None, size(m.NY)),
         "positions": (None, size(m.NQ) + drives),
         "speeds": (None, size(m.NV) + drives),
@@ -105,15 +106,8 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
     }
 
 
-def _frames(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
-    return {"links": (m.LINK_FRAMES, size(m.N_LINKS)), "sites": (m.SITE_FRAMES, size(m.N_SITES))}
-
-
-class Frames(NamedTuple):
-    """Frames of links and sites in rows of the record: LINK_FRAMES without accelerations, (rows, links or sites)."""
-
-    links: np.ndarray
-    sites: np.ndarray
+def _links(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
+    return {"links": (m.LINK_FRAMES, size(m.N_LINKS))}
 
 
 #: outputs that `observe` has stored, each over the rows: (rows, numbers)
@@ -123,9 +117,9 @@ Blocks = dict[str, np.ndarray]
 def room(rows: int, size: Callable[[int], int], *, frames: bool = False) -> tuple[np.ndarray, Blocks]:
     """Allocate zeros for `observe`, contiguous, and return them with their parts; size: returns a number of the header.
 
-    Each quantity of all rows is contiguous, as datasets have it.  frames: whether only frames are stored.
+    Each quantity of all rows is contiguous, as datasets have it.  frames: whether only those of links are stored.
     """
-    columns = _frames(size) if frames else _columns(size)
+    columns = _links(size) if frames else _columns(size)
     widths = [_numbers(kind) * count for kind, count in columns.values()]
     ends = rows * np.cumsum(widths)
     whole = np.zeros(int(ends[-1]))
@@ -135,12 +129,6 @@ def room(rows: int, size: Callable[[int], int], *, frames: bool = False) -> tupl
 
 def _numbers(kind: Any) -> int:
     return 1 if kind is None else getattr(kind, "size", kind)
-
-
-def frames_by_name(blocks: Blocks, size: Callable[[int], int]) -> Frames:
-    """Return views of the frames that `observe` has stored alone."""
-    known = ["origin", "axes", "omega", "velocity"]
-    return Frames(*(_named(kind, count, blocks[name])[known] for name, (kind, count) in _frames(size).items()))
 
 
 def by_name(blocks: Blocks, size: Callable[[int], int]) -> Observed:
@@ -287,7 +275,7 @@ def make_description(
 def make_observation(evaluate: Callable, project: Callable, laws: Callable, describe: Callable) -> Callable:
     """Build the kernel observe(h, f, w, n, rows, pieces, tolerance, out), which fills the blocks of `room`.
 
-    With a tolerance of AS_RECORDED nothing is evaluated, and only the frames of links and sites are stored.
+    With a tolerance of AS_RECORDED nothing is evaluated, and only the frames of links are stored.
 
     evaluate, project, laws: as the stepper calls them.  describe: of `make_description`.
     """
@@ -303,7 +291,7 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
     def copy(d, out, every, r, column, frames):
         """Copy the sections of w that are outputs themselves, each to its row in its block.
 
-        column: number of columns before them.  frames: whether only those of links and sites.
+        column: number of columns before them.  frames: whether only those of links.
         """
         known = d.n_drives
         stretches = (
@@ -323,7 +311,7 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
             (d.at_energy, m.ENERGY.size * d.n_components),
             (d.at_jacobian, d.jacobian_size),
         )
-        for s in range(2 if frames else len(stretches)):  # one loop: several would each be compiled
+        for s in range(1 if frames else len(stretches)):  # one loop: several would each be compiled
             first, count = stretches[s]
             o = every * column + count * r
             for k in range(count):

@@ -16,6 +16,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model import initial, selection
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.interface_basis import modes_of
@@ -248,5 +249,7 @@ def acting(bench: Bench) -> np.ndarray:
     contact alone, in the state evaluated last, as moments [N m]."""
     moments, forces = carried_wrenches(bench.engine)
     loads, touch = (bench.engine.table(table) for table in (m.LOAD, m.TOUCH))
-    pushes = [bench.model.length * rows for rows in (forces, loads["force"], touch["force"])]
+    length = bench.model.length
+    reach = length / arms(bench.model.mechanism)  # ends of angles have torques
+    pushes = [length * forces, length * loads["force"], reach[:, None] * touch["force"]]
     return np.concatenate([v.ravel() for v in [*pushes, moments, loads["moment"]]])

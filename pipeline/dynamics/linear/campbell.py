@@ -245,9 +245,9 @@ def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Poin
         "critical_speed": (("branch",), critical),
         "frame_position": (("speed", "frame", "axis"), np.array([nothing if p is None else p.frames for p in points])),
     }
-    made = xr.Dataset(data, {"speed": speeds, "branch": np.arange(1, len(branches) + 1), "frame": frames})
+    diagram = xr.Dataset(data, {"speed": speeds, "branch": np.arange(1, len(branches) + 1), "frame": frames})
     title = f"Campbell diagram of {subject(bench.scene)}"
-    return conform(made, CAMPBELL, title=title, **attributes(bench.scene), drive=bench.model.drives[which])
+    return conform(diagram, CAMPBELL, title=title, **attributes(bench.scene), drive=bench.model.drives[which])
 
 
 def _crossing(speeds: np.ndarray, over: np.ndarray) -> float:

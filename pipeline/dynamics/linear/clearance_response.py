@@ -127,9 +127,9 @@ class OpeningMap:
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
         """Return the largest motion that an adjoint solution gives per metre of separation of a joint's points."""
-        constraint, mine, _ = self.joints[name]
+        constraint, range_of_rows, _ = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
-        first = rows[:, mine][:, :count] / self.length
+        first = rows[:, range_of_rows][:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
 
 
@@ -177,7 +177,7 @@ def centre(model: Model, poses: Sequence[Placement], body: str) -> np.ndarray:
     """Return the position of a body's centre of mass."""
     i, part = model.mechanism.link_of[body], model.scene.body[body]
     com = np.array(part.com) if isinstance(part, RigidBody) else np.zeros(3)
-    return np.asarray(poses[i].of(model.mechanism.links[i].places[body].of(Placement(com))).p)
+    return np.asarray(poses[i].of(model.mechanism.links[i].placements[body].of(Placement(com))).p)
 
 
 def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[str, Wrench]) -> np.ndarray:
@@ -189,7 +189,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
     """
     model = motions.model
     i = model.mechanism.link_of[name]
-    place = model.mechanism.links[i].places[name]
+    place = model.mechanism.links[i].placements[name]
     own = motions.link(i).at(place.p, place.R)
     a, alpha, omega = (np.einsum("tji,tj->ti", own.R, x) for x in (own.a - model.gravity, own.alpha, own.omega))
     A = skew(alpha) + skew(omega) @ skew(omega)
@@ -206,7 +206,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
 
 
 def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
-    """Return the wrenches of joints, paths and loads on a body's frames; moments about the kernels' origin."""
+    """Return the wrenches of joints, paths and loads on a body at its frames; moments about the kernels' origin."""
     model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
         moment, force = joints[joint]
@@ -224,7 +224,7 @@ def openings(
     These are rotation and displacement of the centre of mass, world axes, shape (3, mode).
     """
     i = model.mechanism.link_of[name]
-    placement = poses[i].of(model.mechanism.links[i].places[name])
+    placement = poses[i].of(model.mechanism.links[i].placements[name])
     frames = [str(frame) for frame in bundle["frame"].values]
     matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, tuple[Any, Any]]()
     for body, frame in _carried(model.scene, name).items():
@@ -261,8 +261,8 @@ def _carried(scene: Scene, name: str) -> dict[str, str]:
     pairs = [(a.partition(".")[0], b.partition(".")[0]) for a, b in fixed]
     beyond, carriers = [pair for pair in pairs if name not in pair], dict[str, str]()
     for ends, pair in zip(fixed, pairs, strict=True):
-        for here, there in ((0, 1), (1, 0)):
-            if pair[here] == name:
-                carriers |= dict.fromkeys(reached(pair[there], beyond), ends[here].partition(".")[2])
+        for near, far in ((0, 1), (1, 0)):
+            if pair[near] == name:
+                carriers |= dict.fromkeys(reached(pair[far], beyond), ends[near].partition(".")[2])
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
     return carriers | {f"{name}.{frame}": frame for frame in own}

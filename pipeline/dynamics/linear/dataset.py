@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.linear.bench import Bench, observe, rows, state
 from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium
 from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
-from flexclear.pipeline.dynamics.record.dataset import attributes, dataset, subject
+from flexclear.pipeline.dynamics.record.dataset import attributes, recorded, subject
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
@@ -28,7 +28,7 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
     seen = observe(bench, state(bench, rest.at.q)[None, :])
     contacts, none = len(bench.model.contacts), m.named(m.EVENT, np.zeros((0, m.EVENT.size)))[:, 0]
     once = Trajectory(rows(bench, seen.state), none, contacts, {}, ((bench.time, bench.engine.selected.copy()),))
-    still = dataset(Run(bench.scene, bench.engine, once, seen)).isel(time=0, drop=True)
+    still = recorded(Run(bench.scene, bench.engine, once, seen)).to_xarray().isel(time=0, drop=True)
     kept = [n for n in EQUILIBRIUM if n in still.variables]
     names = [n for n in still.coords if set(still[n].dims) <= set().union(*(still[k].dims for k in kept))]
     result = still[kept].assign_coords({n: still[n].variable for n in names})
@@ -71,15 +71,15 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     if numbering.flexible:
         shapes = np.concatenate([w[modes] for modes in numbering.modal_coordinates.values()])
         data["modal_shape"] = (("vibration", "part", "mode"), _split(shapes.T))
-    made = still.assign({n: xr.Variable(*v) for n, v in data.items()})
-    made = made.assign_coords(
+    result = still.assign({n: xr.Variable(*v) for n, v in data.items()})
+    result = result.assign_coords(
         vibration=np.arange(1, len(value) + 1),
         part=list(PARTS),
         moving_body=parts,
         frame=list(bench.model.mechanism.frames),
     )
     facts = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
-    return conform(made, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth)
+    return conform(result, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth)
 
 
 def motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:

@@ -140,10 +140,10 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
     """
     energy, fractions = motion * (mass @ motion), dict[str, float]()
     for i, link in enumerate(model.links[1:], start=1):
-        edge, mine = link.branch.edge, model.numbering.coordinates[i]
+        edge, coordinates = link.branch.edge, model.numbering.coordinates[i]
         name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
         if not link.drives:
-            fractions[name] = fractions.get(name, 0.0) + float(energy[mine].sum())
+            fractions[name] = fractions.get(name, 0.0) + float(energy[coordinates].sum())
         if link.flexible:
             fractions[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
     return max(fractions, key=lambda name: fractions[name])
@@ -295,7 +295,7 @@ def _rounding(bench: Bench, at: Tangent) -> float:
 
 def _require_turning_frames(bench: Bench) -> None:
     """Raise SolverError for a body with bushings only: its coordinates do not move with the drives."""
-    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.places}
+    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.placements}
     for name, load in bench.scene.forces().items():
         mounted = loose & {frame.partition(".")[0] for frame in load.between} if isinstance(load, Bushing) else ()
         for body in mounted:

@@ -128,10 +128,10 @@ def _assembled(
     opened = np.zeros((lever.gradient.shape[0], first[-1]))
     own = {name: (np.zeros((3, first[-1])), np.zeros((3, first[-1]))) for name in model.scene.body}
     for k, (name, bundle) in enumerate(bundles.items()):
-        mine = slice(first[k], first[k + 1])
-        opened[:, mine], carried = clearance_response.openings(model, poses, lever, name, bundle)
+        columns = slice(first[k], first[k + 1])
+        opened[:, columns], carried = clearance_response.openings(model, poses, lever, name, bundle)
         for body in own.keys() & carried.keys() - {name}:
-            own[body][0][:, mine], own[body][1][:, mine] = carried[body]
+            own[body][0][:, columns], own[body][1][:, columns] = carried[body]
     Z = scipy.linalg.null_space(np.hstack([lever.gradient.toarray(), opened]), rcond=FOLLOWED)
     M, momenta = _mass(model, poses, bundles, first, own)
     K = scipy.linalg.block_diag(*(b["modal_stiffness"].values for b in bundles.values()))
@@ -161,7 +161,7 @@ def _mass(
         if not isinstance(body, RigidBody):
             continue
         placement = poses[model.mechanism.link_of[name]].of(
-            model.mechanism.links[model.mechanism.link_of[name]].places[name]
+            model.mechanism.links[model.mechanism.link_of[name]].placements[name]
         )
         inertia = placement.R @ np.array(body.inertia) @ placement.R.T
         rigid = [clearance_response.body_motion(model, poses, name, turning=turning) for turning in (True, False)]
@@ -170,14 +170,14 @@ def _mass(
         M += turn.T @ spin + shift.T @ push
         if name in bundles:
             k = list(bundles).index(name)
-            mine = slice(m + first[k], m + first[k + 1])
+            columns = slice(m + first[k], m + first[k + 1])
             push_q, spin_q = _momenta(bundles[name], placement, clearance_response.centre(model, poses, name))
             across = turn.T @ spin_q + shift.T @ push_q
-            M[:, mine] += across
-            M[mine, :] += across.T
-            M[mine, mine] += bundles[name]["modal_mass"].values
-            spin[:, mine] += spin_q
-            push[:, mine] += push_q
+            M[:, columns] += across
+            M[columns, :] += across.T
+            M[columns, columns] += bundles[name]["modal_mass"].values
+            spin[:, columns] += spin_q
+            push[:, columns] += push_q
         momenta += rigid[0].T @ spin + rigid[1].T @ push
     return 0.5 * (M + M.T), momenta
 

@@ -119,3 +119,9 @@ def _reduced_mass(masses: Sequence[float]) -> float | None:
     """Return the reduced mass of the links on both sides [kg]; 0 means the ground, infinite. None when both are."""
     inverse = sum(1.0 / mass for mass in masses if mass > 0.0)
     return 1.0 / inverse if inverse > 0.0 else None
+
+
+def arms(mechanism: Mechanism) -> np.ndarray:
+    """Return the factor that makes each contact's gap a length: 1, or the size [m] for ends of angles."""
+    turning = [getattr(contact.joint, "coordinate", None) for contact in mechanism.contacts]
+    return np.array([mechanism.length if one is not None and one.turning else 1.0 for one in turning])

@@ -136,9 +136,9 @@ class ScreeningRuns:
 
         A run of the beginning from one start predicts that part; it shrinks where the part still takes too long.
         """
-        begun = self.must_run(dropped, BEGINNING, 0)
-        fraction = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
-        fraction = LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
+        beginning = self.must_run(dropped, BEGINNING, 0)
+        fraction = BEGINNING * ALLOWED / (MEMBERS * max(beginning.evaluations, 1) * self.extent.variables)
+        fraction = LEAST_PART if beginning.refused else float(np.clip(fraction, LEAST_PART, 1.0))
         return longest(fraction, lambda part: self.must_run(dropped, part))[0]
 
     def whole(self, dropped: Collection[Effect]) -> float:
@@ -162,20 +162,20 @@ class ScreeningRuns:
         scene, names = self.variant(dropped), self._names(dropped)
         key = (names, json.dumps([scene.solver.model_dump(mode="json") | solver, level, fraction, members]))
         if key not in self.points:
-            mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
+            own = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
             if level is not None:
-                mine |= {name: bundle for name, bundle in self.fewer[level].items() if name in mine}
-                scene = with_modes(scene, self.modes(level, mine))
+                own |= {name: bundle for name, bundle in self.fewer[level].items() if name in own}
+                scene = with_modes(scene, self.modes(level, own))
             end = scene.time.start + fraction * (scene.time.end - scene.time.start)
             scene = edited(scene, {f"solver.{k}": v for k, v in solver.items()} | {"time.end": end})
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
             place = names, level, scene.solver.integrator
-            runner = Runner(mine, recorded(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
+            runner = Runner(own, recorded(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
             measured = self.points[key] = runner.run(scene)
             self._engines[place] = runner.engine
             self.evaluations += measured.evaluations
-            self.work += measured.evaluations * self._variables(mine)
+            self.work += measured.evaluations * self._variables(own)
         return self.points[key]
 
     def modes(self, level: int, bodies: Collection[str]) -> dict[str, int]:

@@ -68,8 +68,8 @@ def plan(
     uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
     plain = edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
     bare = pruned(plain, uncoupled_parts)
-    mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
-    runs = ScreeningRuns(bare, mine, less, filled, quantities, progress)
+    own, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
+    runs = ScreeningRuns(bare, own, less, filled, quantities, progress)
     _ = runs.extent  # refuses a scene that cannot be built, before anything is run
     runs.must_run((), BEGINNING, 0)
     loose, soft = ([effect for effect in runs.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
@@ -222,9 +222,9 @@ def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effec
     if rigid is not None:
         together = response(rigid, bundles, search.runs.chosen)
         for effect in soft:
-            mine = {effect.owner: bundles[effect.owner]}
-            alone = together if len(soft) == 1 else response(rigid, mine, search.runs.chosen)
-            bending[effect.name] = _with_margin(alone.influence)
+            own = {effect.owner: bundles[effect.owner]}
+            single = together if len(soft) == 1 else response(rigid, own, search.runs.chosen)
+            bending[effect.name] = _with_margin(single.influence)
         total = _with_margin(together.influence)
         if search.fits(total):
             search.spend(total)

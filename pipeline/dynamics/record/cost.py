@@ -16,7 +16,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.dynamics.record.dataset import dataset
+from flexclear.pipeline.dynamics.record.dataset import recorded
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -25,6 +25,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Followed, Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
+    from flexclear.pipeline.dynamics.equations.observation import Observed
     from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
 
 #: least number of repeats of an integration; short ones are repeated until they have taken this time [s] together, at
@@ -69,9 +70,13 @@ def measure(
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
-    record = lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched))  # noqa: E731
-    recording = (_once(record),) if brief else _repeated(record, 0)
-    run = dataset(Run(scene, last, trajectory, seen, perturbed, switched))
+
+    def record(seen: Observed, perturbed: PerturbedRun | None = None) -> xr.Dataset:
+        return recorded(Run(scene, last, trajectory, seen, perturbed, switched)).to_xarray()
+
+    again = lambda: record(observed(last, trajectory))  # noqa: E731
+    recording = (_once(again),) if brief else _repeated(again, 0)
+    run = record(seen, perturbed)
     integration = _repeated(lambda: follow(engine, start, silent, other), MOST_REPEATS, first)
     return Cost(run, integration, recording, engine.model.length)
 

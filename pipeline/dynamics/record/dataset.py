@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Collection, Iterator
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,14 +33,6 @@ from flexclear.pipeline.dynamics.run import ledger
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-
-def dataset(run: Run) -> xr.Dataset:
-    """Return all recorded variables of a run (schema RUN), as a dataset."""
-    return recorded(run).to_xarray()
 
 
 def recorded(run: Run) -> LabelledArrays:
@@ -355,7 +346,7 @@ def contact_names(model: Model) -> dict[str, object]:
 
 
 def events_of(model: Model, trajectory: Trajectory) -> Variables:
-    """The events of a run, by variable."""
+    """Return the events of a run, by variable."""
     events, names = trajectory.events, np.array([contact.name for contact in model.contacts], dtype=str)
     columns = {
         "event_time": events["time"],

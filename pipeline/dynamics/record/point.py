@@ -19,8 +19,9 @@ from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.effects import EVENTS
+from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.record.dataset import events_of, series, variables_for
-from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
+from flexclear.pipeline.dynamics.record.ensemble import ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.alike import engines_alike
@@ -62,7 +63,7 @@ class Runner:
     engine: Engine | None = None
     _making: Lock = field(default_factory=Lock)
     #: the observed rows of a point are large: one thread at a time holds them in memory
-    _looking: Lock = field(default_factory=Lock)
+    _observing: Lock = field(default_factory=Lock)
 
     def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
         """Run one point; errors from physics or input of this point are reported in the result, not raised.
@@ -106,15 +107,15 @@ class Runner:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
         # exact: the number of points evaluated together depends on the machine and on their durations
-        engine.straight.exact = True
-        engine.straight.place = place
+        engine.specialised.exact = True
+        engine.specialised.place = place
         if in_sections(self.recorded):
             values, count = _sections(scene, engine, self.recorded, alive)
             return [values], count
         rows, count, judges = list[Values](), 0, affordable(scene)
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other, judges and judges.run)
-            with self._looking:
+            with self._observing:
                 rows.append(_recorded_values(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         return rows, count
@@ -148,7 +149,7 @@ class Runner:
         jacobian = offset_jacobian(engine, start)
         given = model.scene.ensemble or (None if self.scaled else Ensemble())
         offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.members)
-        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model)
+        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model.mechanism)
         return [perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3)) for moved in offsets]
 
 
@@ -177,18 +178,18 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
+def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, recorded: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    events = {} if all(one.quantity.over_time for one in kept) else events_of(engine.model, trajectory)
-    terms = {term for one in kept for term in one.quantity.terms()}
+    events = {} if all(one.quantity.over_time for one in recorded) else events_of(engine.model, trajectory)
+    terms = {term for one in recorded for term in one.quantity.terms()}
     arrays = variables_for(scene, Motions(engine.model, seen), terms, trajectory.time, events)
-    return _values(arrays, kept, trajectory.time, _regular(engine, trajectory.time))
+    return _values(arrays, recorded, trajectory.time, _regular(engine, trajectory.time))
 
 
 def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regular: np.ndarray) -> Values:
-    """Recorded values of a run, or of what of it they are read from; regular: rows of the regular output times."""
+    """Return the recorded values from the variables of a run; regular: rows of the regular output times."""
     values: Values = {}
     for one in recorded:
         if one.quantity.over_time:

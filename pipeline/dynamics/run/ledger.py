@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.solver import Solver
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Variables
 from flexclear.pipeline.dynamics.model.mechanism import Site
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
@@ -19,7 +19,6 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 #: losses of an effect, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
 #: dimension; for each loss its two sites, and its cause in words
 Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: roundings of the largest energies, which may cancel in the balance
 BALANCE_ROUNDING = 1e-12
 #: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]

@@ -44,7 +44,7 @@ class Requested(NamedTuple):
 
 def requested_of(scene: Scene, names: Sequence[str]) -> list[Requested]:
     """Return the quantities of these names; raise InputError for one that the scene lacks."""
-    made = []
+    result = []
     for name in names:
         try:
             recorded = parse_recorded(name, scene.owners())
@@ -58,8 +58,8 @@ def requested_of(scene: Scene, names: Sequence[str]) -> list[Requested]:
                 raise InputError(f"of: '{name}'", str(error)) from None
         if recorded is not None and recorded.reduction in WITHOUT:
             raise InputError(f"of: '{name}'", f"a {recorded.reduction} has no derivative")
-        made.append(Requested(name, quantity, recorded))
-    return made
+        result.append(Requested(name, quantity, recorded))
+    return result
 
 
 def sensitivities(
@@ -98,7 +98,7 @@ def sensitivities(
                 _derivative(one, family.engine.model, run, k, values, changes, horizon) / parameter.unit
             )
     time = run.trajectory.time
-    made = {one.name: _variable(one, np.array(columns[one.name])) for one in requested}
+    variables = {one.name: _variable(one, np.array(columns[one.name])) for one in requested}
     coordinates: dict[str, Any] = {
         "parameter": list(to),
         "parameter_value": ("parameter", [p.value for p in parameters]),
@@ -110,7 +110,7 @@ def sensitivities(
     facts |= {"exponent": grown.exponent, "exponent_error": grown.error, "tangent_horizon": grown.horizon}
     if np.isfinite(horizon):
         facts |= {"horizon": horizon, "validity": f"up to the predictability horizon, {horizon:.6g} s; beyond it NaN"}
-    return xr.Dataset(made, coordinates, facts)
+    return xr.Dataset(variables, coordinates, facts)
 
 
 METHOD = "variational equations of the tangent of the equations of motion, with the jumps of impacts"
@@ -176,14 +176,14 @@ def _of_contact(
     if one.quantity.kind == "impulse":
         slot = model.speeds.stop + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * contact
         return float(trajectory.time[-1]), float(run.changes[-1, k, slot + m.CONTACT_LEDGER.impulse])
-    mine = (events["contact"] == contact) & (events["kind"] == CLOSING)
+    own = (events["contact"] == contact) & (events["kind"] == CLOSING)
     if one.quantity.kind == "impact_times":
-        hits = np.flatnonzero(mine & (events["speed"] > IMPACT))
+        hits = np.flatnonzero(own & (events["speed"] > IMPACT))
         if not len(hits):
             return 0.0, np.nan
         hit = hits[0 if one.recorded.reduction == "first" else -1]
         return float(events["time"][hit]), float(run.event_times[hit, k])
-    closings = events[mine]
+    closings = events[own]
     if not len(closings):
         return 0.0, np.nan
     strongest = closings[np.argmax(closings["peak_force"])]

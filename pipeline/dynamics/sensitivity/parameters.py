@@ -62,10 +62,10 @@ class Family:
         Its code and its choices of method are those of the unchanged scene.
         """
         edited = with_numbers(self.scene, {parameter.path: parameter.changed(amount)})
-        made, _ = engines_alike(self.engine, edited, self.bundles)
-        if not np.array_equal(made.model.arrays.h, self.engine.model.arrays.h):
+        engine, _ = engines_alike(self.engine, edited, self.bundles)
+        if not np.array_equal(engine.model.arrays.h, self.engine.model.arrays.h):
             raise InputError(parameter.path, "changes how the mechanism is built, not only its numbers", "leave it out")
-        return made
+        return engine
 
     def direction(self, parameter: Parameter) -> Direction:
         """Return the change of numbers and start per unit of a parameter."""

@@ -35,15 +35,15 @@ Series = dict[str, np.ndarray]
 def read(family: Family, engine: Engine, run: Differentiated, requested: Collection[Quantity]) -> Series:
     """Return quantities over time, (rows, components), by name; and NORMAL_FORCE, (rows, contacts)."""
     seen = observed(engine, run.trajectory)
-    made = series(family.scene, Motions(engine.model, seen), requested, run.trajectory.time)
-    return made | {NORMAL_FORCE: seen.touch["normal_force"]}
+    result = series(family.scene, Motions(engine.model, seen), requested, run.trajectory.time)
+    return result | {NORMAL_FORCE: seen.touch["normal_force"]}
 
 
 def derivatives(
     family: Family, run: Differentiated, k: int, parameter: Parameter, requested: Collection[Quantity]
 ) -> Series:
     """Return the derivatives of the series of `read` along direction k of a run, per unit of the parameter."""
-    made: Series = {}
+    result: Series = {}
     # rows with equal steps together
     powers = np.floor(np.log10(_steps(family, run, k, parameter)) + 1e-9).astype(int)
     for power in np.unique(powers):
@@ -53,9 +53,9 @@ def derivatives(
             for j in (-2, -1, 1, 2)
         }
         for name in around[1]:
-            change = central({j: there[name] for j, there in around.items()}, step)
-            made.setdefault(name, np.zeros((len(run.trajectory.rows), change.shape[1])))[rows] = change
-    return made
+            change = central({j: values[name] for j, values in around.items()}, step)
+            result.setdefault(name, np.zeros((len(run.trajectory.rows), change.shape[1])))[rows] = change
+    return result
 
 
 def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differentiated:

@@ -120,8 +120,8 @@ def _function(name: str) -> Callable:
 def plain(kernel: Any) -> Callable:
     """Return the kernel as a function of Python on dual numbers."""
     assert set(FUNCTIONS) <= RULES.keys()
-    made: Callable = Plain(_function, lambda a, b: b if b > a else a, lambda a, b: b if b < a else a)(kernel)
-    return made
+    function: Callable = Plain(_function, lambda a, b: b if b > a else a, lambda a, b: b if b < a else a)(kernel)
+    return function
 
 
 def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
@@ -133,5 +133,5 @@ def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
 def changes(numbers: Iterable[Any], directions: int) -> np.ndarray:
     """Return the changes of numbers, shape (directions, len(numbers))."""
     nothing = np.zeros(directions)
-    made = [number.change if isinstance(number, Dual) else nothing for number in numbers]
-    return np.array(made).reshape(len(made), directions).T.copy()
+    rows = [number.change if isinstance(number, Dual) else nothing for number in numbers]
+    return np.array(rows).reshape(len(rows), directions).T.copy()

@@ -31,7 +31,7 @@ from flexclear.pipeline.dynamics.run.run import maker
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
 #: a pin has reached its position within this fraction of the clearance; largest number of passes for that
-THERE, PIN_PASSES = 1e-9, 20
+REACHED, PIN_PASSES = 1e-9, 20
 #: forces below this fraction of the weight press nothing: the pin stays in the middle
 NO_FORCE = 1e-9
 #: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
@@ -50,13 +50,13 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     """
     ideal_scene, t = placed(scene), scene.time.start
     engine, y = _started(ideal_scene, bundles, progress)
-    y = _loaded(engine, y)
+    y = _deform_statically(engine, y)
     forces = _forces(scene, engine, y)
     concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
     if not scene.contacts():
         return concentric, choice
     engine, y = _started(concentric, bundles, progress)
-    y = _pressed(engine, y, forces)
+    y = _press_pins(engine, y, forces)
     return resting(moving(concentric, engine, y, t), loose(scene)), choice
 
 
@@ -84,7 +84,7 @@ def _started(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     return engine, consistent_start(engine)
 
 
-def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
+def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Return the state with flexible bodies deformed statically by the loads of the start, inertia included.
 
     Modal coordinates then do not accelerate, as far as loops leave them free.  Where rods buckle or the pose is
@@ -96,14 +96,14 @@ def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
     try:
         state, step = y, MODAL_STEP * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
         for _ in range(LOADINGS):
-            pulled = _pulled(engine, state, speeds)
+            rates = _accelerations(engine, state, speeds)
             slopes = np.array(
-                [_pulled(engine, _bent(engine, state, step * unit), speeds) for unit in np.eye(len(speeds))]
+                [_accelerations(engine, _changed(engine, state, step * unit), speeds) for unit in np.eye(len(speeds))]
             )
-            slopes = (slopes - pulled).T / step
+            slopes = (slopes - rates).T / step
             stiffness = np.maximum(np.abs(np.diag(slopes)), np.finfo(float).tiny)
-            change = np.linalg.lstsq(slopes / stiffness[:, None], -pulled / stiffness, rcond=SINGULAR_ROUNDING)[0]
-            state = _bent(engine, state, change)
+            change = np.linalg.lstsq(slopes / stiffness[:, None], -rates / stiffness, rcond=SINGULAR_ROUNDING)[0]
+            state = _changed(engine, state, change)
             if np.max(np.abs(change)) <= SETTLED * np.max(np.abs(state[_modes(engine)])):
                 return state
     except SolverError:
@@ -111,15 +111,15 @@ def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
     return y
 
 
-def _bent(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
+def _changed(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Return the state with changed modal coordinates and closed loops."""
-    bent = y.copy()
-    bent[_modes(engine)] += change
+    changed = y.copy()
+    changed[_modes(engine)] += change
     engine.select_pieces_after(engine.start)
-    return project(engine, bent)
+    return project(engine, changed)
 
 
-def _pulled(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
+def _accelerations(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
     """Return the accelerations of the modal coordinates, shape (n,)."""
     return closure_rows.evaluate(engine, y, engine.start)[speeds].copy()
 
@@ -127,7 +127,7 @@ def _pulled(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
 def _modal_speeds(engine: Engine) -> list[int]:
     """Return the indices of the speeds of modal coordinates in the state."""
     model = engine.model
-    return [model.nq + k for mine in model.numbering.modal_coordinates.values() for k in mine]
+    return [model.nq + k for own in model.numbering.modal_coordinates.values() for k in own]
 
 
 def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
@@ -136,12 +136,12 @@ def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray
     return {name: wrench[1][0] for name, wrench in joint_wrenches(Motions(engine.model, seen)).items()}
 
 
-def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) -> np.ndarray:
+def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the nearest state in which every pin is where the force on it presses it."""
     model, contacts = engine.model, engine.model.arrays.table(m.CONTACTS)
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
     pins = [contact.name in loose(model.scene) for contact in model.contacts]
-    bent = y[_modes(engine)]
+    modal = y[_modes(engine)]
     for _ in range(PIN_PASSES):
         closure_rows.evaluate(engine, y, engine.start)
         sites, missing = engine.table(m.SITE_FRAMES), []
@@ -155,20 +155,20 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
                 force, offset = force - axis * (axis @ force), offset - axis * (axis @ offset)
             size = float(np.linalg.norm(force))
             depth = (size / law.numbers.stiffness) ** (1.0 / law.numbers.exponent)
-            there = -force / size * (contact.joint.clearance + depth) if size > NO_FORCE * weight else 0.0 * force
-            missing.append(there - offset)
+            target = -force / size * (contact.joint.clearance + depth) if size > NO_FORCE * weight else 0.0 * force
+            missing.append(target - offset)
         least = min(joint.clearance for joint in loose(model.scene).values())
-        if np.max(np.abs(missing)) <= THERE * least:
+        if np.max(np.abs(missing)) <= REACHED * least:
             return y
-        y = _moved(engine, y, pins, np.concatenate(missing), bent)
+        y = _move_pins(engine, y, pins, np.concatenate(missing), modal)
     raise SolverError(
         f"at t = {engine.start:.6g} s: the pins cannot be put where their joints' forces press them; "
         "give poses and velocities instead of [start] at = 'ideal'"
     )
 
 
-def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, bent: np.ndarray) -> np.ndarray:
-    """Return the state with pins moved by `offsets` (3 each) [m] and modal coordinates as close to `bent` as possible.
+def _move_pins(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, modal: np.ndarray) -> np.ndarray:
+    """Return the state with pins moved by `offsets` (3 each) [m] and modal coordinates as close to `modal` as possible.
 
     The least motion alone would bend rods by part of the clearance, and the run would begin with the impact of their
     springing back: a stiff rod would carry kilonewtons.
@@ -180,7 +180,7 @@ def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray,
     speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=SINGULAR_ROUNDING)
     if modes:
         free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that do not move the pins
-        bending = bent - y[modes] - ways[modes] @ speeds
+        bending = modal - y[modes] - ways[modes] @ speeds
         speeds += free @ np.linalg.lstsq(ways[modes] @ free, bending, rcond=SINGULAR_ROUNDING)[0]
     moved = y.copy()
     moved[:nq] += ways @ speeds
@@ -189,4 +189,4 @@ def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray,
 
 def _modes(engine: Engine) -> list[int]:
     """Return the indices of the flexible bodies' modal coordinates in the state."""
-    return [k for mine in engine.model.numbering.modal_positions.values() for k in mine]
+    return [k for own in engine.model.numbering.modal_positions.values() for k in own]

@@ -34,7 +34,7 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         if isinstance(body, Ground):
             bodies[name] = body
             continue
-        placement, frame = model.links[i].places[name], frames[i]
+        placement, frame = model.links[i].placements[name], frames[i]
         p = frame["origin"] + frame["axes"] @ placement.p + model.mechanism.origin
         quaternion = matrix_to_quaternion(frame["axes"] @ placement.R)
         pose = Pose(position=tuple(_given(p)), quaternion=tuple(_given(quaternion)))
@@ -44,7 +44,7 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         name: ModalStart(coordinate=tuple(q), velocity=given[name].velocity if name in given else None)
         for name, q in _modes(engine, y[: model.nq], model.numbering.modal_positions).items()
     }
-    return scene.model_copy(update={"body": bodies, "start": _begun(scene, modal)})
+    return scene.model_copy(update={"body": bodies, "start": _start_without_poses(scene, modal)})
 
 
 def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
@@ -75,7 +75,7 @@ def resting(scene: Scene, contacts: Mapping[str, Clearance]) -> Scene:
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
     """Return the values of the modes of flexible bodies, by name."""
-    return {str(engine.model.links[i].flexible): _given(values[mine]) for i, mine in numbers.items()}
+    return {str(engine.model.links[i].flexible): _given(values[own]) for i, own in numbers.items()}
 
 
 def _given(values: np.ndarray) -> Any:
@@ -83,7 +83,7 @@ def _given(values: np.ndarray) -> Any:
     return np.where(np.abs(values) < 1.0 / LARGEST_NUMBER, 0.0, values).tolist()
 
 
-def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
+def _start_without_poses(scene: Scene, modal: dict[str, ModalStart]) -> Start:
     """Return the start without entries that the poses now replace."""
     old = scene.start if scene.start is not None else Start()
     rates = joint_starts(old, lambda one: None if one.velocity is None else JointStart(velocity=one.velocity))
@@ -92,8 +92,8 @@ def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
 
 def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:
     """Return the non-empty results of `left`, applied to a start's entry of each joint coordinate, by joint."""
-    made = {
+    reduced = {
         joint: {name: new for name, one in coordinates.items() if (new := left(one)) is not None}
         for joint, coordinates in start.joint.items()
     }
-    return {joint: coordinates for joint, coordinates in made.items() if coordinates}
+    return {joint: coordinates for joint, coordinates in reduced.items() if coordinates}

@@ -218,6 +218,8 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
             if len(drawn):  # bars that begin near their ends would exaggerate small differences
                 panel.set_xlim(left=0.1 * float(drawn.min()))
             if requested and np.isfinite(requested.get(chosen[k], np.nan)):
+                if not len(drawn):  # a line alone has no extent to scale axes by
+                    panel.set_xlim(0.1 * requested[chosen[k]], 10.0 * requested[chosen[k]])
                 panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
             low, high = panel.get_xlim()
             if high < FEW * low:

@@ -45,7 +45,7 @@ def _own(study: xr.Dataset) -> str:
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
         return f"{took} Its error cannot be said: other runs{until} have another number of impacts."
-    return f"{took} Its largest error{until} is {error:.1e} of the {of}."
+    return f"{took} Its largest error at the outputs{until} is {error:.1e} of the {of}."
 
 
 def _digit(study: xr.Dataset) -> str:
@@ -76,7 +76,7 @@ def _cause(study: xr.Dataset) -> str:
         return ""
     first = max(known, key=lambda cause: known[cause])
     others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first and value > 0.0)
-    size = f"{known[first]:.0e}" if np.isfinite(known[first]) else "other impacts"
+    size = f"{known[first]:.0e} of a quantity's size" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
     missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
     unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""

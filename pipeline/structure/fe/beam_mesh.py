@@ -143,10 +143,10 @@ def _node_at(x: np.ndarray, position: float, where: str) -> int:
         return nearest
     neighbours = sorted(np.argsort(np.abs(x - position))[:2])
     shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in neighbours)
-    there = f"{len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}"
+    neighbourhood = f"{len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}"
     moved = "mass" if "[masses." in where else "frame"
     remedy = f"move the {moved} to a node, or choose another number of elements"
-    raise InputError(where, f"{position * 1e3:.6g} mm lies on no node; {there}", remedy)
+    raise InputError(where, f"{position * 1e3:.6g} mm lies on no node; {neighbourhood}", remedy)
 
 
 def as_vtu(mesh: xr.Dataset) -> bytes:

@@ -92,8 +92,8 @@ def shape(types: tuple[str, ...], given: Section) -> tuple[str, tuple[float, ...
     return "", ()
 
 
-def _is(made: Section, given: Section) -> bool:
-    a, b = (np.array([s.torsion, s.second_y, s.second_z], dtype=float) for s in (made, given))
+def _is(section: Section, given: Section) -> bool:
+    a, b = (np.array([s.torsion, s.second_y, s.second_z], dtype=float) for s in (section, given))
     return bool(np.all(np.abs(a - b) <= SAME * b))
 
 

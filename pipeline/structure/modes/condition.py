@@ -11,7 +11,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Interface, Model, own_dofs
 
 WHERE = "modes.reference"
-ONCE = "hold each motion once; interfaces that are tied to the same nodes move alike"
+HOLD_ONCE = "hold each motion once; interfaces that are tied to the same nodes move alike"
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Condition:
     mean_axes: bool = False
 
 
-def joined(given: Given, count: int, needs: str) -> tuple[Interface, ...]:
+def interfaces_of(given: Given, count: int, needs: str) -> tuple[Interface, ...]:
     """Return the interfaces; raise InputError when there are fewer than `count`.  needs: the requirement in words."""
     if len(given.interfaces) < count:
         raise InputError("modes.interfaces", needs, "name the recipe's frames")
@@ -63,7 +63,7 @@ def in_own_axes(frame: Interface) -> sp.csr_array:
     return sp.csr_array(turned)
 
 
-def different(frames: tuple[Interface, ...]) -> None:
+def distinct(frames: tuple[Interface, ...]) -> None:
     """Raise InputError when two frames move alike, so that the second one adds nothing."""
     for k, frame in enumerate(frames):
         for other in frames[:k]:
@@ -82,7 +82,7 @@ def check(model: Model, condition: Condition) -> None:
         rows = held.toarray()
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         if np.any(size == 0.0) or np.linalg.matrix_rank(rows / size, tol=1e-9) < len(rows):
-            raise InputError(WHERE, "the held motions are not independent of each other", ONCE)
+            raise InputError(WHERE, "the held motions are not independent of each other", HOLD_ONCE)
     lengths = np.linalg.norm(model.position - model.position.mean(axis=0), axis=1)
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / max(lengths.max(), 1e-300)] * 3])
     left = 6 - np.linalg.matrix_rank(np.asarray(held @ model.rigid) * scale, tol=1e-9)

@@ -39,16 +39,16 @@ class Front:
         """Range of the front's own unknowns in elimination order."""
         return slice(self.start, self.start + len(self.diagonal))
 
-    def add(self, at: np.ndarray, theirs: np.ndarray) -> None:
+    def add(self, at: np.ndarray, child: np.ndarray) -> None:
         """Add the lower triangle of a child's matrix; at: indices of its rows in this front, ascending."""
         k = len(self.diagonal)
         own = int(np.searchsorted(at, k))
-        here, there = _runs(at[:own]), _runs(at[own:] - k)
-        _add_lower(self.diagonal, here, theirs[:own, :own])
-        for row, rows in there:
-            for column, columns in here:
-                self.under[row, column] += theirs[own:, :own][rows, columns]
-        _add_lower(self.rest, there, theirs[own:, own:])
+        own_runs, rest_runs = _runs(at[:own]), _runs(at[own:] - k)
+        _add_lower(self.diagonal, own_runs, child[:own, :own])
+        for row, rows in rest_runs:
+            for column, columns in own_runs:
+                self.under[row, column] += child[own:, :own][rows, columns]
+        _add_lower(self.rest, rest_runs, child[own:, own:])
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,10 @@ def _runs(at: np.ndarray) -> Runs:
     return [(slice(int(at[a]), int(at[b - 1]) + 1), slice(a, b)) for a, b in pairwise(ends)]
 
 
-def _add_lower(matrix: np.ndarray, runs: Runs, theirs: np.ndarray) -> None:
+def _add_lower(matrix: np.ndarray, runs: Runs, child: np.ndarray) -> None:
     for k, (column, columns) in enumerate(runs):
         for row, rows in runs[k:]:
-            matrix[row, column] += theirs[rows, columns]
+            matrix[row, column] += child[rows, columns]
 
 
 def cholesky(matrix: sp.csr_array, positions: np.ndarray, progress: Progress = lambda fraction: None) -> Factor:
@@ -168,8 +168,8 @@ def _fronts(matrix: sp.csr_array, tree: Tree, progress: Progress) -> Iterator[Fr
         columns, own = np.repeat(np.arange(k), np.diff(lower.indptr[start : stop + 1])), rows < stop
         front.diagonal[rows[own] - start, columns[own]] = values[own]
         front.under[local[rows[~own]] - k, columns[~own]] = values[~own]
-        for theirs, rest in left[index]:
-            front.add(local[theirs], rest)
+        for child, rest in left[index]:
+            front.add(local[child], rest)
         left[index] = []
         if k:
             yield front

@@ -149,22 +149,22 @@ def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline |
     return OUTLINES[name](sections.SHAPES[name].constants(*lengths), poisson, *lengths)
 
 
-def _round(made: Section, poisson: float, radius: float, inner: float = 0.0) -> Outline:
+def _round(section: Section, poisson: float, radius: float, inner: float = 0.0) -> Outline:
     angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(angle), np.sin(angle)])
     y, z = np.concatenate([radius * ring, inner * ring if inner else np.zeros((2, 1))], axis=1)
-    stress = _axial(made, y, z)
-    stress[:, 1, 3], stress[:, 2, 3] = -z / made.torsion, y / made.torsion
-    stress[:, 1, 1], stress[:, 2, 1] = _flexure(y, z, radius, inner, poisson, made.second_z)
+    stress = _axial(section, y, z)
+    stress[:, 1, 3], stress[:, 2, 3] = -z / section.torsion, y / section.torsion
+    stress[:, 1, 1], stress[:, 2, 1] = _flexure(y, z, radius, inner, poisson, section.second_z)
     # a force along z equals one along y in axes turned by a quarter
-    stress[:, 2, 2], stress[:, 1, 2] = _flexure(z, y, radius, inner, poisson, made.second_y)
+    stress[:, 2, 2], stress[:, 1, 2] = _flexure(z, y, radius, inner, poisson, section.second_y)
     return Outline(stress, True)
 
 
-def _axial(made: Section, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _axial(section: Section, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     stress = np.zeros((len(y), 3, 6))
-    stress[:, 0, 0] = 1.0 / made.area
-    stress[:, 0, 4], stress[:, 0, 5] = z / made.second_y, -y / made.second_z
+    stress[:, 0, 0] = 1.0 / section.area
+    stress[:, 0, 4], stress[:, 0, 5] = z / section.second_y, -y / section.second_z
     return stress
 
 
@@ -181,16 +181,16 @@ def _flexure(
     return scale * along, scale * (across + (2.0 + poisson) * y * z)
 
 
-def _sides(made: Section, poisson: float, width: float, height: float) -> Outline:
+def _sides(section: Section, poisson: float, width: float, height: float) -> Outline:
     """Return the stress maps of a rectangle; its flexure neglects the effect of Poisson's ratio."""
     s = np.linspace(-0.5, 0.5, ALONG)
     half = np.full(ALONG, 0.5)
     y = width * np.concatenate([s, s, half, -half, [0.0]])
     z = height * np.concatenate([half, -half, s, s, [0.0]])
-    stress = _axial(made, y, z)
-    stress[:, 1, 3], stress[:, 2, 3] = _torsion(y, z, width, height, made.torsion)
-    stress[:, 1, 1] = 1.5 / made.area * (1.0 - (2.0 * y / width) ** 2)
-    stress[:, 2, 2] = 1.5 / made.area * (1.0 - (2.0 * z / height) ** 2)
+    stress = _axial(section, y, z)
+    stress[:, 1, 3], stress[:, 2, 3] = _torsion(y, z, width, height, section.torsion)
+    stress[:, 1, 1] = 1.5 / section.area * (1.0 - (2.0 * y / width) ** 2)
+    stress[:, 2, 2] = 1.5 / section.area * (1.0 - (2.0 * z / height) ** 2)
     return Outline(stress, False)
 
 

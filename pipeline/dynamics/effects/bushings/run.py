@@ -56,7 +56,7 @@ def explanation(engine: Engine) -> str | None:
     return None
 
 
-def give(model: Model, seen: Observed) -> Series:
+def bushing_series(model: Model, seen: Observed) -> Series:
     """Return displacement [m] and rotation vector [rad] of each second frame in the first one's axes; coordinates."""
     rows = model.rows_of(Bushing)
     displacement, rotation = (np.zeros((len(seen.state), len(rows), 3)) for _ in range(2))

@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_loads
 
 
-def controllers(model: Model, seen: Observed) -> Series:
+def controller_series(model: Model, seen: Observed) -> Series:
     """Return each controller's force along its coordinate, and its integral part [N or N m]."""
     rows, first = model.rows_of(Pid, SampledPid), model.ny - model.arrays.size(m.N_INTERNAL)
     places = [

@@ -39,10 +39,10 @@ def _gains(engine: Engine) -> np.ndarray:
     reactions = engine.table(m.NAMED["reactions"]).reshape(-1, 1 + size)
     levers = arrays.table(m.NAMED["bearing_numbers"])["lever"]
     gains = []
-    for row, mine in zip(arrays.table(m.NAMED["rubbing"]), reactions, strict=True):
+    for row, part in zip(arrays.table(m.NAMED["rubbing"]), reactions, strict=True):
         own = range(row["bearing0"], row["bearing0"] + row["n_bearings"])
-        felt = [
-            np.linalg.norm(mine[1 + e]["force"]) + 2.0 * levers[e] * np.linalg.norm(mine[1 + e]["moment"]) for e in own
+        loads = [
+            np.linalg.norm(part[1 + e]["force"]) + 2.0 * levers[e] * np.linalg.norm(part[1 + e]["moment"]) for e in own
         ]
-        gains.append(max(felt))
+        gains.append(max(loads))
     return np.array(gains)

@@ -22,7 +22,7 @@ def make_stops(forms: tuple[Any, ...]) -> Callable:
 
     @kernel
     def stop(d, c):
-        """Store gap and rate of contact c, an end of a coordinate, and apply its force when closed."""
+        """Store gap and rate of contact c, an end of a coordinate, and apply its force or torque when closed."""
         contact, numbers, touch = d.contacts[c], d.contact_numbers[c], d.touch[c]
         value, rate, moment, force = counted(d, contact.surfaces)
         limit, sense = numbers.shape[0], numbers.shape[1]
@@ -32,7 +32,7 @@ def make_stops(forms: tuple[Any, ...]) -> Callable:
         touch.force, touch.offset, touch.point = ZERO, (numbers.clearance - gap, 0.0, 0.0), ZERO
         if d.mode[c] == 1:
             size = -sense * normal_force(d, c)
-            touch.force = scale(size, force)
+            touch.force = scale(size, moment if d.gauges[contact.surfaces].turning else force)
             apply_between(d, contact.outer, contact.inner, scale(size, moment), scale(size, force))
 
     @kernel

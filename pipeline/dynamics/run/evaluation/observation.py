@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
-from flexclear.pipeline.dynamics.equations.observation import Blocks, Frames, Observed
+from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
@@ -45,13 +46,12 @@ def observe_blocks(engine: Engine, rows: np.ndarray, *, after: bool = False) -> 
     return observe_with(engine, rows, pieces, max(recording.record_share(engine.rtol) * engine.rtol, ROUNDING))
 
 
-def frames(engine: Engine, rows: np.ndarray) -> Frames:
-    """Return the frames of links and sites in rows of the record, without projection."""
-    size = engine.model.arrays.size
+def frames(engine: Engine, rows: np.ndarray) -> np.ndarray:
+    """Return LINK_FRAMES without accelerations in rows of the record, without projection; (rows, links)."""
     pieces = engine.pieces[engine.segments(rows[:, 0], after=False)]
-    whole, blocks = observation.room(len(rows), size, frames=True)
+    whole, blocks = observation.room(len(rows), engine.model.arrays.size, frames=True)
     engine.observe(rows, pieces, observation.AS_RECORDED, whole)
-    return observation.frames_by_name(blocks, size)
+    return m.named(m.LINK_FRAMES, blocks["links"])
 
 
 def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, fraction: float) -> Blocks:

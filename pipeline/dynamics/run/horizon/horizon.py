@@ -231,7 +231,7 @@ class Metric:
 
     def motion(self, engine: Engine, rows: np.ndarray) -> np.ndarray:
         """Return the entries of all bodies in rows of the record [sqrt(J)], shape (row, entries)."""
-        seen = frames(engine, rows).links
+        seen = frames(engine, rows)
         speeds = recording.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
         entries = [np.zeros((len(rows), 0))]
         for i, mass, com, turning, modes in self._bodies:

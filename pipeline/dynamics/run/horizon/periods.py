@@ -188,7 +188,7 @@ def handover(part: Engine, here: Moment) -> Handover:
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:
     """Return the moment at the end of a stretch from the work space."""
-    watched, events = part.view(m.WATCH.place).copy(), list[np.ndarray]()
+    watched, events = part.view(m.WATCH.at).copy(), list[np.ndarray]()
     table = m.named(m.WATCH, watched)
     for c in range(len(part.model.contacts)):
         if part.modes[c]:
@@ -218,7 +218,7 @@ def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: f
 def rescaled(
     part: Engine, scales: np.ndarray, here: Moment, neighbour: Moment | None, separation: float
 ) -> tuple[Moment, tuple[float, int]]:
-    """Return the neighbour at its distance again, the logarithm of its growth, and 1 if the growth was not linear.
+    """Return the neighbour at its distance again, the logarithm of its growth, and 1 if it failed or was not linear.
 
     Where the closed contacts of the two differ, both stay as they are until they agree: a state between them would have
     surfaces that overlap without an impact.

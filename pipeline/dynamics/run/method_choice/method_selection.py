@@ -79,20 +79,19 @@ class Rates:
 class Costs:
     """Known and predicted costs of a scene's runs.
 
-    span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
+    span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  handed_over: by integrator, the
     loosest tolerance at which it handed a run over.  expected: by integrator, the evaluations predicted for the present
-    run when it handed over.  left: evaluations and fraction of the motion at the last handover.  touching: True with
-    contacts.
+    run when it handed over.  left: evaluations and fraction of the motion at the last handover.
     """
 
     rates: Rates
     span: float
     names: tuple[str, ...]
     seen: dict[str, dict[float, float]] = field(default_factory=dict)
-    missed: dict[str, float] = field(default_factory=dict)
+    handed_over: dict[str, float] = field(default_factory=dict)
     expected: dict[str, float] = field(default_factory=dict)
     left: tuple[float, float] = (0.0, 0.0)
-    touching: bool = False
+    has_contacts: bool = False
 
     @property
     def by_stability(self) -> float:
@@ -102,14 +101,14 @@ class Costs:
     @property
     def least(self) -> float:
         """Least evaluations of the default method at any tolerance."""
-        return (CONTACT_FACTOR if self.touching else 1.0) * self.by_stability
+        return (CONTACT_FACTOR if self.has_contacts else 1.0) * self.by_stability
 
     def evaluations(self, name: str, rtol: float) -> float:
         """Return the evaluations at a tolerance, extrapolated from the run at the nearest other one."""
         seen = self.seen[name]
         at = min(seen, key=lambda known: abs(np.log(known / rtol)))
         # half of them locate and begin contacts, at any tolerance
-        power = (0.5 if self.touching or name == DEFAULT else 1.0) / (ORDERS[name] + 1.0)
+        power = (0.5 if self.has_contacts or name == DEFAULT else 1.0) / (ORDERS[name] + 1.0)
         if len(seen) > 1 and name != DEFAULT:  # stability may limit both runs of the default method
             other = min((one for one in seen if one != at), key=lambda known: abs(np.log(known / at)))
             slope = float(np.log(seen[other] / seen[at]) / np.log(at / other))
@@ -131,7 +130,7 @@ class Costs:
             left.remove(VIBRATING)
         others = [self.cost(name, rtol) for name in left if name != STIFF]
         if STIFF in left and STIFF not in self.seen and others:
-            known = WORTH_COMPILING if self.touching else WORTH_STIFF * self._growth(rtol)
+            known = WORTH_COMPILING if self.has_contacts else WORTH_STIFF * self._growth(rtol)
             if not min(others) > (known if DEFAULT in self.seen else CRAWLING):
                 left.remove(STIFF)
         return left or [STIFF]
@@ -142,11 +141,11 @@ class Costs:
 
     def _dropped(self, name: str, rtol: float) -> bool:
         """Return True for a method that was too expensive: by stability anywhere, by accuracy at tighter tolerances."""
-        return name in self.missed and (name == DEFAULT or rtol < AGAIN * self.missed[name])
+        return name in self.handed_over and (name == DEFAULT or rtol < AGAIN * self.handed_over[name])
 
     def _vibrates(self) -> bool:
         """Return True when the modes' vibrations alone make the default method expensive."""
-        enough = BETWEEN_CONTACTS if self.touching else CHEAP
+        enough = BETWEEN_CONTACTS if self.has_contacts else CHEAP
         return self.rates.all > FASTER_VIBRATIONS * self.rates.held and self.by_stability > enough
 
     def best(self, rtol: float) -> str:
@@ -173,7 +172,7 @@ class Costs:
             if other != name
             for at, n in [min(runs.items(), key=lambda run: abs(np.log(run[0] / rtol)))]
         ]
-        if name == STIFF and DEFAULT in self.missed:
+        if name == STIFF and DEFAULT in self.handed_over:
             return f"{STIFF}: stability limited the steps of {DEFAULT} in a run before"
         if name in self.seen and known:
             return (
@@ -188,7 +187,7 @@ class Costs:
                 f"{VIBRATING}: the modes' fastest vibration, {self.rates.all / 6.283:.3g} Hz, would take {most}; "
                 f"with them followed exactly, the fastest rate is {self.rates.held:.3g} 1/s"
             )
-        if VIBRATING in self.missed:
+        if VIBRATING in self.handed_over:
             return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
         if not self.rates.all:
             return f"{DEFAULT}: it is tried first, as nothing at the start shows a fast rate"
@@ -207,7 +206,7 @@ class Costs:
                 continue
             every = max(int(LOOK_FRACTION * most), LEAST_LOOK)
             least = WORTH_STIFF
-            if self.touching and heir not in self.seen:
+            if self.has_contacts and heir not in self.seen:
                 least = WORTH_COMPILING / CLEARLY_COSTLIER
             panel[name] = (Judge(every, self._verdict(name, heir, max(most, least))), heir)
         return panel
@@ -241,7 +240,7 @@ class Costs:
         if DEFAULT in self.expected:  # where stability limits the steps, the progress rate gives the whole cost
             self.seen.setdefault(DEFAULT, {})[rtol] = self.expected[DEFAULT]
         if run.attrs["method"] != name and not (name == DEFAULT and name in self.expected):
-            self.missed[name] = max(rtol, self.missed.get(name, 0.0))
+            self.handed_over[name] = max(rtol, self.handed_over.get(name, 0.0))
         used, done = self.left if self.expected else (0.0, 0.0)
         if done < CHARACTERISTIC:
             rest = (float(run.attrs["evaluations"]) - used) / (1.0 - done)
@@ -264,7 +263,7 @@ def method_costs(scene: Scene, bundles: Mapping[str, Labelled]) -> Costs:
         known = rates(engine, start)
     except SolverError:  # a run may start where linearisation is impossible, as in a singular pose
         known = Rates(0.0, 0.0)
-    return Costs(known, engine.end - engine.start, names, touching=bool(engine.model.contacts))
+    return Costs(known, engine.end - engine.start, names, has_contacts=bool(engine.model.contacts))
 
 
 def rates(engine: Engine, y: np.ndarray) -> Rates:

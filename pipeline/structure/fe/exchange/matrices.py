@@ -54,11 +54,11 @@ def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
     data |= {name: (MATRICES[name].dims, values) for name, values in contents.moments.items() if name in MATRICES}
     data |= _frames(recipe, contents.table, position, path)
     try:
-        made = xr.Dataset(data)
+        dataset = xr.Dataset(data)
     except ValueError as error:  # integrals in a file have other sizes than its unknowns
         raise InputError(where, f"what the file holds does not fit together: {error}") from None
     kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "matrices")
-    return conform(made, MATRICES, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
+    return conform(dataset, MATRICES, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
 
 
 def _read(shape: Matrices, folder: Path, where: str) -> Contents:
@@ -261,13 +261,13 @@ def _lumped(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions:
     mass, c = blocks[:, 0, 0], _axial(blocks[:, 3:, :3]) / blocks[:, :1, 0]
     lever = skew(c)
     J = blocks[:, 3:, 3:] + mass[:, None, None] * lever @ lever
-    made = np.zeros_like(blocks)
-    made[:, range(3), range(3)] = mass[:, None]
-    made[:, 3:, :3] = mass[:, None, None] * lever
-    made[:, :3, 3:] = -made[:, 3:, :3]
-    made[:, 3:, 3:] = blocks[:, 3:, 3:]
+    expected = np.zeros_like(blocks)
+    expected[:, range(3), range(3)] = mass[:, None]
+    expected[:, 3:, :3] = mass[:, None, None] * lever
+    expected[:, :3, 3:] = -expected[:, 3:, :3]
+    expected[:, 3:, 3:] = blocks[:, 3:, 3:]
     size = np.array([1.0] * 3 + [np.ptp(positions, axis=0).max()] * 3)
-    if np.any(np.abs(made - blocks) > ALIKE * mass[:, None, None] * np.outer(size, size)):
+    if np.any(np.abs(expected - blocks) > ALIKE * mass[:, None, None] * np.outer(size, size)):
         return None
     motion = at_centres(models.node_motion(index, component, len(first)), c)
     return Slices(mass, positions[first] + c, spread(J), motion)

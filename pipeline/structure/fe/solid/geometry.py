@@ -29,7 +29,7 @@ class Geometry:
     cell_regions: dict[str, np.ndarray]
 
 
-def made(shape: Cylinder | Block) -> Geometry:
+def generated(shape: Cylinder | Block) -> Geometry:
     """Generate the mesh of a cylinder or block."""
     if isinstance(shape, Cylinder):
         n = shape.cells

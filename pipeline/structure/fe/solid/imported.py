@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 NAMES = {element.cell: name for name, element in ELEMENTS.items()}
 #: other cells that a file may hold; those of faces name surfaces
 FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
-BESIDES = ("vertex", "line", "line3", *FACES)
+OTHER_CELLS = ("vertex", "line", "line3", *FACES)
 #: an integer array of cell data with more distinct values numbers the cells and names no regions
 MOST_REGIONS = 1000
 REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
@@ -45,7 +45,7 @@ def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
 
 def _cell_type(mesh: Mesh, where: str) -> str:
     counts = {block.type: sum(len(b.data) for b in mesh.cells if b.type == block.type) for block in mesh.cells}
-    solid = {name: count for name, count in counts.items() if name not in BESIDES}
+    solid = {name: count for name, count in counts.items() if name not in OTHER_CELLS}
     listed = ", ".join(f"{count} {name}" for name, count in (solid or counts).items()) or "no cells at all"
     known = ", ".join(NAMES)
     if not solid:

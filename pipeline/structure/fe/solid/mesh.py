@@ -23,7 +23,7 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     """Build the mesh dataset (schema SOLID); raise InputError for faulty meshes and frames."""
     where = f"{path} [shape]"
     shape = recipe.shape
-    geometry = imported.read(shape, folder, where) if isinstance(shape, MeshFile) else geometries.made(shape)
+    geometry = imported.read(shape, folder, where) if isinstance(shape, MeshFile) else geometries.generated(shape)
     geometries.check(geometry, where)
     names, region = _materials(recipe, geometry, path)
     materials = [recipe.materials.get(name) or recipe.material for name in names]

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model, rows
-from flexclear.pipeline.structure.modes.condition import Condition, Given, different, joined
+from flexclear.pipeline.structure.modes.condition import Condition, Given, distinct, interfaces_of
 
 FAMILY = "flexclear.pipeline.structure.modes.reference"
 
@@ -34,7 +34,7 @@ def craig_chang(model: Model, given: Given) -> Condition:
     of their computation and is removed by mass orthogonality.  Raises InputError without interfaces.
     Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
     """
-    different(joined(given, 1, "attachment modes need an interface to load"))
+    distinct(interfaces_of(given, 1, "attachment modes need an interface to load"))
     note = "six rigid-body modes were left out; the attachment modes' rigid motion was taken out by mass orthogonality"
     return _free(model, note, rows(given.interfaces, model.size))
 

@@ -11,12 +11,12 @@ import scipy.sparse as sp
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import DIRECTIONS, Interface, Model, rows
-from flexclear.pipeline.structure.modes.condition import WHERE, Condition, Given, different, in_own_axes, joined
+from flexclear.pipeline.structure.modes.condition import WHERE, Condition, Given, distinct, in_own_axes, interfaces_of
 
 
 def cantilever(model: Model, given: Given) -> Condition:
     """Return the condition for normal modes with the first interface clamped; raise InputError without interfaces."""
-    first = joined(given, 1, "a cantilever is clamped at an interface")[0]
+    first = interfaces_of(given, 1, "a cantilever is clamped at an interface")[0]
     return _holding(first.motion, f"the body frame rides on '{first.name}', where all shapes vanish")
 
 
@@ -27,7 +27,7 @@ def craig_bampton(model: Model, given: Given) -> Condition:
     Raises InputError without interfaces, and when two interfaces are the same.
     Source: Craig & Bampton (1968), AIAA Journal 6, 1313-1319.
     """
-    different(joined(given, 1, "a Craig-Bampton basis needs at least one interface"))
+    distinct(interfaces_of(given, 1, "a Craig-Bampton basis needs at least one interface"))
     held = rows(given.interfaces, model.size)
     first = given.interfaces[0].name
     note = f"the body frame rides on '{first}', where all shapes vanish; no rigid motion is left"
@@ -56,7 +56,7 @@ def pinned_pinned(model: Model, given: Given) -> Condition:
     Six conditions: the first interface does not move and does not turn about the line to the second; the second moves
     along that line only.  Raises InputError unless two interfaces are at different points.
     """
-    first, second = joined(given, 2, "a pinned-pinned basis needs two interfaces")[:2]
+    first, second = interfaces_of(given, 2, "a pinned-pinned basis needs two interfaces")[:2]
     line = second.position - first.position
     length = float(np.linalg.norm(line))
     if length <= 1e-9 * np.ptp(model.position, axis=0).max():
