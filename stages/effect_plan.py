@@ -31,8 +31,8 @@ NORMAL = ("free-free", "fixed-fixed", "cantilever")
 PAIR, LEAST_HALVED = 2, 4
 
 
-def task(scene: Scene) -> Task:
-    """Return the task that plans a scene; its artifact is shown as ``plan.nc``."""
+def task(scene: Scene, *, watched: bool = False) -> Task:
+    """Return the task that plans a scene; its artifact is shown as ``plan.nc``. watched: as of `plan`."""
     rigid = edited(
         variants.without(scene, [effect for effect in variants.effects(scene) if effect.name.startswith("body.")]),
         {"accuracy": None},
@@ -56,6 +56,7 @@ def task(scene: Scene) -> Task:
             "title": scene.title,
             "elements": counts,
             "units": {q.name: q.unit for q in scene.requested()},
+            "watched": watched,
         },
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,
@@ -128,7 +129,8 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     own = {name: data for name, data in rigid.items() if bodies[name.removeprefix(simulation.RIGID)]["type"] == "rigid"}
     scene = simulation.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
     meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
-    return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress)
+    watched = params.get("watched", False)
+    return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress, watched)
 
 
 def fewer_modes(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:

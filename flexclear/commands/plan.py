@@ -82,7 +82,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     plans: dict[str, xr.Dataset | str] = {}
     for level in LEVELS:
         try:
-            plans[level] = bring(with_accuracy(scene, level), workplace).made.dataset()
+            plans[level] = bring(scene, workplace, level).made.dataset()
         except (InputError, FailedTasksError) as error:
             if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
@@ -110,7 +110,7 @@ def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene
     from flexclear.pipeline.post.answers.plan import verified, words
 
     workplace = open_workplace()
-    planned = bring(scene if scene.accuracy is not None else with_accuracy(scene, level), workplace)
+    planned = bring(scene, workplace, level if scene.accuracy is None else None)
     result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))
@@ -155,12 +155,14 @@ def _example(scene: Scene) -> str:
     return f'{body}.position = "10 um"'
 
 
-def bring(scene: Scene, workplace: Workplace) -> Planned:
+def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Planned:
     """Bring the plan of a scene up to date, and write the planned scene's file and the page next to it.
 
+    level: accuracy of all watched quantities that change, in place of the scene's `[accuracy]`, as in `with_accuracy`.
     Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy no plan or every plan meets, and
     the errors of its runs.
     """
+    scene = scene if level is None else with_accuracy(scene, level)
     where = f"{scene.path or scene.name}"
     if scene.accuracy is None or not scene.accuracy.quantities:
         raise InputError(
@@ -172,7 +174,7 @@ def bring(scene: Scene, workplace: Workplace) -> Planned:
         raise InputError(
             where, "has no effect that could be left out: no clearance, flexible body, friction, gravity or stop"
         )
-    (made,) = workplace.made(effect_plan.task(scene))
+    (made,) = workplace.made(effect_plan.task(scene, watched=level is not None))
     planned = Planned(scene, of(scene, made.dataset()), made)
     if scene.path is not None:
         publish(planned.target, planned.file(planned.target))
@@ -253,9 +255,9 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
 
     assert planned.scene.accuracy is not None
     asked, begun = planned.scene.accuracy.quantities, time.monotonic()
-    chosen = [parse(name, planned.scene.owners()) for name in asked]
     full = edited(planned.scene, {"accuracy": None})
     result, first = planned.made.dataset()[["requested"]].copy(), list[float]()
+    chosen = [parse(str(name), planned.scene.owners()) for name in result["quantity"].values]
 
     def compared(members: int) -> list[effect_size.Agreement]:
         both = full, planned.planned

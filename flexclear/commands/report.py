@@ -20,13 +20,12 @@ from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.scene.output import rows
 from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.scene.variants import loose
-from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import FlexclearError, ResourceError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.pages import Part, downloads, figures_of, in_folder, page, prose
 from flexclear.pipeline.post.render import gl
 from flexclear.stages import derived_series
 from flexclear.stages.workplace import (
-    FailedTasksError,
     Made,
     Workplace,
     add_options,
@@ -137,7 +136,8 @@ def of_scene(
 
     One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
     the page has no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: False leaves out
-    those that take further runs. Raises FailedTasksError when the run itself fails.
+    those that take further runs. Raises FailedTasksError when the run itself fails, and, after the page is written,
+    ResourceError where a limit of time, of the machine or of `[limits]` left parts out.
     """
     scene = graph.scene
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
@@ -149,13 +149,18 @@ def of_scene(
     outcome = workplace.bring([*drawn, graph.overview, *members])  # the film takes longest, so it begins first
     if any(failure.task not in [*drawn, *members] for failure in outcome.failures):
         check(outcome)
+    left_out = {failure.task.label: failure.exit_code for failure in outcome.failures}
     for failure in outcome.failures:
         workplace.monitor.say(f"not in the report: {failure.message}")
     made = workplace.artifacts(outcome)
     run = made[graph.simulate].dataset() if graph.simulate in made else None
-    result = _answers(answering, workplace) if run is not None else {}
+    result, failed = _answers(answering, workplace) if run is not None else ({}, {})
     text = _page(graph, made, compared, run, result)
-    return publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
+    target = publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
+    limited = [name for name, code in (left_out | failed).items() if code == ResourceError.exit_code]
+    if limited:
+        raise ResourceError(f"{relative(target)} is written without {', '.join(limited)}")
+    return target
 
 
 def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
@@ -169,18 +174,19 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
     return where / name / "index.html"
 
 
-def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
-    """Return the answers that succeed, by name; report why another one fails."""
-    result = {}
+def _answers(answers: Answers, workplace: Workplace) -> tuple[dict[str, Made], dict[str, int]]:
+    """Return the answers that succeed, and the exit codes of the others, whose errors it reports; by name."""
+    result, failed = dict[str, Made](), dict[str, int]()
     for name in ("accuracy", "stability", "matters") if answers.questions else ("stability",):
         try:
             answer = getattr(answers, name)
-        except (InputError, SolverError, FailedTasksError) as error:
+        except FlexclearError as error:
             workplace.monitor.say(f"not in the report: {name}: {error}")
+            failed[name] = error.exit_code
             continue
         if answer is not None:
             result[name] = answer
-    return result
+    return result, failed
 
 
 def _answered(scene: Scene, result: Mapping[str, Made]) -> list[Part]:

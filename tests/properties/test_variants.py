@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexclear.commands.new import write
-from flexclear.pipeline.core.artifacts.effect_size import chance, influence
+from flexclear.pipeline.core.artifacts.effect_size import chance, influence, recorded
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
@@ -121,6 +121,21 @@ def test_a_difference_of_means_within_their_standard_errors_is_chance():
 def test_a_quantity_that_one_side_lacks_is_infinitely_far():
     empty = Point({}, {}, {}, 1)
     assert influence(_point(np.zeros((2, 3))), empty, Quantity("b", "position"), 4).difference == np.inf
+
+
+def test_changes_of_a_component_that_are_rounding_of_its_vector_are_none():
+    """Across its plane a mechanism at 2 m/s moves by rounding, of which nothing is an effect; 1e-9 m/s is one."""
+    across = Quantity("a", "velocity", "z", text="a.velocity.z")
+
+    def moving(size: float) -> Point:
+        values = {"series": np.full(4, size), "largest": np.array(size)}
+        return Point(
+            {"a.velocity.largest": np.array(2.0)} | {f"a.velocity.z.{k}": v for k, v in values.items()}, {}, {}, 1
+        )
+
+    assert influence(moving(2e-14), moving(1e-15), across, 0).most == 0.0
+    assert influence(moving(1e-9), moving(0.0), across, 0).difference == pytest.approx(1e-9)
+    assert {one.name for one in recorded({"body": ["a"]}, [across])} == set(moving(0.0).values)
 
 
 def test_members_that_have_parted_and_agree_at_one_output_by_accident_tell_no_difference():

@@ -308,6 +308,22 @@ def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, c
     assert said.count("gravity") >= 3  # without it nothing swings
 
 
+def test_watched_components_that_never_change_are_left_out_of_the_levels(tmp_path: Path, command: Command):
+    """A pendulum does not move along its axis; an accuracy of that motion which is named in [accuracy] is refused."""
+    path = write("pendulum", tmp_path)[0]
+    text = path.read_text()
+    path.write_text(text.replace('"rod.position",', '"rod.velocity.z",'))
+    said = command("plan", path, "-q", "--jobs", "1").out
+    assert all(f"| {level}" in said for level in plan.LEVELS)
+    assert said.count("gravity") >= 3
+    assert said.count("Left out: rod.velocity.z, which never changes") == 1
+    planned, found = fc.plan(load_scene(path), budget=30.0, accuracy="1 %")
+    assert list(found["quantity"].values) == ["rod.velocity", "hinge.force"]
+    assert planned.watched()[0].name == "rod.velocity.z"
+    path.write_text(f'{text}\n[accuracy]\nrod.velocity = "1 %"\n"rod.velocity.z" = "1 %"\n')
+    assert "[accuracy] rod.velocity.z" in command("plan", path, "-q", "--jobs", "1", code=2).err
+
+
 def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Path, fresh: Path):
     scene = edited(
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}

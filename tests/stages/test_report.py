@@ -4,12 +4,16 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.commands import report
+from flexclear.commands.answers import Answers
+from flexclear.commands.new import write
 from flexclear.papers.wang_wang_2019.tasks import Scenes, figure_tasks
 from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError, SolverError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages.workplace import Workplace
+from tests.stages.conftest import Command
 
 
 def test_every_figure_and_table_of_the_paper_has_its_inputs(root: Path, tmp_path: Path):
@@ -60,3 +64,22 @@ def test_kernels_for_the_timing_alone_are_compiled_concurrently_and_once_per_top
 def test_references_that_lead_nowhere_are_refused(reference: str, reported: str):
     with pytest.raises(InputError, match=reported):
         Scenes().artifact(reference)
+
+
+@pytest.mark.parametrize("error", [ResourceError("the time that --limit 9s gives is over"), SolverError("is singular")])
+def test_a_page_that_a_limit_left_incomplete_is_written_and_the_command_ends_with_4(
+    error: FlexclearError, tmp_path: Path, fresh: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+):
+    """An answer that its runs refuse is left out as well, but there the command has done what it could."""
+
+    def stopped(_: Answers) -> None:
+        raise error
+
+    monkeypatch.setattr(Answers, "stability", property(stopped))
+    monkeypatch.setattr(report, "SHOWN_MOTION", ())
+    limited = error.exit_code == 4
+    path = write("pendulum", tmp_path)[0]
+    said = command("report", path, "--jobs", "1", "--answers", "none", code=4 if limited else 0)
+    assert (fresh / "runs" / "pendulum" / "report.html").exists()
+    assert f"not in the report: stability: {error}" in said.err
+    assert ("report.html is written without stability" in said.err) == limited

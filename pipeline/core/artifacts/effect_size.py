@@ -33,6 +33,8 @@ POOLED = 0.05
 #: recorded reductions of quantities that are not of contacts: the series, and the largest value, which an impact may
 #: cause between outputs
 OTHERS = ("series", "largest")
+#: changes of a vector's component below this fraction of the vector's largest magnitude are rounding
+ROUNDING = 1e-12
 #: a difference is real when it is at least so many times its uncertainty by chance or by errors of the runs
 REAL = 2.0
 
@@ -107,7 +109,14 @@ def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) 
 
     owners: names of the scene's components, by kind.
     """
-    return [one for q in chosen if q.is_there(owners) for one in _compared(q)]
+    there = [q for q in chosen if q.is_there(owners)]
+    every = [*(one for q in there for one in _compared(q)), *(_whole(q) for q in there if q.component)]
+    return list({one.name: one for one in every}.values())
+
+
+def _whole(quantity: Quantity) -> Recorded:
+    """Return the largest magnitude of the vector of which a quantity is a component."""
+    return Recorded(replace(quantity, component="", text=""), "largest")
 
 
 def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
@@ -126,7 +135,7 @@ def _turns(what: Recorded) -> bool:
 
 
 def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
-    """Return the difference of two variants in a quantity.
+    """Return the difference of two variants in a quantity; zero where it is rounding.
 
     members: number of starts run of each; a point without deviations counts as exactly known.
     """
@@ -138,7 +147,8 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
         uncertainty = chance(members) * error
         differences.append(float(_beyond(distance, uncertainty).max(initial=0.0)))
         uncertainties.append(float(uncertainty.max(initial=0.0)))
-    return Influence(max(differences), max(uncertainties))
+    result = Influence(max(differences), max(uncertainties))
+    return Influence(0.0) if result.most <= max(rounding(a, quantity), rounding(b, quantity)) else result
 
 
 def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray, np.ndarray]:
@@ -282,6 +292,11 @@ def size(point: Point, quantity: Quantity) -> float:
     if quantity.of_place:
         return float(np.linalg.norm(values - values[:1], axis=1).max())
     return float(np.abs(point.values[f"{name}.largest"]))
+
+
+def rounding(point: Point, quantity: Quantity) -> float:
+    """Return the value below which a vector's component is rounding, such as motion across a plane; 0 for others."""
+    return ROUNDING * float(point.values.get(_whole(quantity).name, 0.0)) if quantity.component else 0.0
 
 
 def _rows(values: np.ndarray) -> np.ndarray:

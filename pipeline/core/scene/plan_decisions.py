@@ -58,7 +58,8 @@ class Plan:
     flexible bodies that need fewer than they have. integration: estimated error of the integration by quantity [SI].
     evaluations: of the right-hand side in all runs of the plan. runs: their number. uncoupled: names of parts that
     nothing couples to the requested quantities. meshes: finite elements of flexible bodies whose recipes give their
-    number. ledger_tolerance: of the planned run, where it differs from the usual one.
+    number. ledger_tolerance: of the planned run, where it differs from the usual one. constant: watched quantities that
+    never change in the ideal mechanism, for which nothing is planned.
     """
 
     decisions: tuple[Decision, ...]
@@ -72,6 +73,7 @@ class Plan:
     uncoupled: tuple[str, ...] = ()
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     ledger_tolerance: float | None = None
+    constant: tuple[str, ...] = ()
 
     @property
     def gone(self) -> tuple[Effect, ...]:

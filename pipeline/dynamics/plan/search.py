@@ -54,12 +54,14 @@ def plan(
     meshes: Mapping[str, tuple[int, xr.Dataset]],
     filled: Callable[[Scene], Scene],
     progress: Progress,
+    watched: bool = False,
 ) -> Plan:
     """Return the decisions for a scene with `[accuracy]`.
 
     bundles: reduced flexible bodies.  fewer: those with fewer modes, for bodies with a choice, levels with the
     fewest first.  meshes: numbers of elements, and the bodies reduced from twice as many.  filled: fills a variant
-    with the rigid bodies that recipes describe.
+    with the rigid bodies that recipes describe.  watched: the quantities are those that the scene watches, not named
+    for their accuracy: those that never change are left out.
     Raises InputError where nothing is requested, or the motion is smaller than the request; SolverError where the
     scene, or its planned variant, cannot be run.
     """
@@ -74,27 +76,29 @@ def plan(
     runs.must_run((), BEGINNING, 0)
     loose, soft = ([effect for effect in runs.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
     ideal = runs.point([*loose, *soft], rtol=RTOL)
-    search = Search(runs, _requested(scene, quantities, ideal, lambda: runs.point(soft)))
+    search = Search(runs, _requested(scene, quantities, ideal, lambda: runs.point(soft), watched))
+    runs.chosen = [q for q in quantities if q.name in search.requested]
     rigid = _rigid(search, [*loose, *soft]) if loose or soft else None
     _clearances(search, loose, soft, rigid)
     _interactions(search, soft)
     _flexibilities(search, soft, loose, rigid)
     _confirm(search, soft)
     _others(search)
-    return _finished(search, effects(scene), uncoupled_parts, meshes)
+    constant = tuple(q.name for q in quantities if q.name not in search.requested)
+    return replace(_finished(search, effects(scene), uncoupled_parts, meshes), constant=constant)
 
 
 def _requested(
-    scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]
+    scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point], watched: bool
 ) -> dict[str, float]:
     """Return the requested accuracy by quantity [SI]; relative ones refer to the size in the ideal mechanism. For
     quantities of contacts the size is that with rigid bodies, half of it where bodies are flexible.
 
-    rigid: runs the scene with clearance and rigid bodies.
-    Raises InputError where a quantity never changes, or all requested errors exceed the quantities' sizes;
-    SolverError where the mechanism with rigid bodies cannot be run.
+    rigid: runs the scene with clearance and rigid bodies.  watched: quantities that never change are left out.
+    Raises InputError where a quantity never changes (with `watched`: where none changes), or all requested errors
+    exceed the quantities' sizes; SolverError where the mechanism with rigid bodies cannot be run.
     """
-    accuracies, sizes = {}, {}
+    accuracies, sizes, constant = dict[str, float](), dict[str, float](), list[str]()
     where = f"{scene.path or scene.name} [accuracy]"
     assert scene.accuracy is not None
     for q in quantities:
@@ -104,13 +108,18 @@ def _requested(
             raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")
         sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
         want = scene.accuracy.quantities[q.name]
-        accuracies[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
-        if not accuracies[q.name] > 0.0:
-            raise InputError(
-                f"{where} {q.name}",
-                "a relative accuracy of a quantity that never changes in the ideal mechanism",
-                "give an absolute one, with a unit",
-            )
+        if want.absolute is None and sizes[q.name] <= effect_size.rounding(point, q):
+            constant.append(q.name)
+        else:
+            accuracies[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
+    if constant and not (watched and accuracies):
+        raise InputError(
+            f"{where} {constant[0]}",
+            "a relative accuracy of a quantity that never changes in the ideal mechanism",
+            "give an absolute one, with a unit",
+        )
+    quantities = [q for q in quantities if q.name in accuracies]
+    sizes = {name: sizes[name] for name in accuracies}
     if all(accuracies[name] >= size for name, size in sizes.items()):
         # forces and rates may come from impacts alone
         more = rigid() if scene.contacts() or scene.stop else ideal

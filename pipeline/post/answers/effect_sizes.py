@@ -125,7 +125,7 @@ def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Qu
         name: np.sqrt(np.sum([np.square(p.deviation.get(name, 0.0 * p.values[name])) for p in points], axis=0))
         for name in names
     }
-    nothing = Point({name: np.zeros_like(value) for name, value in values.items()}, {}, {}, 0)
+    nothing = Point({**both.values, **{name: np.zeros_like(value) for name, value in values.items()}}, {}, {}, 0)
     return influence(Point(values, {}, deviation, 0), nothing, quantity, members)
 
 
@@ -159,8 +159,9 @@ def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
 
 
 def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...], unit: str) -> str:
-    """Format a value of a dataset with its uncertainty."""
-    return written(float(dataset[name].values[at]), float(dataset[f"{name}_uncertainty"].values[at]), unit)
+    """Format an effect size of a dataset with its uncertainty."""
+    value, uncertainty = (float(dataset[part].values[at]) for part in (name, f"{name}_uncertainty"))
+    return "none" if value == uncertainty == 0.0 else written(value, uncertainty, unit)
 
 
 def written(value: float, uncertainty: float, unit: str) -> str:

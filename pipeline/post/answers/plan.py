@@ -47,6 +47,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         **({"integrator": plan.integrator, "rtol": plan.rtol} if plan.integrator else {}),
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
         "uncoupled": list(plan.uncoupled),
+        "constant": list(plan.constant),
     }
     values = {
         "influence": np.reshape([[d.estimate.get(n, np.nan) for n in names] for d in decisions], (-1, len(names))),
@@ -120,6 +121,7 @@ def table(planned: xr.Dataset) -> Table:
         notes.append(
             f"Not integrated, since nothing couples it to the requested quantities: {listed(decided['uncoupled'])}."
         )
+    notes += _constant(decided)
     notes.append(
         f"{_integrated(decided)} The plan rests on {planned.attrs['runs']} short runs, "
         f"{planned.attrs['evaluations']:,} evaluations."
@@ -130,6 +132,15 @@ def table(planned: xr.Dataset) -> Table:
         tuple(rows),
         tuple(notes),
     )
+
+
+def _constant(decided: Mapping[str, Any]) -> list[str]:
+    """Return a sentence that lists the watched quantities for which nothing is planned; else nothing."""
+    names = decided["constant"]
+    if not names:
+        return []
+    verb = "never changes" if len(names) == 1 else "never change"
+    return [f"Left out: {listed(names)}, which {verb} in the ideal mechanism; [accuracy] takes an absolute accuracy."]
 
 
 def _integrated(decided: Mapping[str, Any]) -> str:
@@ -243,12 +254,13 @@ def _verdict(planned: xr.Dataset, k: int) -> str:
 
 def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
     """Tabulate the plan for each accuracy, by the accuracy in words; a string says why a plan is missing."""
-    rows = list[tuple[str, ...]]()
+    rows, constant = list[tuple[str, ...]](), dict[str, None]()
     for level, result in plans.items():
         if isinstance(result, str):
             rows.append((level, "–", "–", "–", "–", result.splitlines()[0]))
             continue
         text = json.loads(result.attrs["planned"])
+        constant |= dict.fromkeys(_constant(text))
         needed, unseen, gone = _sorted(result)
         modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
         method = f"{text['integrator']}, rtol {text['rtol']:.0e}" if "integrator" in text else "as the scene"
@@ -261,6 +273,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
             "Each accuracy is that of all watched quantities, of positions and angles a fraction of the largest change "
             "from the start, of others of the largest value; name one in [accuracy] to get its planned scene. "
             "Unchanged without a run: leaving the effect out would save no time worth the runs that measure its size.",
+            *constant,
         ),
     )
 
