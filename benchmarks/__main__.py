@@ -1,8 +1,7 @@
-"""``python -m benchmarks [FAMILY ...]``: measure, log, and write the pages of docs/ that show it."""
+"""``python -m benchmarks [FAMILY ...]``: measure, log, and write the measured parts of docs/."""
 
 from __future__ import annotations
 
-# first of all: it pins BLAS to one thread, which NumPy reads when it is imported
 import argparse
 import os
 import sys
@@ -21,7 +20,7 @@ from flexclear.pipeline.post.plotting.table import pipe_table
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Do what the options say; exit code as of the command `flexclear`, and 1 when a case went wrong."""
+    """Measure, list or write pages as the options say; return the exit code of `flexclear`, or 1 for a wrong case."""
     options = _parser().parse_args(arguments)
     try:
         chosen = {name: page.named(name) for name in options.families or families.NAMES}
@@ -64,7 +63,7 @@ def _listed(chosen: dict[str, Family]) -> str:
 
 
 def _run(name: str, family: Family, options: argparse.Namespace) -> bool:
-    """Measure a family, print and log what was found; whether a case went wrong."""
+    """Measure a family, print and log the records; return True when a case went wrong."""
     settings = _settings(name, family, options)
     if family.needs is not None and not processes.installed(family.needs[0]):
         library, extra = family.needs
@@ -92,7 +91,7 @@ def _run(name: str, family: Family, options: argparse.Namespace) -> bool:
 
 
 def _measured(name: str, family: Family, cases: list[Case], memory: log.Memory, jobs: int) -> dict[str, list[Record]]:
-    """Records by case; what is known is not measured again."""
+    """Return the records by case; cases with valid earlier results are not measured again."""
     found = {case.name: known for case in cases if (known := memory.recall(case)) is not None}
     todo = [case for case in cases if case.name not in found]
     say, begun = Monitor().say, time.monotonic()
@@ -107,7 +106,7 @@ def _measured(name: str, family: Family, cases: list[Case], memory: log.Memory, 
 
 
 def _settings(name: str, family: Family, options: argparse.Namespace) -> dict[str, int]:
-    """Settings of a family with those that were asked for; others than its own go into a folder of their own."""
+    """Return the family's settings, changed by `--set`; raise InputError when a change lacks --into and --dry."""
     found = dict(family.settings)
     for text in options.set:
         key, _, value = text.partition("=")

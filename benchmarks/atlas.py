@@ -1,6 +1,6 @@
-"""The cases of the atlas, and a scene for each: the 4-SPS/PS mechanism with its parameters free.
+"""Cases of the stability atlas: scenes of the 4-SPS/PS mechanism with varied parameters, and their verdicts.
 
-One parameter at a time is moved over its range, and there are random points of all of them.
+Sweeps vary one parameter at a time over its range; random points vary all parameters.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ CLEARANCE, STIFFNESS = 0.5e-3, 1.3631e11  # Table 3 [m], eq. (26) with its data 
 RADIUS_A, RADIUS_B, HEIGHT = 0.1, 0.2, 0.35
 ANGLE_A, ANGLE_B, SINGULAR = 30.0, 60.0, 45.0
 STROKE, LIFT = 0.18, 0.06  # duration [s] and change of the driven legs [m]
-#: evaluations after which a case counts as refused: with rigid bodies about a minute; a hundred strokes take half of it
+#: limit of evaluations, above which a case is refused: about a minute with rigid bodies, twice what 100 strokes take
 CAP = 8_000_000
 #: Craig-Bampton counts that cut no pair of equal frequencies: 6 static modes and pairs, torsion, axial
 MODES = (0, 6, 8, 10, 11, 13, 15, 30)
-#: ranges over which single parameters are varied; logarithmic ones by decades
+#: values of each swept parameter
 RANGES: dict[str, tuple[float, ...]] = {
     "clearance": tuple(np.geomspace(1e-6, 2e-3, 14).tolist()),
     "stiffness": tuple(np.geomspace(1e-2, 1e4, 13).tolist()),
@@ -58,7 +58,7 @@ RANGES: dict[str, tuple[float, ...]] = {
     "joints": (1, 2, 3, 4, 5),
     "strokes": (1, 10, 100),
 }
-#: the parameter that another one needs to mean anything
+#: further parameters that a swept parameter needs to have an effect
 ALONG: dict[str, dict[str, Any]] = {"damping": {"modes": 13}}
 
 
@@ -66,9 +66,9 @@ ALONG: dict[str, dict[str, Any]] = {"damping": {"modes": 13}}
 class Parameters:
     """One point of the atlas; the defaults are the paper's clearance model.
 
-    clearance [m]; stiffness, speed and mass: factors; modes: elastic coordinates kept, 0 for a rigid rod; damping:
+    clearance [m]; stiffness, speed and mass: factors; modes: modal coordinates of rod 1, 0 for a rigid rod; damping:
     modal damping ratio; nearness: 0 for the scene's geometry, 1 for the singular one (aligned squares); joints: number
-    of clearance joints (A1..A4, C); strokes: how often the motion is repeated.
+    of clearance joints (A1..A4, C); strokes: number of repetitions of the motion.
     """
 
     clearance: float = CLEARANCE
@@ -85,12 +85,12 @@ class Parameters:
 
 
 def cases(seed: int, random: int) -> list[Case]:
-    """All single sweeps, and so many random points; other seeds give others of the same kind."""
+    """Return all sweeps and `random` random points; another seed gives other points of the same distribution."""
     return [*_sweeps(), *_random(seed, random)]
 
 
 def sweep(case: str) -> str:
-    """The parameter that moves in a case of this name, or `random`."""
+    """Return the parameter that a case of this name varies, or `random`."""
     return case.partition(" ")[0]
 
 
@@ -103,7 +103,7 @@ def _sweeps() -> Iterator[Case]:
 
 
 def _random(seed: int, count: int) -> Iterator[Case]:
-    """Every parameter uniform over its range (logarithmic where it spans decades); flexible rods in one of four."""
+    """Yield points with every parameter uniform over its range (logarithmic over decades); one in four is flexible."""
     random = np.random.default_rng(seed)
     for k in range(count):
         flexible = random.random() < 0.25
@@ -125,7 +125,7 @@ def _random(seed: int, count: int) -> Iterator[Case]:
 
 
 def scene(p: Parameters, rtol: float | None = None) -> Scene:
-    """The scene of a point. Raises InputError when it cannot be described."""
+    """Return the scene of a point; raise InputError when no valid scene describes the point."""
     moved = edits(layout(p.nearness), flexible=bool(p.modes)) if p.nearness else {}
     table = compose(TREE / "scenes" / "sps4" / "variants" / "first_csj.toml")
     _scale_mass(table["body"]["platform"], p.mass)
@@ -135,7 +135,7 @@ def scene(p: Parameters, rtol: float | None = None) -> Scene:
     if p.modes:
         table["body"]["rod1"] = _flexible(table["body"]["rod1"], p)
     _time(table, p)
-    # a method of its own: the program would look for the loosest tolerance that suffices up to the horizon
+    # a fixed method: automatic selection would choose the loosest tolerance that suffices up to the horizon
     table["solver"] = {"integrator": DEFAULT, "evaluations": CAP} | ({"rtol": rtol} if rtol else {})
     table.pop("ensemble", None)
     made = scene_of(table, moved)
@@ -144,13 +144,11 @@ def scene(p: Parameters, rtol: float | None = None) -> Scene:
 
 
 def layout(nearness: float) -> Layout:
-    """Joints on two circles, from the scene's own angles (0) to those of aligned squares, which are singular (1)."""
-    angles = np.deg2rad([own + nearness * (SINGULAR - own) for own in (ANGLE_A, ANGLE_B)])
-    (ax, ay), (bx, by) = (
-        radius * np.array([np.cos(angle), np.sin(angle)])
-        for radius, angle in zip((RADIUS_A, RADIUS_B), angles, strict=True)
-    )
-    return Layout(float(ax), float(ay), float(bx), float(by), HEIGHT)
+    """Return the joints on two circles; nearness 0: angles of the scene, 1: aligned squares, which are singular."""
+    a, b = np.deg2rad([own + nearness * (SINGULAR - own) for own in (ANGLE_A, ANGLE_B)])
+    joints = RADIUS_A * np.cos(a), RADIUS_A * np.sin(a), RADIUS_B * np.cos(b), RADIUS_B * np.sin(b)
+    ax, ay, bx, by = map(float, joints)
+    return Layout(ax, ay, bx, by, HEIGHT)
 
 
 def _contact(joint: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
@@ -165,7 +163,7 @@ def _contact(joint: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
 
 
 def _flexible(rod: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
-    """The paper's rod with Craig-Bampton modes; its mesh frame lies at the lower end, x along the rod."""
+    """Return the paper's rod with Craig-Bampton modes; its mesh frame is at the lower end, with x along the rod."""
     z, x = (np.array(rod["pose"]["axes"][k]) for k in "zx")
     lower = np.array(rod["pose"]["position"]) - (ROD_END - ROD_CENTRE) * z / np.linalg.norm(z)
     return {
@@ -183,7 +181,7 @@ def _scale_mass(body: dict[str, Any], factor: float) -> None:
 
 
 def _time(table: dict[str, Any], p: Parameters) -> None:
-    """Strokes one after the other, each `speed` times as fast as the paper's."""
+    """Set consecutive strokes, each `speed` times as fast as the paper's."""
     half = 0.5 * STROKE / p.speed
     starts = [k * half for k in range(2 * p.strokes)]
     law = {
@@ -198,38 +196,38 @@ def _time(table: dict[str, Any], p: Parameters) -> None:
     table["output"] = {"interval": p.strokes * STROKE / p.speed / 1800}
 
 
-#: processor time of a case after which it counts as hanging [s]; the dearest takes a fifth of it
+#: processor time after which a case counts as hanging [s]; the most expensive case takes a fifth of this limit
 LIMIT = 600
-#: how much tighter the run is that a finished one is compared with, and runs so dear are not made twice
+#: factor of the tolerance in the comparison run, and limit of evaluations of runs that are compared
 TIGHTER, TWICE = 1e-2, 300_000
 TIGHTEST = 1e-14
-#: a finished run is wrong when its energy is off by more than this share of the energy that passed through it,
+#: a finished run is wrong above this energy error, as a fraction of the largest energy in its ledger,
 LEDGER = 1e-4
-#: when a loop is open by more than this [m],
+#: above this opening of a loop [m],
 CLOSURE = 1e-9
-#: or when its platform's speed is off by more than this share of the largest, from that of a run at tighter tolerance,
-#: before its own horizon, which ends where a run and its perturbed run separate by a tenth of that
+#: or above this difference of the platform's velocity from a run at tighter tolerance, as a fraction of its largest
+#: value, up to the predictability horizon, where a run and its perturbed run differ by a tenth of that
 DEVIATION = 1e-2
 
 
 def modules(case: Case) -> set[str]:
-    """What decides about a case: its scene, the dynamics, the stages before them, and the parts that it names."""
+    """Return the modules that determine a case: its scene, the dynamics, the earlier stages, and the parts it names."""
     tasks = in_order([Graph(scene(case.of), shown=False).simulate])
     named = {name for task in tasks for name in task.roots()}
     return {scene.__module__, "flexclear.pipeline.dynamics", *named}
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each case; one that hangs or dies is an outcome, too."""
+    """Yield a record for each case, also for a case that hangs or dies."""
     for case, found in processes.outcomes(list(cases), jobs, run_case, LIMIT):
         yield case, [{"sweep": sweep(case.name), "parameters": asdict(case.of), **found}]
 
 
 def run_case(parameters: Parameters, compiled: Callable[[], None] = lambda: None) -> Record:
-    """What becomes of a case.
+    """Return the outcome of a case.
 
-    Refusals are outcomes; anything else that goes wrong is a fault of the program and listed as such.
-    compiled: called when the kernels are there, so that a limit of time may begin.
+    Refusals are outcomes; any other failure is a fault of the program and gets the verdict WRONG.
+    compiled: called when the kernels are compiled, so that a time limit may begin.
     """
     begun = time.process_time()
     try:
@@ -243,21 +241,21 @@ def run_case(parameters: Parameters, compiled: Callable[[], None] = lambda: None
         return judge(run, _deviation(parameters, described, run), seconds)
     except SolverError as error:
         return {"verdict": REFUSED, "reason": str(error), "seconds": time.process_time() - begun}
-    except Exception as error:  # the atlas reports faults, it does not stop at them
+    except Exception as error:  # the atlas reports faults and continues
         reason = f"{type(error).__name__}: {error}"
         return {"verdict": WRONG, "reason": reason, "seconds": time.process_time() - begun}
 
 
 @cache
 def _place() -> Workplace:
-    """The usual one, for as long as this process lives; nobody watches it."""
+    """Return the usual workplace, without progress output, for the lifetime of this process."""
     return replace(open_workplace(), monitor=Monitor(io.StringIO()))
 
 
 def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> float:
-    """Largest difference of the platform's velocity from that of a tighter run, up to the horizon, over its largest.
+    """Return the largest difference of the platform's velocity from a tighter run, up to the horizon, over its largest.
 
-    Not a number where the run is too dear to be made twice, or the tighter one cannot be had.
+    NaN where a second run would cost too much, or where the tighter run fails.
     """
     if int(run.attrs["evaluations"]) > TWICE:
         return float("nan")
@@ -272,13 +270,12 @@ def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> flo
 
 
 def judge(run: xr.Dataset, deviation: float, seconds: float) -> Record:
-    """The outcome of a finished run.
+    """Return the record of a finished run.
 
-    method: the integrator that made the run; switched: why it took the place of the one asked for.  ledger: largest
-    energy error, as a share of the largest energy in the ledger.  closure: largest opening of a loop [m].  deviation:
-    of the platform's velocity from that of a tighter run, up to the horizon, as a share of its largest; not a number
-    where that was not looked for.  horizon_share: how much of the run can be believed point by point.  seconds: of
-    processor time.
+    method: integrator that made the run; switched: why it replaced the requested one.  ledger: largest energy error, as
+    a fraction of the largest energy in the ledger.  closure: largest opening of a loop [m].  deviation: of the
+    platform's velocity from that of a tighter run, up to the horizon, as a fraction of its largest; NaN without a
+    comparison.  horizon_share: predictability horizon as a fraction of the run.  seconds: processor time [s].
     """
     energies = ("kinetic", "potential", "elastic", "dissipated", "drive_work")
     largest = max(float(np.abs(run[name]).max()) for name in energies)
@@ -304,8 +301,8 @@ def judge(run: xr.Dataset, deviation: float, seconds: float) -> Record:
 
 
 def fault(run: xr.Dataset, ledger: float, closure: float, deviation: float) -> str:
-    """What is wrong with a finished run, in words; empty when nothing is."""
-    # an event that is no closing has no peak, so that its columns have gaps on purpose
+    """Return what is wrong with a finished run, in words; empty when nothing is wrong."""
+    # events other than closings have no peak: their gaps are intended
     series = [name for name in run.data_vars if not str(name).startswith("event_")]
     if not all(np.isfinite(run[name]).all() for name in series):
         return "values that are not finite"

@@ -1,7 +1,7 @@
-"""Processor time of one command, divided by what it goes into: ``python -m benchmarks.command_parts run SCENE``.
+"""Processor time of one command, by parts of the work: ``python -m benchmarks.command_parts run SCENE``.
 
-In a process of its own, since imports are a part of it. The last line of its output is a table as JSON: part ->
-seconds; a part has none of the time of the parts inside of it. Threads that work side by side are counted each.
+The command runs in a process of its own, since imports are a part. The last line of the output is a table as JSON:
+part -> seconds. The time of a part excludes the parts nested in it. Threads that run concurrently count separately.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 IMPORTS, REST = "imports", "rest"
 _CORE, _RUN = "flexclear.pipeline.core", "flexclear.pipeline.dynamics"
-#: functions by module -> the part that they are
+#: module -> function -> part to which the function's time counts
 PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_CORE}.scene.load": {"load_scene": "scene"},
     f"{_CORE}.workflow.task": {"facts": "keys", "key": "keys"},
@@ -35,7 +35,7 @@ _adding = Lock()
 
 
 class _Inside(local):
-    """Of each thread what the parts inside of those that it is in have taken."""
+    """Stack, for each thread, of the time [s] that nested parts have used inside each active part."""
 
     def __init__(self) -> None:
         self.seconds: list[float] = []
@@ -45,7 +45,7 @@ _inside = _Inside()
 
 
 def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, whose own time is added to a part."""
+    """Return the function wrapped so that its own time is added to a part."""
 
     @wraps(function)
     def called(*arguments: Any, **named: Any) -> Any:
@@ -64,7 +64,7 @@ def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def listen() -> None:
-    """From now on imports are timed, and the functions of `PARTS` as soon as their modules are there."""
+    """Time imports from now on, and wrap the functions of `PARTS` when their modules are imported."""
     find_and_load = timed(IMPORTS, _bootstrap._find_and_load)  # type: ignore[attr-defined]
 
     def loaded(name: str, import_: Any) -> Any:
@@ -81,7 +81,7 @@ def listen() -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command, and tell its parts."""
+    """Run the command and print the seconds of its parts as JSON."""
     started = time.process_time()
     listen()
     from flexclear.commands.__main__ import main as command

@@ -1,4 +1,4 @@
-"""Errors of whole runs against one converged reference, and our own ladder of tolerances."""
+"""Errors of whole runs against one converged reference, and runs of this program over a ladder of tolerances."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
-#: two codes are compared at multiples of this [s], unless more rarely
+#: default interval of the samples at which two codes are compared [s]
 SAMPLING = 1e-3
-#: the integrators that are tried, those first whose runs tell soonest that others are far dearer
+#: integrators in the order of trial: fast ones first, so that the ladders of far more expensive ones end early
 OURS = ("exponential", "dop853", "dopri5", "radau")
 TOLERANCES = (1e-2, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
-#: of the reference
+#: tolerance of the reference run
 FINEST = 1e-13
-#: a method's ladder ends with a run so many times longer than one that is no worse: tighter ones are dearer still
+#: a ladder ends when a run takes this many times longer than one with no larger error; tighter runs cost even more
 DEAR = 5.0
 
 
@@ -43,7 +43,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Error:
-    """Largest deviations over the samples: of position [m] and velocity [m/s]; speed: the largest speed [m/s]."""
+    """Largest deviations over the samples, of position [m] and velocity [m/s].  speed: the largest speed [m/s]."""
 
     position: float
     velocity: float
@@ -51,21 +51,21 @@ class Error:
 
     @property
     def relative(self) -> float:
-        """Error of the velocity as a share of the largest speed."""
+        """Velocity error as a fraction of the largest speed."""
         return self.velocity / self.speed
 
     def within(self, other: Error) -> bool:
-        """Whether neither deviation is larger."""
+        """Return True when neither deviation exceeds that of another error."""
         return self.position <= other.position and self.velocity <= other.velocity
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One of our runs: by what, its time once [s], how wrong it is, and how to time it once more [s].
+    """One run of this program: integrator, tolerance, time [s], error, and functions that time the run again [s].
 
-    bare: how to time its integration alone [s], whose samples are states.  alike: how to time its integration with the
-    body's position and velocity in the samples, as two sensors of another code have them [s]; alike_error: how wrong
-    these are.
+    time: times integration and outputs.  bare: times the integration alone, whose samples are states.  alike: times the
+    integration with the body's position and velocity in the samples, as two sensors of another code record them.
+    alike_error: error of those samples.
     """
 
     integrator: str
@@ -81,10 +81,10 @@ class Rung:
 
 @dataclass(frozen=True)
 class Reference:
-    """A motion to compare with, up to a horizon [s]: its samples every so many seconds.
+    """A reference motion up to a horizon [s], sampled at a regular interval [s].
 
-    at: the same motion at any other times [s], ascending from the start of the run; for codes that cut their steps, and
-    whose samples come late then.
+    at: returns the motion at other ascending times [s] from the start of the run; needed for codes that cut their steps
+    and therefore sample late.
     """
 
     samples: Samples
@@ -93,7 +93,7 @@ class Reference:
     at: Callable[[np.ndarray], Samples] | None = None
 
     def error(self, samples: Samples) -> Error:
-        """Deviation of a motion; ValueError when it was sampled at times at which this one is not known."""
+        """Return the deviation of a motion; raise ValueError when the reference is unknown at its sample times."""
         here = samples.time <= self.horizon * (1.0 + 1e-9)
         known = self._known(samples.time[here])
         return Error(
@@ -113,7 +113,7 @@ class Reference:
 
 
 def converged(here: Mechanism, body: str, horizon: float, sampling: float = SAMPLING) -> Reference:
-    """Our run at the tightest tolerance."""
+    """Return the reference motion: our run at the tightest tolerance."""
     finest = _at(here, DEFAULT, FINEST, sampling)
     engine = finest.engine()
     start = consistent_start(engine)
@@ -128,9 +128,9 @@ def converged(here: Mechanism, body: str, horizon: float, sampling: float = SAMP
 
 
 def ladder(here: Mechanism, body: str, reference: Reference, enough: Callable[[Error], bool]) -> list[Rung]:
-    """Our runs by all methods at all tolerances, as far as they are not refused and not far dearer than others.
+    """Return our runs by all methods at all tolerances, except refused runs and runs after a far more expensive one.
 
-    enough: whether a run is so right that the method need not be tried at tighter tolerances.
+    enough: returns True when an error is so small that the method needs no tighter tolerance.
     """
     rungs: list[Rung] = []
     for integrator in OURS:
@@ -175,10 +175,10 @@ def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> 
 
 
 def _sensed(engine: Engine, rows: np.ndarray, body: str) -> Samples:
-    """Position and velocity of a rigid body's centre of mass in rows of the record, as the integration left them."""
+    """Return position and velocity of a rigid body's centre of mass from the rows that the integration recorded."""
     model = engine.model
     link = model.mechanism.link_of[body]
-    frame, place = frames(engine, rows)[:, link], model.links[link].places[body]
+    frame, place = frames(engine, rows)[:, link], model.links[link].placements[body]
     arm = frame["axes"] @ (place.p + place.R @ np.array(model.scene.body[body].com))  # type: ignore[union-attr]
     position = frame["origin"] + arm + model.mechanism.origin
     return Samples(rows[:, 0], position, frame["velocity"] + np.cross(frame["omega"], arm))
@@ -194,17 +194,17 @@ def _run(here: Mechanism) -> xr.Dataset:
 
 
 def _regular(run: xr.Dataset, body: str, sampling: float) -> Samples:
-    """The rows at multiples of the sampling time; those of events lie in between."""
+    """Return the samples at multiples of the sampling time; rows of events lie in between."""
     time, motion = run["time"].values, run.sel(body=body)
     here = _sampled(time, sampling)
     return Samples(time[here], motion["position"].values[here], motion["velocity"].values[here])
 
 
 def _sampled(time: np.ndarray, sampling: float) -> np.ndarray:
-    """Which times are multiples of the sampling time."""
+    """Return the mask of the times that are multiples of the sampling time."""
     return np.asarray(np.abs(time / sampling - np.round(time / sampling)) < 1e-6)
 
 
 def cheapest(rungs: list[Rung], good: Callable[[Error], bool]) -> Rung | None:
-    """Our fastest run whose error is good."""
+    """Return our fastest run whose error is acceptable, or None."""
     return min((rung for rung in rungs if good(rung.error)), key=lambda rung: rung.seconds, default=None)

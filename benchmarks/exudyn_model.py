@@ -1,7 +1,7 @@
 """A scene as an Exudyn model, and its runs: the same masses, frames, joints, drive laws, contact and modal invariants.
 
-Redundant coordinates, as Exudyn has them, in its leanest objects. docs/benchmarks.md says what is the same in the two
-codes and what differs, and which settings were tried: these are the best of them.
+The model uses redundant coordinates, as Exudyn does, in its leanest objects. docs/benchmarks.md lists what is equal and
+what differs in the two codes, and the settings that were tried: these are the best of them.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from flexclear.pipeline.dynamics.model.contacts import LEAST_RATE
 EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
 #: axes with x along the old z: Exudyn's prismatic joint slides along x
 X_FROM_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-#: mass of the slide between a cylinder and a flexible rod, which a drive's marker needs, as a share of the rod's
+#: mass of the slide between a cylinder and a flexible rod, which a drive's marker needs, as a fraction of the rod's
 SLIDE_SHARE = 1e-8
-#: Newmark's method (beta 1/4, gamma 1/2) or not, the spectral radius of generalized-alpha, relative tolerance of
-#: Newton's iterations (the absolute one is a hundredth), by name
+#: name -> True for Newmark's method (beta 1/4, gamma 1/2), spectral radius of generalized-alpha, relative tolerance of
+#: Newton's iterations (the absolute one is a hundredth)
 METHODS = {
     "trapezoidal, index 2": (True, 1.0, 1e-5),
     "generalized-alpha, index 3": (False, 0.9, 1e-5),
@@ -46,7 +46,7 @@ METHODS = {
 
 @dataclass
 class Model:
-    """An Exudyn system under construction; bodies[i] is the object of group i, centres[i] its node's place in it."""
+    """Exudyn system under construction.  bodies[i]: object of group i; centres[i]: its node's position in the group."""
 
     system: Any
     parts: Any
@@ -61,7 +61,7 @@ class Model:
 
 
 def load() -> Any:
-    """The exudyn package, in its version without range checks; ImportError when it is not installed."""
+    """Return the exudyn package in its version without range checks; raise ImportError when it is not installed."""
     sys.exudynFast = True  # type: ignore[attr-defined]  # the package reads it when it is imported
     with contextlib.redirect_stdout(io.StringIO()):  # it prints a line on import
         import exudyn
@@ -70,7 +70,7 @@ def load() -> Any:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run: processor time of the solver alone [s], and what was sampled; or why it failed."""
+    """One run: processor time of the solver alone [s], and its samples or the reason of its failure."""
 
     seconds: float
     samples: Samples | None
@@ -78,7 +78,7 @@ class Outcome:
 
 
 def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Model:
-    """The model of a scene, not yet assembled, so that sensors can be added."""
+    """Return the model of a scene, not yet assembled, so that sensors can be added."""
     container, parts = load().SystemContainer(), import_module("exudyn.itemInterface")
     _check(scene)
     frames = grouping.frames_of(scene, bundles)
@@ -99,7 +99,7 @@ def _check(scene: Scene) -> None:
 
 
 def _held_legs_merged(scene: Scene, frames: Mapping[str, grouping.Frame]) -> Scene:
-    """Joints between rigid bodies whose drive keeps them at zero become fixed ones."""
+    """Return the scene with fixed joints in place of those between rigid bodies whose drive holds them at zero."""
     flexible = scene.flexible()
     held = {
         name: scene.joint[name].model_copy(update={"type": "fixed"})
@@ -111,7 +111,7 @@ def _held_legs_merged(scene: Scene, frames: Mapping[str, grouping.Frame]) -> Sce
 
 
 def _bodies(model: Model, scene: Scene) -> None:
-    """The ground, and every group of bodies that are fixed to each other."""
+    """Add the ground, and every group of bodies that are fixed to each other."""
     model.bodies.append(model.system.AddObject(model.parts.ObjectGround()))
     model.centres.append(np.zeros(3))
     ground = model.system.AddNode(model.parts.NodePointGround())
@@ -135,13 +135,13 @@ def _add_rigid(model: Model, place: grouping.Placement, mass: float, J: np.ndarr
 
 
 def _rigid_body(model: Model, scene: Scene, i: int) -> None:
-    mass, com, J = grouping.rigid_inertia(scene, model.groups[i].places)
+    mass, com, J = grouping.rigid_inertia(scene, model.groups[i].placements)
     model.bodies.append(_add_rigid(model, model.starts[i].of(grouping.Placement(com)), mass, J))
     model.centres.append(com)
 
 
 def _flexible_body(model: Model, scene: Scene, i: int) -> None:
-    """Floating frame with reduced order; all its matrices are integrals that the bundle holds."""
+    """Add a floating frame with reduced order; all its matrices are integrals that the bundle holds."""
     name = model.groups[i].host
     b, parts = model.bundles[name], model.parts
     n, damping = b.sizes["mode"], scene.flexible()[name].damping or 0.0
@@ -183,7 +183,7 @@ def _dense(matrix: np.ndarray) -> Any:
 
 
 def _invariants(b: xr.Dataset) -> dict[str, np.ndarray]:
-    """Integrals of Zwoelfer and Gerstmayr's nodal FFRF, for fields S_j and X with ~v w = v x w."""
+    """Return the integrals of Zwoelfer and Gerstmayr's nodal FFRF, for fields S_j and X with ~v w = v x w."""
     S, XS, SS = (b[name].values for name in ("modal_first_moment", "position_mode_moment", "mode_mode_moment"))
     n, e = S.shape[1], EPSILON
     return {
@@ -197,7 +197,7 @@ def _invariants(b: xr.Dataset) -> dict[str, np.ndarray]:
 
 
 def _frame_points(b: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Six points around each frame, 10 mm off, and their modes: a marker on them moves and turns as the frame does."""
+    """Return six points around each frame, 10 mm off, and their modes: a marker on them moves and turns with it."""
     arms = 0.01 * np.concatenate([np.eye(3), -np.eye(3)])
     positions, basis = [], []
     for k in range(b.sizes["frame"]):
@@ -209,11 +209,11 @@ def _frame_points(b: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _marker(model: Model, frame: str, turn: np.ndarray | None = None) -> Any:
-    """A rigid marker at a frame, its axes turned by `turn` against the frame's."""
+    """Add a rigid marker at a frame, with axes turned by `turn` relative to the frame's."""
     f = model.frames[frame]
     i, turn = model.group_of[f.body], np.eye(3) if turn is None else turn
     if not model.groups[i].flexible:
-        place = model.groups[i].places[f.body].of(f.place)
+        place = model.groups[i].placements[f.body].of(f.placement)
         here = _transformation(place.p - model.centres[i], place.R @ turn)
         return model.system.AddMarker(model.parts.MarkerBodyRigid(bodyNumber=model.bodies[i], localHT=here))
     k = list(model.bundles[f.body]["frame"].values).index(frame.partition(".")[2])
@@ -222,7 +222,7 @@ def _marker(model: Model, frame: str, turn: np.ndarray | None = None) -> Any:
             bodyNumber=model.bodies[i],
             meshNodeNumbers=list(range(6 * k, 6 * k + 6)),
             weightingFactors=[1.0 / 6.0] * 6,
-            localHT=_transformation(np.zeros(3), f.place.R @ turn),
+            localHT=_transformation(np.zeros(3), f.placement.R @ turn),
         )
     )
 
@@ -253,7 +253,7 @@ def _joints(model: Model, scene: Scene) -> None:
 
 
 def joint_laws(scene: Scene) -> dict[str, Pieces]:
-    """The law of every driven joint's coordinate; ValueError for drives that prescribe something else."""
+    """Return the law of every driven joint's coordinate; raise ValueError for drives that prescribe something else."""
     found, dimension = {}, {"prismatic": "length", "revolute": "angle"}
     for name, drive in scene.drive.items():
         if not isinstance(drive, JointDrive):
@@ -263,11 +263,14 @@ def joint_laws(scene: Scene) -> dict[str, Pieces]:
 
 
 def _driven(model: Model, a: str, b: str, law: Pieces) -> None:
-    """Prismatic joint with a prescribed coordinate; on a flexible rod by way of a slide of next to no mass."""
+    """Add a prismatic joint with a prescribed coordinate; on a flexible rod, through a slide of negligible mass."""
     add, parts = model.system.AddObject, model.parts
     f, g = model.frames[a], model.frames[b]
     i, j = model.group_of[f.body], model.group_of[g.body]
-    inner, outer = model.groups[i].places[f.body].of(f.place), model.groups[j].places[g.body].of(g.place)
+    inner, outer = (
+        model.groups[i].placements[f.body].of(f.placement),
+        model.groups[j].placements[g.body].of(g.placement),
+    )
     body, point, end = model.bodies[j], outer.p - model.centres[j], None
     if model.groups[j].flexible:
         mass = SLIDE_SHARE * float(model.bundles[g.body]["mass"])
@@ -296,7 +299,7 @@ def _driven(model: Model, a: str, b: str, law: Pieces) -> None:
 
 
 def _symbolic(model: Model, law: Pieces, order: int, name: str) -> Any:
-    """A derivative of a law as an expression that Exudyn evaluates itself, without calling Python."""
+    """Return a derivative of a law as an expression that Exudyn evaluates itself, without calling Python."""
     from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
     choose = load().symbolic.IfThenElse
@@ -318,7 +321,7 @@ def _symbolic(model: Model, law: Pieces, order: int, name: str) -> Any:
 
 
 def _contact(model: Model, joint: ClearanceSpherical, socket: Any, ball: Any) -> None:
-    """Exudyn's contact of a ball in a hollow sphere, between markers; ValueError for laws that it does not have."""
+    """Add Exudyn's contact of a ball in a hollow sphere, between markers; raise ValueError for laws that it lacks."""
     restitution = joint.normal.restitution
     if joint.normal.law != "lankarani-nikravesh" or restitution is None:
         raise ValueError(f"no Exudyn object has the normal law '{joint.normal.law}'")
@@ -345,7 +348,7 @@ def _contact(model: Model, joint: ClearanceSpherical, socket: Any, ball: Any) ->
 
 
 def _friction(joint: ClearanceSpherical) -> tuple[float, float]:
-    """Coefficient, and the speed [m/s] up to which Exudyn's law rises to it."""
+    """Return the friction coefficient, and the speed [m/s] up to which Exudyn's law rises to that value."""
     law = joint.friction
     if law is None:
         return 0.0, 1e-3
@@ -358,14 +361,14 @@ def _friction(joint: ClearanceSpherical) -> tuple[float, float]:
 
 
 def holds_at_zero(law: Pieces) -> bool:
-    """Whether the coordinate stays at zero for ever."""
+    """Return True when the coordinate always stays at zero."""
     return all(not piece.terms and not any(piece.coefficients) for piece in law.pieces)
 
 
 def polynomials(law: Pieces, order: int) -> tuple[list[float], list[list[float]]]:
-    """Starts of the pieces [s], and coefficients of falling order of a derivative of each in the time since.
+    """Return the starts of the pieces [s], and coefficients of falling order of a derivative of each in the time since.
 
-    ValueError for laws with harmonics.
+    Raise ValueError for laws with harmonics.
     """
     if law.harmonic:
         raise ValueError("laws with harmonics have no polynomials")
@@ -374,7 +377,7 @@ def polynomials(law: Pieces, order: int) -> tuple[list[float], list[list[float]]
 
 
 def solve(here: Mechanism, body: str, method: str, step: float, sampling: float) -> Outcome:
-    """Run a scene in Exudyn at a fixed step, sampled every so many seconds; building the model is not timed.
+    """Run a scene in Exudyn at a fixed step [s], sampled at an interval [s]; building the model is not timed.
 
     Where Newton's iterations fail, Exudyn cuts its steps, and samples come at the first step after their time.
     """
@@ -382,7 +385,7 @@ def solve(here: Mechanism, body: str, method: str, step: float, sampling: float)
     model = build(here.scene, here.bundles)
     i = model.group_of[body]
     centre = np.array(here.scene.body[body].com)  # type: ignore[union-attr]
-    place = model.groups[i].places[body]
+    place = model.groups[i].placements[body]
     sensors = [
         model.system.AddSensor(
             model.parts.SensorBody(
@@ -397,8 +400,8 @@ def solve(here: Mechanism, body: str, method: str, step: float, sampling: float)
     model.system.Assemble()
     settings = _settings(exudyn, here.scene.time.end, method, step, sampling)
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # of a run that fails it prints what the error says
-            # the clock of its thread: that of a process with a limit of time goes by ticks of 4 ms
+        with contextlib.redirect_stdout(io.StringIO()):  # a failing run prints the text of its error
+            # the thread's clock: the clock of a process with a time limit advances in ticks of 4 ms
             begun = time.thread_time()
             model.system.SolveDynamic(settings)
             seconds = time.thread_time() - begun

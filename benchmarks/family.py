@@ -1,4 +1,4 @@
-"""How a benchmark declares itself; what is common to all of them is in the modules next to this one."""
+"""Declaration of a benchmark family: its cases, how they are measured, and how records become a page."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from functools import wraps
 from typing import Any
 
-#: one measurement: `case`, then numbers and words as JSON has them
+#: one measurement: `case`, then numbers and texts that JSON can hold
 Record = dict[str, Any]
-#: what a record may have as `verdict`; one that is wrong makes the command fail
+#: values of a record's `verdict`; a record with WRONG makes the command fail
 FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
 
 
 @dataclass(frozen=True)
 class Case:
-    """One thing to measure. of: what the family needs to know of it; with the name it says which case it is."""
+    """One item to measure.  of: parameters that the family needs; name and parameters together identify the case."""
 
     name: str
     of: Any = None
@@ -25,9 +25,9 @@ Measured = Iterator[tuple[Case, list[Record]]]
 
 
 def each(of: Callable[[Case], list[Record]]) -> Callable[[Sequence[Case], int], Measured]:
-    """What measures cases one after the other, in this process."""
+    """Return a `measure` function that measures the cases one after the other in this process."""
 
-    @wraps(of)  # sources of a result are those of its module
+    @wraps(of)  # so that the sources of a result are those of the wrapped function's module
     def measure(cases: Sequence[Case], jobs: int) -> Measured:
         for case in cases:
             yield case, of(case)
@@ -37,21 +37,21 @@ def each(of: Callable[[Case], list[Record]]) -> Callable[[Sequence[Case], int], 
 
 @dataclass(frozen=True)
 class Family:
-    """A benchmark.
+    """A family of benchmark cases.
 
-    what: it measures, in a sentence.  takes: how long that takes.
-    page: file below docs/ in which the lines between its marks are what `show` makes (see `benchmarks.page`).
-    cases: all of them, called with the numbers of `settings`, which `--set` changes.
-    measure: some of them, in at most so many processes, each with its records as soon as it is done.
-    show: records of some or all cases as Markdown, or several parts of the page by name.
-    files: what belongs to the page, by path below docs/.
-    quick: the smallest case, where it takes below 5 s warm.
-    times: whether times are the subject. If so, the log keeps every measurement, with four digits, since what is
-    behind them is noise; else the last one, with all digits.
-    modules: what decides about a case. With it, a result is valid until a source that they import changes; without
-    it, a case is measured again whenever that is asked for.
-    needs: an optional library, and the extra of this project that brings it.
-    children: it measures or limits child processes, which not every system can (`benchmarks.processes`).
+    what: subject of the measurement, in one sentence.  takes: its duration, in words.
+    page: file below docs/; `show` writes the lines between the family's marks (see `benchmarks.page`).
+    cases: returns all cases; its arguments are the numbers of `settings`, which `--set` changes.
+    measure: measures some cases in at most the given number of processes; yields the records of each case when done.
+    show: turns the records of some or all cases into Markdown, or into several parts of the page by name.
+    files: files that belong to the page, by path below docs/.
+    quick: name of the smallest case, where it takes less than 5 s warm.
+    times: True when times are the subject. The log then keeps every measurement, with four digits, since further
+    digits are noise; otherwise it keeps only the last measurement, with all digits.
+    modules: modules that determine a case's result. With it, a result is valid until a source that they import changes;
+    without it, a case is measured again at each request.
+    needs: an optional library, and the extra of this project that installs it.
+    children: the family measures or limits child processes, which not every system can (`benchmarks.processes`).
     """
 
     what: str

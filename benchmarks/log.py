@@ -1,7 +1,7 @@
-"""The log, one file of JSON lines for each family: what was measured, when, and on what machine.
+"""Log of measurements with date and machine: one file of JSON lines for each family.
 
-A line with `measured` (the date), `cpu` and `versions` begins a session; every line after it is one measurement with
-its `case`. Machine and date stand nowhere else. `cpu` is null where nobody noted it.
+A line with `measured` (the date), `cpu` and `versions` begins a session; every later line is one measurement with
+its `case`. Machine and date appear nowhere else. `cpu` is null where it was not recorded.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, library_
 
 FOLDER = Path(__file__).parent / "log"
 PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn", "pin", "mujoco")
-#: digits of measured times
+#: significant digits of measured times
 DIGITS = 4
 
 
 @dataclass(frozen=True)
 class Session:
-    """Date and machine of some measurements. cpu: the processor's model; no name of a machine.  note: for readers."""
+    """Date and machine of some measurements.  cpu: the processor's model, no name of a machine.  note: for readers."""
 
     measured: str
     cpu: str | None
@@ -38,13 +38,13 @@ class Session:
 
 
 def today() -> Session:
-    """A session on this machine."""
+    """Return a session without records, with today's date and this machine."""
     versions = {name: known for name in PACKAGES if (known := library_version(name)) != "absent"}
     return Session(datetime.date.today().isoformat(), _processor(), {"python": platform.python_version(), **versions})
 
 
 def read(path: Path) -> list[Session]:
-    """All sessions of a file, in their order."""
+    """Return all sessions of a file, in their order."""
     found: list[Session] = []
     for line in map(json.loads, path.read_text(encoding="utf-8").splitlines() if path.exists() else ()):
         if "measured" in line:
@@ -55,7 +55,7 @@ def read(path: Path) -> list[Session]:
 
 
 def latest(path: Path) -> list[Session]:
-    """The sessions with those records only whose case no later session has."""
+    """Return the sessions, each reduced to the records of cases that no later session has."""
     found, known = [], set[str]()
     for session in reversed(read(path)):
         kept = [record for record in session.records if record["case"] not in known]
@@ -66,7 +66,7 @@ def latest(path: Path) -> list[Session]:
 
 
 def append(path: Path, session: Session, *, history: bool) -> None:
-    """Add a session. history: keep what it measured anew; else the older records of its cases go."""
+    """Append a session.  history: keep older records of the session's cases; otherwise delete them."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8", newline="\n") as file:
         file.writelines(_lines(session))
@@ -80,7 +80,7 @@ def _lines(session: Session) -> list[str]:
 
 
 def plain(value: Any, digits: int | None) -> Any:
-    """What JSON can say: floats at any depth with so many digits, those that are no number as null."""
+    """Return a value that JSON can hold: floats at any depth rounded to `digits`, non-finite ones as None."""
     if isinstance(value, dict):
         return {key: plain(inner, digits) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
@@ -91,10 +91,10 @@ def plain(value: Any, digits: int | None) -> Any:
 
 
 class Memory:
-    """What is measured already, so that what was interrupted goes on where it stopped: a line for each case.
+    """Earlier results, one line for each case, so that an interrupted measurement continues where it stopped.
 
-    A line is valid as long as the case, the sources that it reaches, the processor and the versions are the same.
-    trusting: also with other sources, of cases that finished.
+    A line is valid while the case, the sources that it reaches, the processor and the versions are unchanged.
+    trusting: accept finished cases also when their sources have changed.
     """
 
     def __init__(self, family: str, spec: Family, *, trusting: bool = False, folder: Path | None = None) -> None:
@@ -104,7 +104,7 @@ class Memory:
         self.known = {line["of"]: line for line in map(json.loads, lines)}
 
     def recall(self, case: Case) -> list[Record] | None:
-        """The records of a case, when they are known."""
+        """Return the records of a case, or None when no valid ones exist."""
         line = self.known.get(_identity(case))
         if line is None or line["sources"] == sources(self.spec, case):
             return line and line["records"]
@@ -112,7 +112,7 @@ class Memory:
         return line["records"] if self.trusting and good else None
 
     def learn(self, case: Case, records: list[Record]) -> None:
-        """Keep the records of a case, at once."""
+        """Store the records of a case immediately."""
         line = {"of": _identity(case), "sources": sources(self.spec, case), "records": records}
         self.known[line["of"]] = line
         self.file.parent.mkdir(parents=True, exist_ok=True)
@@ -120,7 +120,7 @@ class Memory:
             file.write(json.dumps(line) + "\n")
 
     def forget(self, cases: list[Case]) -> None:
-        """Measure again what is in the log, unless it is valid until sources change."""
+        """Drop the results of logged cases, unless the family's results stay valid until sources change."""
         if self.spec.modules is None and self.file.exists():
             for case in cases:
                 self.known.pop(_identity(case), None)
@@ -135,7 +135,7 @@ def _identity(case: Case) -> str:
 
 
 def sources(spec: Family, case: Case) -> str:
-    """Digest of the source that measuring a case reaches."""
+    """Return the digest of the sources that measuring a case reaches."""
     own = spec.measure.__module__
     if spec.modules is None:
         return _digest(frozenset({own}))

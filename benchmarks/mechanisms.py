@@ -1,10 +1,11 @@
-"""Scenes with their bundles and compiled engines, and the states at which they are evaluated."""
+"""The paper's scenes with bundles and compiled engines, and the states at which they are evaluated."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from unittest.mock import patch
 
 import numpy as np
 import xarray as xr
@@ -18,13 +19,13 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_code
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
-#: the scenes of the paper, from the least to the fullest
+#: the scenes of the paper, from the fewest to the most effects
 SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")
 
 
@@ -37,25 +38,22 @@ class Mechanism:
     bundles: Mapping[str, xr.Dataset]
 
     def engine(self) -> Engine:
-        """Its compiled engine."""
+        """Return the compiled engine of the scene."""
         return engine_of(self.scene, self.bundles, silent)
 
     def general_engine(self) -> Engine:
-        """Its engine that evaluates with the kernels for all wirings, as what is too long for straight code does."""
-        proper, straight_code.INTERPRETED = straight_code.INTERPRETED, True
-        try:
+        """Return the engine with the kernels for every topology, which scenes too long for specialised code use."""
+        with patch.object(specialised_code, "INTERPRETED", True):
             return self.engine()
-        finally:
-            straight_code.INTERPRETED = proper
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
-        """The same bundles under an edited scene."""
+        """Return a mechanism with an edited scene and the bundles of this one."""
         return Mechanism(name, scene, {body: self.bundles[body] for body in scene.flexible()})
 
 
 @dataclass(frozen=True)
 class State:
-    """A state of a run: time [s], per contact its mode and impact rate [m/s], state vector."""
+    """A state of a run: time [s], mode and impact rate [m/s] of each contact, state vector."""
 
     t: float
     modes: np.ndarray
@@ -64,19 +62,19 @@ class State:
 
 
 def mechanism(name: str) -> Mechanism:
-    """A model of the paper's mechanism, such as `far_cb`, with fresh bundles; FlexclearError when there are none."""
+    """Return a model of the paper's mechanism, such as `far_cb` and its bundles; raise FlexclearError without them."""
     scene = load_scene(find_scene(f"sps4/{name}"))
     return Mechanism(name, scene, bundles(scene))
 
 
 def without_friction(scene: Scene) -> Scene:
-    """A copy whose clearance joints have no friction."""
+    """Return a copy whose clearance joints have no friction."""
     smooth = {name: joint.model_copy(update={"friction": None}) for name, joint in _loose(scene).items()}
     return scene.model_copy(update={"joint": scene.joint | smooth})
 
 
 def without_clearance(scene: Scene) -> Scene:
-    """A copy whose clearance joints are ideal ones."""
+    """Return a copy with ideal spherical joints in place of the clearance joints."""
     ideal = {name: IdealJoint(type="spherical", between=joint.between) for name, joint in _loose(scene).items()}
     return scene.model_copy(update={"joint": scene.joint | ideal})
 
@@ -86,23 +84,23 @@ def _loose(scene: Scene) -> dict[str, ClearanceSpherical]:
 
 
 def damped(scene: Scene, ratio: float) -> Scene:
-    """A copy whose flexible bodies have a modal damping ratio."""
+    """Return a copy whose flexible bodies all have one modal damping ratio."""
     return edited(scene, {f"body.{name}.damping": ratio for name in scene.flexible()})
 
 
 def trajectory(engine: Engine) -> Trajectory:
-    """A whole run of an engine, from its consistent start."""
+    """Integrate an engine over the whole run from its consistent start."""
     return integrate(engine, consistent_start(engine), silent)
 
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
-    """A state of the run without contact ("free") and, where all contacts press at a time, one of those."""
+    """Return a state without contact ("free") and, where all contacts carry force at some time, one "in contact"."""
     record = recording.record(run.rows, run.contacts)
     found = {"free": np.flatnonzero(~np.any(record.modes == 1.0, axis=1))}
     if run.contacts:
         forces = observed(engine, run).touch["normal_force"]
         found["in contact"] = np.flatnonzero(np.all(forces > 0.0, axis=1))
-    # the middle of the candidates: at the very start much is zero
+    # the middle of the candidates: at the start many terms are zero
     middles = {name: rows[len(rows) // 2] for name, rows in found.items() if len(rows)}
     return {
         name: State(float(record.time[k]), record.modes[k], record.latched[k], record.state[k])
@@ -111,14 +109,13 @@ def states(engine: Engine, run: Trajectory) -> dict[str, State]:
 
 
 def set_state(engine: Engine, state: State) -> None:
-    """Put contact modes, impact rates and the pieces of the drives as they are in a state."""
+    """Set contact modes, impact rates and the active pieces of the drives to those of a state."""
     engine.modes[:], engine.latched[:] = state.modes, state.latched
     engine.select_pieces_after(state.t)
 
 
 def evaluation_time(engine: Engine, state: State, repeat: int) -> float:
-    """Processor time of one evaluation of the right-hand side [s] as steps call it, from `repeat` of them in compiled
-    code."""
+    """Return the processor time of one evaluation [s] as steps make it, averaged over `repeat` in compiled code."""
     set_state(engine, state)
     with _as_steps(engine):
         return once(lambda: closure_rows.evaluate(engine, state.y, state.t, repeat)) / repeat
@@ -126,7 +123,7 @@ def evaluation_time(engine: Engine, state: State, repeat: int) -> float:
 
 @contextmanager
 def _as_steps(engine: Engine) -> Iterator[None]:
-    """Let evaluations that Python asks for be those of the steps."""
+    """Make evaluations that Python requests identical to those of the steps."""
     engine.settle(silent)
     before, engine.h[m.EVALUATE] = int(engine.h[m.EVALUATE]), engine.h[m.RATES]
     try:

@@ -1,9 +1,9 @@
-"""The pages of docs/ that hold measurements: what is between two marks of a page is written from the log.
+"""Pages of docs/ that hold measurements: the lines between two marks of a page are written from the log.
 
-    <!-- begin growth -->      until <!-- end growth -->: what that family shows, or one part of it by name
-    <!-- begin measured -->    until <!-- end measured -->: when, and on what machine; nothing else says that
+    <!-- begin growth -->      until <!-- end growth -->: Markdown of that family, or of one named part of it
+    <!-- begin measured -->    until <!-- end measured -->: date and machine of the measurements, which appear only here
 
-Everything else on a page is written by hand, and stays.
+Everything else on a page is written by hand and is left unchanged.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.plotting.table import pipe_table
 
 DOCS = TREE / "docs"
-#: of a table: heading, and the cell of a record
+#: columns of a table: heading, and the function that returns a record's cell
 Columns = Mapping[str, Callable[[Record], str]]
-#: longest list of the cases that a session measured, in letters; of more their number is given
+#: longest list of a session's cases [characters]; a longer one is replaced by the number of cases
 LONGEST_LIST = 80
 #: the text where nothing was measured
 NOTHING = "Not measured."
 
 
 def named(name: str) -> Family:
-    """The family of a name; InputError, with those there are, for any other."""
+    """Return the family with this name; raise InputError, which lists the known names, for any other."""
     return lookup(families.__name__, name, where="python -m benchmarks")
 
 
 def of_page(page: str) -> dict[str, Family]:
-    """Families by name whose measurements are on a page."""
+    """Return the families, by name, whose measurements are on a page."""
     return {name: family for name in families.NAMES if (family := named(name)).page == page}
 
 
 def write(page: str, logs: Path = log.FOLDER, into: Path = DOCS) -> Path:
-    """Write a page, and the files next to it, from the logs in a folder; returns the page."""
+    """Write a page and its files from the logs in a folder; return the page's path."""
     (into / page).parent.mkdir(parents=True, exist_ok=True)
     (into / page).write_text(text(page, logs), encoding="utf-8", newline="\n")
     for path, content in files_of(page, logs).items():
@@ -52,7 +52,7 @@ def write(page: str, logs: Path = log.FOLDER, into: Path = DOCS) -> Path:
 
 
 def text(page: str, logs: Path = log.FOLDER) -> str:
-    """A page with the lines between its marks from the logs."""
+    """Return a page whose lines between marks are filled from the logs."""
     parts = dict[str, str]()
     sessions = {name: log.latest(logs / f"{name}.jsonl") for name in of_page(page)}
     for name, family in of_page(page).items():
@@ -64,7 +64,7 @@ def text(page: str, logs: Path = log.FOLDER) -> str:
 
 
 def files_of(page: str, logs: Path = log.FOLDER) -> dict[str, bytes]:
-    """The files next to a page, by path below docs/."""
+    """Return the files that belong to a page, by path below docs/."""
     found: dict[str, bytes] = {}
     for name, family in of_page(page).items():
         if sessions := log.latest(logs / f"{name}.jsonl"):
@@ -73,12 +73,12 @@ def files_of(page: str, logs: Path = log.FOLDER) -> dict[str, bytes]:
 
 
 def records(sessions: list[Session]) -> list[Record]:
-    """The measurements of some sessions."""
+    """Return the records of some sessions in one list."""
     return [record for session in sessions for record in session.records]
 
 
 def filled(page: str, parts: Mapping[str, str], place: str) -> str:
-    """A page with other text between its marks; InputError where a part has no place on it."""
+    """Return a page with new text between its marks; raise InputError when the page has no marks for a part."""
     found = re.split(r"<!-- begin (.+?) -->\n.*?<!-- end \1 -->\n", page, flags=re.DOTALL)
     if missing := sorted(parts.keys() - set(found[1::2])):
         marks = " and ".join(f"<!-- {word} {missing[0]} -->" for word in ("begin", "end"))
@@ -89,7 +89,7 @@ def filled(page: str, parts: Mapping[str, str], place: str) -> str:
 
 
 def where(measured: Mapping[str, list[Session]]) -> str:
-    """Date and machine of a page's measurements: once, if they are the same, else once for each."""
+    """Return date and machine of a page's measurements: one sentence, or a list where sessions differ."""
     by_session: dict[str, list[str]] = {}
     for name, sessions in measured.items():
         cases: dict[str, list[str]] = {}
@@ -106,34 +106,40 @@ def where(measured: Mapping[str, list[Session]]) -> str:
 
 
 def session_words(session: Session) -> str:
-    """When, on what machine and with what versions a session measured."""
+    """Return date, machine and versions of a session in words."""
     versions = "".join(f", {name} {number}" for name, number in session.versions.items())
-    machine = f"{session.measured} on {session.cpu or 'a machine that nobody noted'}{versions}"
+    machine = f"{session.measured} on {session.cpu or 'an unrecorded machine'}{versions}"
     return f"{machine} ({session.note})" if session.note else machine
 
 
 def table(records: Iterable[Record], columns: Columns) -> str:
-    """A row for each record."""
+    """Return a Markdown table with one row for each record."""
     return pipe_table(tuple(columns), [[cell(record) for cell in columns.values()] for record in records])
 
 
 def spread(time: Mapping[str, float], unit: str, digits: int) -> str:
-    """A time of the log, and half the range of the middle half of its repeats."""
+    """Return a time of the log with half the interquartile range of its repeats."""
     return f"{time[unit]:.{digits}f} ± {percent(time['spread'])}"
 
 
+def mean(record: Record, name: str, factor: float = 1.0, digits: int = 0) -> str:
+    """Return a mean over the members of an ensemble and its standard deviation; of a single run the value alone."""
+    value = f"{factor * record[name]:.{digits}f}"
+    return value if record.get("members") == 1 else f"{value} ± {factor * record[f'{name}_std']:.{digits}f}"
+
+
 def percent(fraction: float) -> str:
-    """A share with one digit after the point."""
+    """Return a fraction as a percentage with one decimal."""
     return f"{100 * fraction:.1f} %"
 
 
 def short(value: float) -> str:
-    """Three digits, without an exponent where it is readable without."""
+    """Return a value with three significant digits; with an exponent below 1e-3 and from 1e4 on."""
     return f"{value:.3g}" if value == 0.0 or 1e-3 <= abs(value) < 1e4 else f"{value:.1e}"
 
 
 def png(figure: Any, **how: Any) -> bytes:
-    """A figure of matplotlib as a file; without the version that drew it, so that equal records give equal bytes."""
+    """Return a matplotlib figure as PNG, without the library's version, so that equal records give equal bytes."""
     from matplotlib import pyplot as plt
 
     file = io.BytesIO()

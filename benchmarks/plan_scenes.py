@@ -1,8 +1,8 @@
-"""A family of scenes for the benchmark of plans: four mechanisms with random clearances, rods, speeds and accuracies.
+"""Random scenes for the benchmark of plans: four mechanisms with random clearances, rods, speeds and accuracies.
 
-One seed makes one family. Every scene may hold all effects at once: flexible rods, clearances with friction, gravity,
-damping. What differs: clearances of 1 um to 1 mm, rods from steel to nylon, speeds of a tenth to ten times the usual
-ones, and accuracies over four decades: 1 um to 10 mm, 10 urad to 0.1 rad, 0.1 mm/s to 1 m/s, shares of forces.
+One seed defines one family of scenes. Every scene may have all effects: flexible rods, clearances with friction,
+gravity, damping. Ranges: clearances from 1 um to 1 mm, rods from steel to nylon, speeds from a tenth to ten times the
+usual ones, and accuracies over four decades: 1 um to 10 mm, 10 urad to 0.1 rad, 0.1 mm/s to 1 m/s, fractions of forces.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MATERIALS = {
     "nylon": (1140.0, 2.7e9, 0.39),
 }
 CLEARANCES, SPEEDS = (1e-6, 1e-3), (0.1, 10.0)
-#: accuracies over four decades, by quantity, SI; of forces and of what contacts do, shares of their size
+#: accuracies over four decades, by quantity [SI]; those of forces and contact quantities (FORCES) are relative
 ACCURACIES = {
     "position": (1e-6, 1e-2),
     "orientation": (1e-5, 1e-1),
@@ -37,16 +37,16 @@ ACCURACIES = {
     "angular_velocity": (1e-3, 10.0),
 }
 FORCES = (5e-5, 5e-1)
-#: how often what is asked for is of which kind
+#: probability of each kind of requested quantity
 ASKED = {"pose": 0.5, "pose and rate": 0.2, "rate": 0.1, "force": 0.2}
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """What the family knows of a mechanism.
+    """Data of one mechanism.
 
-    source: the scene.  loose: joint with clearance.  rods: recipe of each flexible body.  quantities: by kind.  more:
-    changes the scene further.
+    source: scene file.  loose: joint with clearance.  rods: recipe of each flexible body.  quantities: by kind.  more:
+    function that changes the scene further.
     """
 
     source: Path
@@ -57,13 +57,13 @@ class Mechanism:
 
 
 def _second_leg(table: dict[str, Any], random: np.random.Generator) -> None:
-    """Half of the platforms have a second loose joint, on the other side."""
+    """Add a second clearance joint, A3 on the other side, to half of the platforms."""
     if random.random() < 0.5:
         table["joint.A3"] = {**table["joint.A1"], "between": ["socket_A3.centre", "ball_A3.centre"]}
 
 
 def _bent_coupler(table: dict[str, Any], random: np.random.Generator) -> None:
-    """The coupler of the four-bar as a beam from its pin B on."""
+    """Replace the coupler of the four-bar by a beam that starts at pin B."""
     table["body.coupler"] = {
         "type": "flexible",
         "modes": {"reference": "craig-bampton", "count": 13, "interfaces": ["B", "C"]},
@@ -109,9 +109,9 @@ MECHANISMS = {
         {"pose": ("platform.position",), "rate": ("platform.velocity",), "force": ("slide.force", "ball.peak_force")},
     ),
 }
-#: evaluations of a full run beyond which a scene is not one of the family: with three members, a minute
+#: limit of evaluations of a full run, above which a scene leaves the family: with three members, about a minute
 DEAREST = 5_000_000
-#: longest time of a scene, in times of the mechanism's usual motion
+#: longest duration of a scene, as a multiple of the mechanism's usual motion
 LONGEST = 0.6
 #: half of the scenes are the parallel mechanism of the paper
 ORDER = ("sps4", "slider-crank", "sps4", "four-bar", "sps4", "leg")
@@ -119,14 +119,14 @@ ORDER = ("sps4", "slider-crank", "sps4", "four-bar", "sps4", "leg")
 
 @dataclass(frozen=True)
 class Drawn:
-    """A scene of the family, and what was drawn for it."""
+    """A scene of the family and its random parameters."""
 
     scene: Scene
     record: Mapping[str, Any]
 
 
 def drawn(seed: int, number: int, folder: Path) -> Drawn:
-    """Scene `number` of the family of a seed; recipes of its rods are written into a folder."""
+    """Return scene `number` of a seed's family; write the recipes of its rods into a folder."""
     random = np.random.default_rng([seed, number])
     name = ORDER[number % len(ORDER)]
     mechanism = MECHANISMS[name]
@@ -137,7 +137,7 @@ def drawn(seed: int, number: int, folder: Path) -> Drawn:
     table: dict[str, Any] = {"accuracy": None, "ensemble": None, "view": None, "sections": None}
     table["solver"] = {"evaluations": DEAREST}
     table["output"] = {"interval": min(base.time.end / speed, LONGEST * base.time.end) / 600.0}
-    # slow motions are run over their first part
+    # slow motions are simulated over their first part only
     table["time.end"] = min(base.time.end / speed, LONGEST * base.time.end)
     plain = base.model_dump(mode="json", exclude_none=True)
     for drive, part in plain["drive"].items():
@@ -157,10 +157,10 @@ def drawn(seed: int, number: int, folder: Path) -> Drawn:
     loads = {key: load for key, load in plain.get("load", {}).items() if key != "gravity"}
     table["load"] = loads | ({"gravity": {"type": "gravity", "acceleration": down}} if random.random() < 0.5 else {})
     scene = edited(base, table)
-    asked = _asked(random, mechanism)
-    scene = edited(scene, {"accuracy": {"quantities": asked}})
+    requested = _requested(random, mechanism)
+    scene = edited(scene, {"accuracy": {"quantities": requested}})
     scene._name, scene._path = f"{name}-{number}", None
-    record = {"mechanism": name, "clearance": clearance, "speed": speed, "rod": material, "wanted": asked}
+    record = {"mechanism": name, "clearance": clearance, "speed": speed, "rod": material, "wanted": requested}
     return Drawn(scene, record)
 
 
@@ -168,8 +168,8 @@ def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
-def _asked(random: np.random.Generator, mechanism: Mechanism) -> dict[str, dict[str, float]]:
-    """Quantities with their accuracy, absolute or relative as a scene says it."""
+def _requested(random: np.random.Generator, mechanism: Mechanism) -> dict[str, dict[str, float]]:
+    """Return random quantities with their requested accuracy, absolute or relative as in a scene."""
     kinds = str(random.choice(list(ASKED), p=list(ASKED.values()))).split(" and ")
     found = {}
     for kind in kinds:
@@ -182,13 +182,8 @@ def _asked(random: np.random.Generator, mechanism: Mechanism) -> dict[str, dict[
 
 
 def _faster(law: dict[str, Any], speed: float) -> dict[str, Any]:
-    """A step law with its times scaled; a law of constants as it is."""
-    scaled: dict[str, Any] = {k: [t / speed for t in _listed(law[k])] for k in ("start", "end") if k in law}
-    return law | scaled
-
-
-def _listed(value: Any) -> list[float]:
-    return list(value) if isinstance(value, (list, tuple)) else [value]
+    """Return a step law with scaled times; a constant law stays unchanged."""
+    return law | {k: (np.atleast_1d(law[k]) / speed).tolist() for k in ("start", "end") if k in law}
 
 
 def _ends(name: str) -> tuple[str, str]:
@@ -197,7 +192,7 @@ def _ends(name: str) -> tuple[str, str]:
 
 
 def _recipe(recipe: Path, name: str, material: str, folder: Path) -> Path:
-    """The recipe of a rod of another material; of the four-bar's, longer and with its own names of frames."""
+    """Write the recipe of a rod of another material; that of the four-bar also gets its length and names of frames."""
     density, modulus, poisson = MATERIALS[material]
     text = recipe.read_text(encoding="utf-8")
     text = re.sub(r"(?m)^density = .*$", f"density = {density}", text)

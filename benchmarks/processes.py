@@ -1,6 +1,6 @@
-"""Processes that take work in turn; one that takes too long or dies is replaced, and that is an outcome.
+"""Worker processes that take work in turn; a process that takes too long or dies is replaced, which is an outcome.
 
-Windows has no module `resource`. What needs it to measure or limit child processes refuses there in words (`lacking`).
+Windows has no module `resource`. Families that measure or limit child processes do not run there (`lacking`).
 """
 
 from __future__ import annotations
@@ -19,16 +19,15 @@ from typing import Any
 
 import psutil
 
-from benchmarks import processes
 from benchmarks.family import WRONG, Case, Record
 
 Work = Callable[[Any, Callable[[], None]], Any]
-#: an answer is waited for so many times the limit of processor time: what sleeps for ever takes none
+#: longest wait for an answer, as a multiple of the limit of processor time: a sleeping process uses none
 PATIENCE = 10
 
 
 class LostError(Exception):
-    """A process gave no answer. seconds: processor time of its case [s], as far as that is known."""
+    """Raised when a process gives no answer.  seconds: processor time of its case [s] where known, else 0."""
 
     def __init__(self, reason: str, seconds: float = 0.0) -> None:
         super().__init__(reason)
@@ -36,15 +35,14 @@ class LostError(Exception):
 
 
 def outcomes(cases: Sequence[Case], jobs: int, work: Work, limit: int) -> Iterator[tuple[Case, Record]]:
-    """Every case with its record, as they come; see `Worker`, which is given what the case is of."""
+    """Yield every case with its record, in order of completion; `work` gets `case.of` as parameters (see `Worker`)."""
     workers = [Worker(work, limit) for _ in range(min(jobs, len(cases)))]
     idle: SimpleQueue[int] = SimpleQueue()
 
     def record(case: Case) -> Record:
         number = idle.get()
         try:
-            workers[number].give(case.of)
-            found: Record = workers[number].take()
+            found: Record = workers[number].ask(case.of)
         except LostError as lost:
             found = {"verdict": WRONG, "reason": str(lost), "seconds": lost.seconds}
             workers[number] = Worker(work, limit)
@@ -65,10 +63,10 @@ def outcomes(cases: Sequence[Case], jobs: int, work: Work, limit: int) -> Iterat
 
 
 class Worker:
-    """A process with a line to it, for one piece of work after the other; `work(parameters, begin)` must be importable.
+    """A process and a connection for one piece of work after the other; `work(parameters, begin)` must be importable.
 
-    limit: processor time of a piece [s]. It begins when `work` calls `begin`, and is kept by the system: it also ends
-    a process that sits in compiled code.
+    limit: processor time of one piece [s], counted from the moment when `work` calls `begin`. The operating system
+    enforces the limit, also while the process executes compiled code.
     """
 
     def __init__(self, work: Work, limit: int) -> None:
@@ -80,49 +78,45 @@ class Worker:
         self.process.start()
         other.close()
 
-    def give(self, parameters: Any) -> None:
-        """Begin a piece of work; `take` raises when the process is gone."""
-        with suppress(BrokenPipeError):
+    def ask(self, parameters: Any) -> Any:
+        """Return the result of a piece of work; raise LostError when the process hangs or has died."""
+        with suppress(BrokenPipeError, EOFError, ConnectionResetError):
             self.line.send(parameters)
-
-    def take(self) -> Any:
-        """What became of it, waited for; LostError when the process hangs, or has died."""
-        with suppress(EOFError, ConnectionResetError):
             if self.line.poll(PATIENCE * self.limit):
                 return self.line.recv()
             self.dismiss()
             raise LostError(f"did not answer within {PATIENCE * self.limit} s")
         self.process.join()
         code = self.process.exitcode or 0
-        if processes.ended_by(code) == "SIGXCPU":
+        if ended_by(code) == "SIGXCPU":
             raise LostError(f"did not end within {self.limit} s of processor time", float(self.limit))
-        raise LostError(f"its process died ({processes.ended_by(code) or f'exit code {code}'})")
+        raise LostError(f"its process died ({ended_by(code) or f'exit code {code}'})")
 
     def dismiss(self) -> None:
-        """End the process, whatever it does."""
-        # first of all: the end of its line ends a thread that waits for an answer
+        """Terminate the process, also in the middle of its work."""
+        # terminate first: the closed connection releases a thread that waits for an answer
         self.process.terminate()
         self.process.join()
         self.line.close()
 
 
 def _serve(line: connection.Connection, work: Work, limit: int) -> None:
-    """Work through what comes until the line is cut."""
-    with suppress(EOFError, BrokenPipeError):  # whoever asked is gone
+    """Do each piece of work that arrives, until the connection closes."""
+    with suppress(EOFError, BrokenPipeError):  # the parent process has ended
         while True:
             parameters = line.recv()
-            processes.limit_seconds(None)
-            line.send(work(parameters, lambda: processes.limit_seconds(limit)))
+            limit_seconds(None)
+            line.send(work(parameters, lambda: limit_seconds(limit)))
 
 
 def as_installed(folder: Path) -> dict[str, str]:
-    """Environment of commands whose results go to a folder, and which keep Python's bytecode, as if installed."""
+    """Return an environment for commands: results go to a folder, and bytecode is cached there, as when installed."""
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     return kept | {"FLEXCLEAR_RESULTS": str(folder / "results"), "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
 
 
 def installed(library: str) -> bool:
-    """Whether a library can be imported here."""
+    """Return True when a library can be imported here."""
     try:
         return find_spec(library) is not None
     except ValueError:  # its import is blocked
@@ -130,7 +124,7 @@ def installed(library: str) -> bool:
 
 
 def lacking() -> str:
-    """Why child processes can be neither measured nor limited here; empty where they can."""
+    """Return the reason why child processes can be neither measured nor limited here; empty where they can."""
     return (
         ""
         if installed("resource")
@@ -143,13 +137,13 @@ def _resource() -> Any:
 
 
 def seconds_of_children() -> float:
-    """Processor time of all child processes that ended so far [s], with theirs."""
+    """Return the processor time of all child processes that have ended, descendants included [s]."""
     used = _resource().getrusage(_resource().RUSAGE_CHILDREN)
     return float(used.ru_utime + used.ru_stime)
 
 
 def limit_seconds(seconds: int | None) -> None:
-    """Let this process take so much more processor time [s], whole seconds; None: as much as it may."""
+    """Limit the further processor time of this process [whole s]; None restores the highest permitted limit."""
     resource = _resource()
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     used = resource.getrusage(resource.RUSAGE_SELF)
@@ -158,16 +152,16 @@ def limit_seconds(seconds: int | None) -> None:
 
 
 def limit_files(size: int) -> Callable[[], None]:
-    """What lets a process write no file longer than so many bytes."""
+    """Return a function that limits each file that a process writes to `size` bytes."""
     resource = _resource()
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
 def children(process: int) -> list[psutil.Process]:
-    """The processes that a process has started and that still run; none where it has ended.
+    """Return the running child processes of a process; an empty list when the process has ended.
 
-    Python's own tracker of semaphores is left out: without it nothing is lost, but Python prints tracebacks at its end.
-    So are processes that still have their parent's command line: any of them may become the tracker.
+    Python's semaphore tracker is left out: killing it loses nothing, but Python then prints tracebacks when it exits.
+    Children that still have their parent's command line are left out too: any of them may become the tracker.
     """
     running = list[psutil.Process]()
     with suppress(psutil.Error):
@@ -182,7 +176,7 @@ def children(process: int) -> list[psutil.Process]:
 
 
 def seconds_of(process: psutil.Process) -> float:
-    """Processor time that a process has used [s]; 0 where it has ended."""
+    """Return the processor time that a process has used [s]; 0 when the process has ended."""
     try:
         times = process.cpu_times()
     except psutil.Error:
@@ -191,9 +185,9 @@ def seconds_of(process: psutil.Process) -> float:
 
 
 def ended_by(exit_code: int) -> str:
-    """Name of the signal that ended a process, such as SIGSEGV; empty when it was none.
+    """Return the name of the signal that ended a process, such as SIGSEGV; empty when no signal did.
 
-    Real-time signals but the first and the last have no name: they are known by their number.
+    Real-time signals except the first and the last have no name and are returned with their number.
     """
     if exit_code >= 0:
         return ""

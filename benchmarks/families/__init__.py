@@ -1,4 +1,4 @@
-"""The benchmarks: a module each, whose `FAMILY` declares it (`benchmarks.family.Family`)."""
+"""Families of benchmarks: name -> module and attribute that declares it (`benchmarks.family.Family`)."""
 
 KIND = "benchmark"
 NAMES = {

@@ -1,7 +1,7 @@
-"""What accuracy costs: the studies of `flexclear cost` of five scenes, with Exudyn's logged runs next to ours.
+"""Cost of accuracy: the studies of `flexclear cost` of five scenes, with Exudyn's logged runs next to ours.
 
-The studies are in the store, point by point. The log has what the page says of them, and the digests of their pictures,
-which are drawn with the studies and not from the log.
+The store holds the studies, point by point. The log holds the texts of the page and the digests of the pictures, which
+are drawn from the studies and not from the log.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ SCENES = ("sps4/ideal", "sps4/csj", "sps4/far_cb", "sps4/variants/far_csj_cb_dam
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """Of each scene a record with the advice, one for each picture, one for each table."""
+    """Yield for each scene one record with the advice, one for each picture and one for each table."""
     place = open_workplace()
     peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
     for case in cases:
         scene = load_scene(find_scene(case.name))
         study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY, models=True)
-        said, pictures = cost.figures_and_tables(case.name, study, "accuracy")
-        records: list[Record] = [{"advice": said.advice}]
-        for title, path in said.pictures.items():
+        studied, pictures = cost.figures_and_tables(case.name, study, "accuracy")
+        records: list[Record] = [{"advice": studied.advice}]
+        for title, path in studied.pictures.items():
             file = pictures[path]
             digest = hashlib.sha256(study.read(file)).hexdigest()
             records.append({"picture": title, "path": path, "file": file, "sha256": digest})
-        yield case, records + [{"table": asdict(from_markdown(text))} for text in said.tables]
+        yield case, records + [{"table": asdict(from_markdown(text))} for text in studied.tables]
 
 
 def show(records: list[Record]) -> str:
-    """What to choose for each scene, and its pictures and tables."""
+    """Return the advice for each scene, with its pictures and tables."""
     found = []
     measured = {r["case"] for r in records}
     for scene in (name for name in SCENES if name in measured):
@@ -60,7 +60,7 @@ def _table(stored: Mapping[str, list]) -> Table:
 
 
 def files(records: list[Record]) -> dict[str, bytes]:
-    """Pictures that are among the results still; those of other studies have other digests."""
+    """Return the pictures that still exist among the results; those of other studies have other digests."""
     found = {}
     for r in records:
         file = results_root() / "cost" / r["case"] / r.get("file", "")

@@ -1,4 +1,4 @@
-"""Classes of hard cases of the stability atlas: one small scene each, with what is known of it."""
+"""Classes of hard cases of the stability atlas: one small scene each, with a known result."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ Table = dict[str, Any]
 #: stiffness of a shaft's end [N/m, N/rad, N m/rad], and its disc [kg, kg m^2, m]
 SIDE, MIXED, SLOPE = 164163.04446739165, 20520.380558423956, 3420.0634264039927
 MASS, ACROSS, ALONG, ARM = 3.0, 0.02, 0.036, 0.25
-#: axes along none of the world's
+#: axes that are parallel to none of the world's
 OBLIQUE = {"z": [2.0, 6.0, 3.0], "x": [-3.0, 1.0, 0.0]}
 UPRIGHT = {"z": [0.0, 0.0, 1.0], "x": [1.0, 0.0, 0.0]}
 
 
 @dataclass(frozen=True)
 class HardCase:
-    """A scene of a class, and what is examined.
+    """A scene of a class, and its examination.
 
-    compared: what with what.  examine: largest relative deviation of a run or of its frequencies.  limit: of that
-    deviation; 0 where the scene must be refused.  refused: words of the refusal.
+    compared: quantity and reference of the comparison.  examine: returns the largest relative deviation of a run or of
+    its frequencies.  limit: of that deviation; 0 where the scene must be refused.  refused: words of the refusal.
     """
 
     scene: Callable[[], Scene]
@@ -49,7 +49,7 @@ class HardCase:
 
 
 def run(scene: Scene) -> xr.Dataset:
-    """The run of a scene without flexible bodies."""
+    """Simulate a scene without flexible bodies."""
     return dynamics.simulate(scene, {}, silent)
 
 
@@ -69,9 +69,9 @@ def _ground(**frames: Any) -> Table:
 
 
 def rotor(speed: float, unbalance: float = 0.0, axes: Mapping[str, list[float]] = UPRIGHT, size: float = 1.0) -> Scene:
-    """A disc at the end of a massless shaft on a driven hub; unbalance of its centre of mass along x, per size [m].
+    """Return a disc at the end of a massless shaft on a driven hub; unbalance: offset of its centre along x [m].
 
-    size: all lengths are as much larger; forces per displacement, and frequencies, stay the same.
+    size: factor of all lengths, the unbalance included; forces per displacement, and frequencies, are unchanged.
     """
     K = np.diag([SIDE, SIDE, 1e8, SLOPE * size**2, SLOPE * size**2, 1e5 * size**2])
     K[0, 4] = K[4, 0] = -MIXED * size
@@ -101,12 +101,12 @@ def _steady(scene: Scene) -> xr.Dataset:
 
 
 def _deflection(scene: Scene) -> float:
-    """Of the shaft's end, in comparison with its closed form."""
+    """Return the relative error of the deflection of the shaft's end against its closed form."""
     return abs(float(_steady(scene).frame_position.sel(frame="disc.o", axis="x")) / (deflection(150.0) * 1e-5) - 1.0)
 
 
 def deflection(speed: float) -> float:
-    """Deflection of the shaft's end per unbalance, in the axes that turn.
+    """Return the deflection of the shaft's end per unbalance, in the rotating axes.
 
     (K - Omega^2 diag(m, I_t - I_p)) (x, p) = (m Omega^2 e, 0); Genta (2005), Dynamics of Rotating Systems, sec. 2.6.
     """
@@ -123,7 +123,7 @@ def _as_upright(scene: Scene) -> float:
 
 
 def driven_into_a_stop() -> Scene:
-    """A slide whose drive moves it 10 mm into a stop: nothing is free."""
+    """Return a slide that its drive moves 10 mm into a stop: no coordinate is free."""
     return _scene(
         0.9,
         body={"ground": _ground(o={}), "slide": _body({"o": {}})},
@@ -133,15 +133,19 @@ def driven_into_a_stop() -> Scene:
     )
 
 
-def _peak(scene: Scene) -> float:
-    """That of k d^1.5 = 1000 N at each of the three peaks."""
+def _of_closings(scene: Scene, name: str) -> np.ndarray:
     found = run(scene)
-    peaks = found.event_peak_force.values[found.event_kind.values == "closing"]
+    return found[name].values[found.event_kind.values == "closing"]
+
+
+def _peak(scene: Scene) -> float:
+    """Return the error of the three peak forces against k d^1.5 = 1000 N; NaN for another number of peaks."""
+    peaks = _of_closings(scene, "event_peak_force")
     return float(np.abs(peaks / 1e3 - 1.0).max()) if len(peaks) == 3 else float("nan")
 
 
 def bounce(**solver: Any) -> Scene:
-    """A ball that falls 0.2 m onto a stiff plane."""
+    """Return a ball that falls 0.2 m onto a stiff plane."""
     normal = {"law": "hertz", "stiffness": 1e8}
     plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.1, "normal": normal}
     return _scene(
@@ -154,13 +158,17 @@ def bounce(**solver: Any) -> Scene:
 
 
 def graze(depth: float, rtol: float) -> Scene:
-    """A mass on a spring, 10 rad/s and 0.1 m, that meets a plane before its lowest point [m]."""
-    normal = {"law": "hertz", "stiffness": 1e8}
-    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02, "normal": normal}
-    floor = {"position": [0.0, 0.0, -0.12 + depth]}
+    """Return a mass on a spring, 10 rad/s and 0.1 m, that meets a plane at `depth` before its lowest point [m]."""
+    return _ball_on_a_spring(-0.12 + depth, {"law": "hertz", "stiffness": 1e8}, rtol)
+
+
+def _ball_on_a_spring(height: float, normal: Table, rtol: float, unit: float = 1.0) -> Scene:
+    """Return a ball on a spring above a plane at a height [m]; unit: factor of the ball's lengths."""
+    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02 * unit, "normal": normal}
+    floor, place = {"position": [0.0, 0.0, height]}, {"position": [0.0, 0.0, 0.1 * unit]}
     return _scene(
         3.0,
-        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, pose={"position": [0, 0, 0.1]})},
+        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, 1.0, 0.01 * unit**2, pose=place)},
         joint={"rail": {"type": "prismatic", "between": ["ground.o", "ball.o"]}, "floor": plane},
         load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": 100.0}},
         solver={"rtol": rtol},
@@ -169,9 +177,8 @@ def graze(depth: float, rtol: float) -> Scene:
 
 def _graze_speed(depth: float) -> Callable[[Scene], float]:
     def examined(scene: Scene) -> float:
-        """Speed of each of the five closings, sqrt(2 w^2 A d - w^2 d^2); a negative one is off by more than 1."""
-        found = run(scene)
-        speeds = found.event_approach_speed.values[found.event_kind.values == "closing"]
+        """Return the error of the five closing speeds, sqrt(2 w^2 A d - w^2 d^2); above 1 for a negative speed."""
+        speeds = _of_closings(scene, "event_approach_speed")
         known = 10.0 * np.sqrt(0.2 * depth - depth**2)
         return float(np.abs(speeds / known - 1.0).max()) if len(speeds) == 5 else float("nan")
 
@@ -179,26 +186,15 @@ def _graze_speed(depth: float) -> Callable[[Scene], float]:
 
 
 def small_bounce(unit: float) -> Scene:
-    """A lossy ball on a spring that meets a plane; all lengths are so many times as large, forces per mass too."""
+    """Return a lossy ball on a spring that meets a plane; `unit` scales all lengths, and forces per mass as well."""
     normal = {"law": "lankarani-nikravesh", "restitution": 0.6, "stiffness": 1e6 * unit**-0.5}
-    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02 * unit, "normal": normal}
-    floor = {"position": [0.0, 0.0, -0.09 * unit]}
-    place = {"position": [0.0, 0.0, 0.1 * unit]}
-    return _scene(
-        3.0,
-        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, 1.0, 0.01 * unit**2, pose=place)},
-        joint={"rail": {"type": "prismatic", "between": ["ground.o", "ball.o"]}, "floor": plane},
-        load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": 100.0}},
-        solver={"rtol": 1e-10},
-    )
+    return _ball_on_a_spring(-0.09 * unit, normal, 1e-10, unit)
 
 
 def _as_in_metres(unit: float) -> Callable[[Scene], float]:
     def examined(scene: Scene) -> float:
-        speeds = []
-        for one, size in ((small_bounce(1.0), 1.0), (scene, unit)):
-            found = run(one)
-            speeds.append(found.event_approach_speed.values[found.event_kind.values == "closing"] / size)
+        pairs = (small_bounce(1.0), 1.0), (scene, unit)
+        speeds = [_of_closings(one, "event_approach_speed") / size for one, size in pairs]
         if len(speeds[0]) != len(speeds[1]) or len(speeds[0]) < 5:
             return float("nan")
         return float(np.abs(speeds[1] / speeds[0] - 1.0).max())
@@ -210,7 +206,7 @@ def _as_in_metres(unit: float) -> Callable[[Scene], float]:
 
 
 def stage_next_to_a_crane() -> Scene:
-    """A stage that vibrates by 1 nm next to a swinging jib of 100 m, which nothing connects with it."""
+    """Return a stage that vibrates by 1 nm next to a swinging jib of 100 m, without any connection."""
     jib = _body({"o": {}}, 1e5, 1e6, com=[100.0, 0.0, 0.0])
     stage = _body({"o": {}}, pose={"position": [1.0, 0.0, 1e-9]})
     return _scene(
@@ -235,7 +231,7 @@ def _vibration(scene: Scene) -> float:
 
 
 def wound_bushing() -> Scene:
-    """A free body on an isotropic bushing that turns by 3.54 rad to either side."""
+    """Return a free body on an isotropic bushing that turns by 3.54 rad to either side."""
     spinning = _body({"o": {}}, angular_velocity=[0.0, 0.0, 50.0])
     stiffness = [1000.0, 1000.0, 1000.0, 2.0, 2.0, 2.0]
     load = {"type": "bushing", "between": ["ground.o", "body.o"], "stiffness": stiffness}
@@ -243,14 +239,14 @@ def wound_bushing() -> Scene:
 
 
 def _spin(scene: Scene) -> float:
-    """50 cos(w t) rad/s, w^2 = 2/0.01 1/s^2."""
+    """Return the error of the spin against 50 cos(w t) rad/s, w^2 = 2/0.01 1/s^2."""
     found = run(scene)
     spin = found.angular_velocity.sel(body="body", axis="z").values
     return float(np.abs(spin / 50.0 - np.cos(np.sqrt(200.0) * found.time.values)).max())
 
 
 def fast_sampler() -> Scene:
-    """A controller whose period is too long for its gain."""
+    """Return a controller whose period is too long for its gain."""
     control = {"type": "sampled-pid", "joint": "rail", "reference": 0.1, "proportional": 5e3, "period": 0.1}
     return _scene(
         6.0,
@@ -261,7 +257,7 @@ def fast_sampler() -> Scene:
 
 
 def meshed_loop() -> Scene:
-    """A turning planar four-bar whose coupler's frames, as of a mesh, are off by up to 2.4e-7 m in all directions."""
+    """Return a turning planar four-bar; its coupler's frames, as of a mesh, are off by up to 2.4e-7 m."""
     off = [[1.1e-7, -1.9e-7, 9e-8], [-2e-7, 6e-8, -1.2e-7]]
     corners = np.array([[0.0, 0.0, 0.0], [0.0, 0.05, 0.0], [0.2, 0.15, 0.0], [0.2, 0.0, 0.0]])
     bodies: Table = {"ground": _ground(o0={}, o3={"position": [0.2, 0.0, 0.0]})}
@@ -330,7 +326,7 @@ COLUMNS: Columns = {
 
 
 def examined(name: str) -> Record:
-    """What became of a case: `verdict`, `reason`, largest `deviation` from what is known, seconds with compiling."""
+    """Return the outcome of a case: `verdict`, `reason`, largest `deviation`, seconds with compiling."""
     case, begun, deviation, reason = CASES[name], time.process_time(), None, ""
     try:
         deviation = case.examine(case.scene())
@@ -345,15 +341,17 @@ def examined(name: str) -> Record:
 
 
 def show(records: list[Record]) -> str:
-    """A table, and what was said of what did not finish."""
-    said = [f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split())}" for r in records if r["reason"]]
-    return table(records, COLUMNS) + ("\n\nWhat did not finish said:\n\n" + "\n".join(said) + "\n" if said else "")
+    """Return a table, and the messages of the cases that did not finish."""
+    messages = [f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split())}" for r in records if r["reason"]]
+    return table(records, COLUMNS) + (
+        "\n\nMessages of the cases that did not finish:\n\n" + "\n".join(messages) + "\n" if messages else ""
+    )
 
 
 def modules(case: Case) -> set[str]:
-    """What decides about a case: its scene and the dynamics."""
+    """Return the modules that determine a case: its scene and the dynamics."""
     del case
-    ways = {module_of(RUNS, name) for name in import_module(RUNS).NAMES}  # that scenes call for by these names
+    ways = {module_of(RUNS, name) for name in import_module(RUNS).NAMES}  # scenes request them by these names
     return {__name__, "flexclear.pipeline.dynamics", *ways}
 
 

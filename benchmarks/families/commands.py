@@ -1,4 +1,4 @@
-"""Whole commands from the shell, and points of a loop in Python: what is spent around the integration."""
+"""Times of whole commands from the shell, by parts of the work, and of points of a loop in Python."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from benchmarks.timing import Times, interleaved, of_children
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
 from flexclear.pipeline.core.system.platforms import cores
 
-#: so many, since single ones take up to a quarter longer on a machine that others use as well
+#: number of rounds; single ones take up to a quarter longer on a machine that others use as well
 ROUNDS = 11
-#: parts as they stand in the table; what is not there is in the rest
+#: parts in the order of the table; all other parts belong to the rest
 SHOWN = ("interpreter", IMPORTS, "scene", "keys", "assembling", "integrating", "recording", "writing", "deriving", REST)
 LOOP = """import sys, time
 import flexclear as fc
@@ -36,10 +36,10 @@ print(*(sorted(kind)[4] for kind in zip(*times)))"""
 
 @dataclass(frozen=True)
 class Command:
-    """A command: arguments, in which ``{}`` is a number that is another one each time.
+    """A command with arguments, in which ``{}`` is a number that changes with each run.
 
-    value: that number, about.  own: whether it works on the project's results instead of on empty ones.
-    loop: whether it is a loop over `flexclear.run` in Python, of which one point counts.
+    value: approximate value of that number.  own: True to use the project's results instead of empty ones.
+    loop: True for a loop over `flexclear.run` in Python, of which one point counts.
     """
 
     arguments: tuple[str, ...]
@@ -62,7 +62,7 @@ COMMANDS: Mapping[str, Command] = {
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each command; they take turns. Bytecode is kept, as an installed program has it."""
+    """Yield a record for each command; commands take turns. Bytecode is cached, as by an installed program."""
     with TemporaryDirectory() as folder:
         fresh = (1.0 + 1e-7 * k for k in itertools.count())
         waits = {case.name: list[float]() for case in cases}
@@ -77,7 +77,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[float]) -> Callable[[], float]:
-    """What runs a command for its processor time [s]; how long it was waited for is added to `waits` [s]."""
+    """Return a function that runs a command, returns its processor time and appends its wall time to `waits` [s]."""
 
     def seconds() -> float:
         if command.loop:
@@ -93,7 +93,7 @@ def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[f
 
 
 def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "flexclear") -> str:
-    """The last line that a command says."""
+    """Run a command and return the last line of its output."""
     program = ["-c", LOOP] if command.loop else ["-m", module]
     arguments = [text.format(repr(command.value * next(fresh))) for text in command.arguments]
     environment = as_installed(folder) | ({"FLEXCLEAR_RESULTS": str(results_root())} if command.own else {})
@@ -110,18 +110,18 @@ def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "
 
 
 def show(records: list[Record]) -> str:
-    """The table: seconds of the processor and waited for, and what the former go into in milliseconds."""
+    """Return the table: processor and wall seconds, and the parts of the former in milliseconds."""
     columns: Columns = {
         "command": lambda r: r["case"],
         "CPU [s]": lambda r: spread(r["cpu"], "s", 2),
         "wall [s]": lambda r: spread(r["wall"], "s", 2),
         "processors": lambda r: str(r["processors"]),
-        **{f"{part} [ms]": lambda r, part=part: _told(r["parts"], part) for part in SHOWN},  # type: ignore[misc]
+        **{f"{part} [ms]": lambda r, part=part: _milliseconds(r["parts"], part) for part in SHOWN},  # type: ignore[misc]
     }
     return table(records, columns)
 
 
-def _told(parts: Mapping[str, float], part: str) -> str:
+def _milliseconds(parts: Mapping[str, float], part: str) -> str:
     return f"{1e3 * parts[part]:.0f}" if parts.get(part) else ""
 
 

@@ -1,7 +1,7 @@
-"""What each effect does in the paper's mechanism, what an open contact costs, and what static modes save.
+"""Effect sizes in the paper's mechanism, cost of an open contact, and savings by static modes.
 
-The first answers the paper's questions: does the flexible rod alone matter for the pose, does clearance dominate, are
-both together needed for forces?
+The effect sizes answer the paper's questions: does the flexible rod alone matter for the pose, does clearance dominate,
+are both needed together for forces?
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from flexclear.pipeline.post.answers.effect_sizes import written
 from flexclear.stages.workplace import open_workplace
 
 SCENE, RIGID = "sps4/far_csj_cb", "sps4/csj"
-#: what is asked for
+#: watched quantities
 WATCHED = (
     "platform.position",
     "platform.orientation",
@@ -35,16 +35,16 @@ WATCHED = (
 )
 ROD, PLAY = "body.rod1.modes", "joint.A1.clearance"
 ROUNDS, EVALUATIONS = 8, 20000
-#: share by which the least of repeated times differs from one measurement to the next
+#: relative difference between repeated measurements of a least time
 NOISE = 0.02
-#: one effect dominates another one from this ratio on
+#: an effect dominates another one from this ratio on
 DOMINATES = 10.0
-#: tolerance at which numbers of modes are compared, as of planned runs
+#: tolerance at which numbers of modes are compared, as of planned runs; number of static modes
 RTOL, STATIC = 1e-6, 6
 
 
 def cases() -> list[Case]:
-    """The influences, the cost of an open contact in two scenes, the cost of modes."""
+    """Return the cases: influences, cost of an open contact in two scenes, cost of modes."""
     return [
         Case("influences", None),
         Case("open contact, rigid", RIGID),
@@ -67,10 +67,10 @@ def _influences() -> list[Record]:
         part = found.sel(quantity=quantity)
         record: Record = {"quantity": quantity, "unit": str(part["unit"].values)}
         for name, effect, other in (("rod", ROD, PLAY), ("play", PLAY, ROD)):
-            for kind, beside in (("dropped", effect), ("added", effect), ("interaction", other)):
+            for kind, second in (("dropped", effect), ("added", effect), ("interaction", other)):
                 for part_of in ("", "_uncertainty"):
-                    value = float(part[f"{kind}{part_of}"].sel(effect=effect, other=beside))
-                    # JSON has no infinity: events that are not the same
+                    value = float(part[f"{kind}{part_of}"].sel(effect=effect, other=second))
+                    # infinite where the events differ; JSON has no infinity
                     record[f"{name}_{kind}{part_of}"] = value if np.isfinite(value) else None
         records.append(record)
     return records
@@ -84,22 +84,22 @@ def _started(name: str, **changes: Any) -> tuple[Any, Any, np.ndarray]:
 
 
 def _open(name: str) -> Record:
-    """Processor time of an evaluation with the contact open, and without looking at it [s]."""
+    """Return the processor time of an evaluation with the contact open, and the fraction of checking its gap."""
     engine, _, start = _started(name)
-    there = int(engine.h[m.N_SURFACES])
+    surfaces_of_scene = int(engine.h[m.N_SURFACES])
 
     def evaluation(surfaces: int) -> float:
         engine.h[m.N_SURFACES] = surfaces
         return once(lambda: closure_rows.evaluate(engine, start, engine.start, EVALUATIONS)) / EVALUATIONS
 
-    tasks = {"with_it": partial(evaluation, there), "without": partial(evaluation, 0)}
+    tasks = {"with_it": partial(evaluation, surfaces_of_scene), "without": partial(evaluation, 0)}
     with_it, without = (min(times.seconds) for times in interleaved(tasks, ROUNDS).values())
-    engine.h[m.N_SURFACES] = there
+    engine.h[m.N_SURFACES] = surfaces_of_scene
     return {"scene": name, "evaluation_us": 1e6 * with_it, "share": (with_it - without) / with_it}
 
 
 def _modes(name: str) -> Record:
-    """Processor time of a run with all modes, and with the static ones alone [s]."""
+    """Return the processor time of a run with all modes, and with the static modes only [s]."""
     found: Record = {"scene": name}
     for key, change in (("all", {}), ("static", {"body.rod1.modes.count": STATIC})):
         engine, other, start = _started(name, **change, **{"solver.rtol": RTOL})
@@ -108,7 +108,7 @@ def _modes(name: str) -> Record:
 
 
 def show(records: list[Record]) -> dict[str, str]:
-    """The influences with the answers, and what could be left out on demand."""
+    """Return the table of influences with the answers, and the costs of open contacts and of modes."""
     influences = {r["quantity"]: r for r in records if "quantity" in r}
     columns: Columns = {
         "quantity": lambda r: r["quantity"],
@@ -122,8 +122,8 @@ def show(records: list[Record]) -> dict[str, str]:
     if influences:
         parts["influences"] += "\n\n" + _answers(influences)
     lines = [
-        f"- {r['scene']}: an evaluation takes {r['evaluation_us']:.3g} us while the contact is open; looking at its "
-        f"gap is {_share(r['share'])} of that."
+        f"- {r['scene']}: an evaluation takes {r['evaluation_us']:.3g} us while the contact is open; checking its "
+        f"gap takes {_share(r['share'])} of that."
         for r in records
         if "evaluation_us" in r
     ]
@@ -164,18 +164,18 @@ def _answers(found: dict[str, Record]) -> str:
 
 
 def _matters(place: Record) -> str:
-    """That the rod does more to the pose next to the clearance than alone, where it is more than chance."""
+    """Return a clause when the rod changes the pose more with clearance than alone, beyond chance."""
     known = place["rod_dropped"] > max(place["rod_dropped_uncertainty"] or 0.0, place["rod_added"])
     return ": with clearance the rod does matter, since it changes the impacts" if known else ""
 
 
 def _given(record: Record, name: str) -> str:
-    """What to think of a difference of means that chance may explain."""
+    """Return a remark when chance may explain a difference of means."""
     return "" if record[name] > (record[f"{name}_uncertainty"] or 0.0) else ", which chance may explain"
 
 
 def _share(value: float) -> str:
-    """A share in words where it is below what repeated measurements differ by."""
+    """Return a percentage, or an upper bound where it is below the noise of repeated measurements."""
     return f"{100 * value:.0f} %" if value > NOISE else f"less than {100 * NOISE:.0f} %, the noise of this measurement,"
 
 

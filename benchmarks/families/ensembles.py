@@ -1,12 +1,12 @@
-"""What the members of an ensemble cost next to one run: alone and several at once, on one and two workers."""
+"""Cost of an ensemble's members relative to one run: one by one and several at once, on one and two workers."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
+from unittest.mock import patch
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, mechanism
@@ -20,20 +20,20 @@ from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.record import ensemble
 
-#: scenes, with as many members as the paper's ensembles have
+#: scenes, and the number of members in the paper's ensembles
 SCENES, MEMBERS = ("csj", "far_csj_cb"), 16
-#: numbers of members of a short run of the fullest scene, which a single thread makes
+#: numbers of members in a short run of the fullest scene on a single thread, and its end [s]
 GROWING, UNTIL = (1, 2, 4, 8, 16, 32), 0.02
 ROUNDS = 3
 
 
 def cases() -> list[Case]:
-    """Scenes, then numbers of members."""
+    """Return the scenes, then the numbers of members, as cases."""
     return [Case(name) for name in SCENES] + [Case(f"{n} members", n) for n in GROWING]
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each; numbers of members take turns."""
+    """Yield a record for each case; the numbers of members take turns."""
     for case in cases:
         if case.of is None:
             yield case, [_beside_a_run(mechanism(case.name))]
@@ -43,7 +43,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _beside_a_run(here: Mechanism) -> Record:
-    """Times of a run without its perturbed run, and of all members."""
+    """Return the times of a run without its perturbed run, and of all members."""
     full = _with_members(here, MEMBERS)
     tasks = {
         "run": partial(_timed, partial(dynamics.simulate, here.scene, here.bundles, silent)),
@@ -67,45 +67,29 @@ def _growing(cases: Sequence[Case]) -> Measured:
 
 
 def _with_members(here: Mechanism, members: int) -> Callable[[], Any]:
-    asked = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
-    scene = here.scene.model_copy(update={"ensemble": asked})
+    settings = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
+    scene = here.scene.model_copy(update={"ensemble": settings})
     return lambda: analyses.ensemble(scene, here.bundles, silent)
 
 
 def _timed(work: Callable[[], Any], workers: int = 0, *, together: bool = True) -> tuple[float, float]:
-    """Wall and processor time [s]."""
-    with _workers(workers) if workers else nullcontext(), nullcontext() if together else _alone():
+    """Return wall and processor time of some work [s]."""
+    number = (lambda: workers) if workers else cores.cores
+    few = ensemble.FEW if together else MEMBERS + 1
+    with patch.object(cores, "cores", number), patch.object(ensemble, "FEW", few):
         begun, spent = time.perf_counter(), time.process_time()
         work()
         return time.perf_counter() - begun, time.process_time() - spent
 
 
-@contextmanager
-def _workers(number: int) -> Iterator[None]:
-    proper, cores.cores = cores.cores, lambda: number
-    try:
-        yield
-    finally:
-        cores.cores = proper
-
-
-@contextmanager
-def _alone() -> Iterator[None]:
-    proper, ensemble.FEW = ensemble.FEW, MEMBERS + 1
-    try:
-        yield
-    finally:
-        ensemble.FEW = proper
-
-
 def _in_turn(tasks: Mapping[str, Callable[[], tuple[float, float]]]) -> dict[str, tuple[Times, Times]]:
-    """Wall and processor times of each task."""
+    """Return wall and processor times of each task."""
     pairs_of = {name: list(zip(*pairs, strict=True)) for name, pairs in in_turn(tasks, ROUNDS).items()}
     return {name: (Times(wall), Times(cpu)) for name, (wall, cpu) in pairs_of.items()}
 
 
 def show(records: list[Record]) -> str:
-    """Both tables, with the exponent of the growth."""
+    """Return both tables, with the exponent of the growth."""
 
     def wall(name: str) -> Callable[[Record], str]:
         return lambda r: short(r[name]["wall"]["s"])
@@ -118,7 +102,7 @@ def show(records: list[Record]) -> str:
         "one run, wall [s]": wall("run"),
         f"{MEMBERS} members one by one, wall on 2 workers [s]": wall("alone, 2 workers"),
         "several at once, wall on 2 workers [s]": wall("together, 2 workers"),
-        "as many runs": lambda r: short(r["together, 2 workers"]["wall"]["s"] / r["run"]["wall"]["s"]),
+        "cost in runs": lambda r: short(r["together, 2 workers"]["wall"]["s"] / r["run"]["wall"]["s"]),
         "one by one, processor [s]": cpu("alone"),
         "at once, processor [s]": cpu("together"),
         "factor": lambda r: f"{r['alone']['cpu']['s'] / r['together']['cpu']['s']:.2f}",

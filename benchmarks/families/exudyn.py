@@ -1,7 +1,7 @@
 """Whole runs against Exudyn at equal error, both against the same converged reference.
 
-Each of Exudyn's runs is measured next to ours that is no worse in position and velocity and needs the least time.
-Times are those of the whole integration with its samples; building the model and compiling are in neither.
+Each of Exudyn's runs is measured next to our fastest run that is no worse in position and velocity. Times are those of
+the whole integration with its samples; they exclude building the model and compiling.
 """
 
 from __future__ import annotations
@@ -29,35 +29,35 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.post.plotting.table import pipe_table
 
 BODY = "platform"
-#: shares of the largest speed for which the times needed are compared
+#: velocity errors, as fractions of the largest speed, for which times are compared
 LEVELS = (1e-2, 1e-3, 1e-4)
 REPEATS = 5
-#: Exudyn runs longer than this are not repeated [s]
+#: longer runs of Exudyn are not repeated [s]
 LONG = 1.0
 SMOOTH = (1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
 RARELY = (9e-3, 4.5e-3, 2.25e-3, 1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
 STIFF = (5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
-#: where impacts magnify errors, or the finest run is a reference
+#: steps where impacts magnify errors, or where the finest run is a reference [s]
 FINER = (*STIFF, 5e-7, 2e-7)
-#: a run that is a reference is recorded so often [s]
+#: sampling time of a run that is a reference [s]
 RECORDED = 1e-6
-#: the other methods are no better in the long run; they take part at the first steps of each ladder
+#: number of first steps of each ladder at which the other methods take part: they are no better in the long run
 TRIED = 4
-#: a run is left out when another, no worse in either error, takes less than this share of its time
+#: a run is left out when another one, no worse in either error, takes less than this fraction of its time
 CLEARLY = 0.9
 
 
-#: processor time after which a run counts as one that hangs [s]; the dearest takes a fifth of it
+#: processor time after which a run counts as hanging [s]; the most expensive one takes a fifth of this limit
 LIMIT = 120
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A scene, edited or not.
+    """A scene, edited or not, that both codes run.
 
-    horizon: end of both runs [s].  sampling: both codes record every so many seconds.
-    own_law: Exudyn has another friction law.
-    study: the cost study in whose figure its runs are points.  note: how they differ from that scene.
+    horizon: end of both runs [s].  sampling: interval at which both codes record [s].
+    own_law: True when Exudyn has another friction law.
+    study: cost study whose figure shows Exudyn's runs.  note: how these runs differ from the scene of the study.
     """
 
     scene: str
@@ -72,16 +72,12 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Run:
-    """A setting of Exudyn, what came of it, and how wrong that is."""
+    """A setting of Exudyn, its outcome and the error of that outcome."""
 
     method: str
     step: float
     outcome: Outcome
     error: Error | None
-
-    def reaches(self, level: float) -> bool:
-        """Whether its velocity is right to a share of the largest speed."""
-        return self.error is not None and self.error.relative <= level
 
 
 OWN_LAW = "its friction is linear up to one speed and constant above; errors against its own finest run"
@@ -113,10 +109,10 @@ COMPARISONS = {
 
 
 class Peer:
-    """Exudyn's runs of one mechanism in a process of its own, timed there around the integration alone.
+    """Exudyn's runs of one mechanism in a separate process, which times the integration alone.
 
-    A process serves one run after the other, so that no time holds its start, and all but its first run are warm.
-    After a run that failed the next one is given a fresh process.
+    One process serves all runs, so that no time includes its start, and all but its first run are warm. After a failed
+    run the next one gets a new process.
     """
 
     def __init__(self, here: Mechanism, body: str) -> None:
@@ -124,48 +120,44 @@ class Peer:
         self.worker: Worker | None = None
 
     def run(self, method: str, step: float, sampling: float) -> Outcome:
-        """A run at a fixed step, sampled every so many seconds; arguments of `exudyn_model.solve`."""
+        """Make a run at a fixed step [s], sampled at an interval [s]; arguments as of `exudyn_model.solve`."""
         used = self.worker is not None
         try:
-            found = self._asked((self.here, self.body, method, step, sampling))
+            self.worker = self.worker or Worker(work, LIMIT)
+            found: Outcome = self.worker.ask((self.here, self.body, method, step, sampling))
         except LostError as lost:
             self.close()
-            if used and not lost.seconds:  # what earlier runs left may have killed it
+            if used and not lost.seconds:  # leftovers of earlier runs may have killed the process
                 return self.run(method, step, sampling)
             return Outcome(0.0, None, str(lost))
         if found.samples is None:
             self.close()
         return found
 
-    def _asked(self, parameters: tuple[Any, ...]) -> Outcome:
-        self.worker = self.worker or Worker(work, LIMIT)
-        self.worker.give(parameters)
-        return self.worker.take()
-
     def close(self) -> None:
-        """End its process."""
+        """End the process."""
         if self.worker is not None:
             self.worker.dismiss()
         self.worker = None
 
 
 def work(parameters: tuple[Any, ...], begin: Callable[[], None]) -> Outcome:
-    """What its process does."""
+    """Solve one run in the process of a `Peer`."""
     begin()
     return solve(*parameters)
 
 
 def edited(case: Case) -> Mechanism:
-    """The mechanism that both codes run."""
-    original, asked = mechanism(case.of.scene), case.of
-    scene = asked.edit(original.scene)
-    if asked.horizon is not None:
-        scene = scene.model_copy(update={"time": scene.time.model_copy(update={"end": asked.horizon})})
+    """Return the mechanism that both codes run."""
+    original, comparison = mechanism(case.of.scene), case.of
+    scene = comparison.edit(original.scene)
+    if comparison.horizon is not None:
+        scene = scene.model_copy(update={"time": scene.time.model_copy(update={"end": comparison.horizon})})
     return original.with_scene(case.name, scene)
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """Of each case a record on what is compared, then one for each of our runs and one for each of Exudyn's."""
+    """Yield for each case a record on the comparison, then one for each of our runs and one for each of Exudyn's."""
     for case in cases:
         here = edited(case)
         with closing(Peer(here, BODY)) as peer:
@@ -173,11 +165,11 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _records(case: Case, here: Mechanism, peer: Peer) -> Iterator[Record]:
-    asked: Comparison = case.of
-    reference = errors.converged(here, BODY, here.scene.time.end, asked.sampling)
-    theirs, law = _own(case, peer, reference) if asked.own_law else (reference, {})
+    comparison: Comparison = case.of
+    reference = errors.converged(here, BODY, here.scene.time.end, comparison.sampling)
+    theirs, law = _own(case, peer, reference) if comparison.own_law else (reference, {})
     yield {"horizon": reference.horizon, "version": version("exudyn"), **law}
-    tried = [_tried(peer, method, step, theirs) for method, step in _settings(asked)]
+    tried = [_tried(peer, method, step, theirs) for method, step in _settings(comparison)]
     done = [run for run in tried if run.error is not None]
     ours = errors.ladder(here, BODY, reference, partial(_beyond, [run.error for run in done if run.error]))
     for r in ours:
@@ -191,19 +183,19 @@ def _records(case: Case, here: Mechanism, peer: Peer) -> Iterator[Record]:
         if run.error is None:
             yield record | {"failed": run.outcome.failure}
         elif run in best or levels:
-            yield record | _compared(run, levels, peer, asked.sampling, ours)
+            yield record | _compared(run, levels, peer, comparison.sampling, ours)
         else:
             yield record | {"s": run.outcome.seconds, **_numbers(run.error)}
 
 
-def _settings(asked: Comparison) -> list[tuple[str, float]]:
-    """Methods and steps [s] that are tried; with a law of its own the finest run is the reference."""
-    steps = asked.steps[:-1] if asked.own_law else asked.steps
+def _settings(comparison: Comparison) -> list[tuple[str, float]]:
+    """Return the methods and steps [s] to try; with a friction law of its own, Exudyn's finest run is the reference."""
+    steps = comparison.steps[:-1] if comparison.own_law else comparison.steps
     return [(method, step) for k, method in enumerate(METHODS) for step in (steps[:TRIED] if k else steps)]
 
 
 def _own(case: Case, peer: Peer, ours: Reference) -> tuple[Reference, Record]:
-    """Exudyn's own finest run as a reference at any time, and how far it is from ours."""
+    """Return Exudyn's own finest run as a reference at any time, and its difference from ours."""
     finest = peer.run(next(iter(METHODS)), case.of.steps[-1], RECORDED).samples
     if finest is None:
         raise RuntimeError(f"Exudyn fails on its finest run of {case.name}")
@@ -211,7 +203,7 @@ def _own(case: Case, peer: Peer, ours: Reference) -> tuple[Reference, Record]:
     position = CubicHermiteSpline(t, finest.position, velocity)
 
     def at(times: np.ndarray) -> Samples:
-        # within a microsecond of contact a velocity is straight to some micrometres per second
+        # within a microsecond of contact a velocity is linear to some micrometres per second
         return Samples(times, position(times), np.stack([np.interp(times, t, v) for v in velocity.T], axis=1))
 
     samples = at(ours.samples.time)
@@ -234,7 +226,7 @@ def _numbers(error: Error) -> dict[str, float]:
 
 
 def front(runs: Sequence[tuple[float, ...]]) -> list[int]:
-    """Which runs count, of their times and errors: no other is no worse in each error in clearly less time."""
+    """Return the indices of the runs, given by time and errors, that no clearly faster run equals in every error."""
     return [
         k
         for k, (mine, *wrong) in enumerate(runs)
@@ -243,15 +235,17 @@ def front(runs: Sequence[tuple[float, ...]]) -> list[int]:
 
 
 def _candidates(done: list[Run], level: float) -> list[Run]:
-    """The two fastest that reach a level, as times of one run are not sure; where none does, the longest: a bound."""
-    reaching = sorted((run for run in done if run.reaches(level)), key=lambda run: run.outcome.seconds)
+    """Return the two fastest runs that reach a level, since single times scatter; else the longest run, as a bound."""
+    reaching = sorted(
+        (run for run in done if run.error and _reaches(level, run.error)), key=lambda run: run.outcome.seconds
+    )
     return reaching[:2] or sorted(done, key=lambda run: -run.outcome.seconds)[:1]
 
 
 def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: list[Rung]) -> Record:
-    """One of their runs, and next to it, in turns, ours that is no worse and ours that reach some levels.
+    """Return one of their runs and, measured in turns with it, ours that is no worse and ours that reach some levels.
 
-    Times of ours: the whole run and, of those that reach levels, its parts.
+    Our times are those of the whole run and, for runs that reach levels, of its parts.
     """
     wrong = run.error
     assert wrong is not None
@@ -282,7 +276,7 @@ def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: 
 
 
 def _beyond(theirs: list[Error], error: Error) -> bool:
-    """Whether a run of ours is no worse than any of theirs, and right to all levels."""
+    """Return True when an error of ours is no larger than any of theirs, and within all levels."""
     return error.relative <= min(LEVELS) and all(error.within(their) for their in theirs)
 
 
@@ -295,7 +289,7 @@ def _name(rung: Rung) -> str:
 
 
 def show(records: list[Record]) -> str:
-    """Times needed for an accuracy, then every run of Exudyn that counts with ours next to it."""
+    """Return the times needed for an accuracy, then every run of Exudyn that counts with ours next to it."""
     runs, known = _runs(records), {r["case"]: r for r in records if "horizon" in r}
     heads = {case: known[case] for case in COMPARISONS if case in known}
     levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
@@ -308,8 +302,8 @@ def show(records: list[Record]) -> str:
         "our run",
         "our position [um]",
         "Exudyn / ours",
-        "the same recorded",
-        "its error",
+        "equal samples",
+        "error of these",
         "integration alone",
     )
     columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "ours", "ours, no worse [s]", "ratio")
@@ -330,7 +324,7 @@ def show(records: list[Record]) -> str:
 
 
 def _unlisted(runs: list[Record]) -> str:
-    """What became of settings that failed."""
+    """Return the settings that failed, by reason."""
     found: dict[str, list[str]] = {}
     for run in runs:
         if "failed" in run:
@@ -339,7 +333,7 @@ def _unlisted(runs: list[Record]) -> str:
 
 
 def _runs(records: list[Record]) -> dict[str, list[Record]]:
-    """Exudyn's runs by case."""
+    """Return Exudyn's runs by case."""
     found: dict[str, list[Record]] = {}
     for r in records:
         if r.get("by") == "exudyn":
@@ -348,14 +342,14 @@ def _runs(records: list[Record]) -> dict[str, list[Record]]:
 
 
 def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
-    """Their fastest run that reaches a level against ours; theirs may reach none, then its longest run is a bound."""
+    """Return their fastest run that reaches a level against ours; where none does, their longest run is a bound."""
     name = f"{case}: {100 * level:g} %"
     done = [r for r in runs if str(level) in r.get("ours", ())]
     reaching = [r for r in done if r["relative"] <= level]
     if not done:
         return [name, *[""] * 10]
     best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
-    mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
+    mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may miss the level
     seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
     theirs = [seconds, _called(best), short(best["position_um"])]
     alike, bare = (f"{mark}{best['s'] / ours[part]:.3g}" for part in ("alike_s", "bare_s"))
@@ -375,12 +369,12 @@ def _run_row(run: Record) -> list[str]:
 
 
 def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
-    """By scene of a cost study its runs as `flexclear cost --peer` draws them: seconds [s] and errors [SI] by step."""
+    """Return, by scene of a cost study, runs for `flexclear cost --peer`: seconds [s] and errors [SI] by step."""
     versions = {r["case"]: r["version"] for r in records if "version" in r}
     return {
-        asked.study: list(_tracks(runs, f"Exudyn {versions[case]}", asked.note))
+        comparison.study: list(_tracks(runs, f"Exudyn {versions[case]}", comparison.note))
         for case, runs in _runs(records).items()
-        if (asked := COMPARISONS[case]).study
+        if (comparison := COMPARISONS[case]).study
     }
 
 
@@ -400,7 +394,7 @@ def _tracks(runs: list[Record], program: str, note: str) -> Iterator[dict[str, A
 
 
 def files(records: list[Record]) -> Mapping[str, bytes]:
-    """The file of those points."""
+    """Return the JSON file of `points`, by path below docs/."""
     return {"accuracy/exudyn.json": f"{json.dumps(points(records), indent=1)}\n".encode()}
 
 
@@ -408,7 +402,7 @@ FAMILY = Family(
     what="whole runs against Exudyn at equal error",
     takes="12 min",
     page="benchmarks.md",
-    cases=lambda: [Case(name, asked) for name, asked in COMPARISONS.items()],
+    cases=lambda: [Case(name, comparison) for name, comparison in COMPARISONS.items()],
     measure=measure,
     show=show,
     files=files,

@@ -1,8 +1,8 @@
-"""A campaign of faults: damaged files, folders instead of files, killed commands and helpers, full disks.
+"""A campaign of faults: damaged files, folders instead of files, killed commands and child processes, full disks.
 
-A fault is *detected* when what was damaged counts as absent, or when a command ends with an exit code of its own and a
-sentence. It is *harmless* when nothing is lost. It is *used* when damaged content would be used, or a command ends with
-a traceback: there must be none. The project's own results stay untouched.
+A fault is *detected* when damaged content counts as absent, or when a command ends with an exit code of its own and a
+message. It is *harmless* when nothing is lost. It is *used* when damaged content would be used, or when a command ends
+with a traceback; neither may happen. The project's own results stay untouched.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from flexclear.pipeline.core.workflow.journal import Journal
 from flexclear.pipeline.dynamics.compile.files import CODE, compiled
 
 SCENE = "checks/pendulum"
-#: what is killed, and which fraction of all kills; a sweep of a scene that takes some seconds
+#: command -> its fraction of all kills, and its arguments; the sweep is of a scene that takes some seconds
 COMMANDS = {
     "run": (0.25, ["run", SCENE, "checks/spring_pendulum"]),
     "sweep": (0.15, ["sweep", "{folder}/sweep.toml", "--jobs", "2"]),
@@ -44,12 +44,12 @@ COMMANDS = {
     "sections": (0.1, ["sections", "checks/driven_pendulum"]),
     "plan": (0.1, ["plan", SCENE]),
 }
-#: commands that have helpers, of which one is killed in their stead, and how often in proportion to their own kills
+#: commands with child processes, of which one is killed instead, and number of these kills per kill of the command
 HELPED, PER_KILL = ("run", "sweep", "cost", "report"), 0.5
-#: while a helper takes less processor time than this within so many seconds it is idle [s]
+#: a child process is idle while it uses less than this processor time [s] within this time [s]
 IDLE, LOOK = 0.005, 0.1
-#: exit codes that a command may have which lost a helper: it did without, or says that its memory may be full
-SAID = (0, 4)
+#: exit codes of a command that lost a child process: it continues without, or reports that its memory may be full
+LOST_CHILD = (0, 4)
 SWEEP = """
 title = "Pendulums"
 scene = "checks/pendulum"
@@ -57,9 +57,9 @@ keep = ["bob.position.final"]
 [vary]
 "body.bob.mass" = { from = 1.0, to = 2.0, count = 400 }
 """
-#: a command is killed within this time [s], or that of the whole command
+#: a command is killed within this time [s], or within its own duration where that is shorter
 LATEST = 15.0
-#: file size limits, in place of full disks [B], and commands that run concurrently
+#: file size limits that represent full disks [B], and number of commands that run concurrently
 FULL, CONCURRENT = (0, 200, 2_000, 8_000, 20_000, 40_000, 80_000, 200_000), 8
 #: stages whose artifacts are computed, not measured
 COMPUTED = ("mesh", "modes", "bundle", "simulate", "post")
@@ -87,7 +87,7 @@ COLUMNS: Columns = {
 
 @dataclass(frozen=True)
 class Faults:
-    """How many faults of a kind. flips, cuts: of files; kills: of commands or helpers; seed: of what is chosen."""
+    """Numbers of faults of a kind.  flips, cuts: of files; kills: of commands or children; seed: of random choices."""
 
     seed: int
     flips: int = 0
@@ -96,7 +96,7 @@ class Faults:
 
 
 def cases(seed: int, flips: int, cuts: int, kills: int) -> list[Case]:
-    """All kinds of faults."""
+    """Return all kinds of faults as cases."""
     made = [Case(kind, Faults(seed, flips, cuts)) for kind in DAMAGED]
     made += [Case(kind, Faults(seed)) for kind in (FOLDERS, FILES, FULL_DISKS, AT_ONCE)]
     for verb, (fraction, _) in COMMANDS.items():
@@ -115,18 +115,18 @@ class Place:
     folder: Path
 
     def store(self, results: str = "results") -> Store:
-        """What commands left there."""
+        """Return the store of the results in a folder below this one."""
         return Store(self.folder / results)
 
     def start(self, words: Sequence[str], results: str = "results", **more: Any) -> subprocess.Popen[bytes]:
-        """A command on results in a folder below this one."""
+        """Start a command on results in a folder below this one."""
         here = {"FLEXCLEAR_RESULTS": str(self.folder / results), "FLEXCLEAR_KERNELS": str(self.folder / "kernels")}
         silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         command = [sys.executable, "-m", "flexclear", *(word.format(folder=self.folder) for word in words)]
         return subprocess.Popen(command, env={**os.environ, **here}, **{**silent, **more})
 
     def whole(self, words: Sequence[str], results: str) -> tuple[float, dict[tuple[str, str], str]]:
-        """How long a command takes on empty results that nobody disturbs [s], and what it makes."""
+        """Run a command undisturbed on empty results; return its duration [s] and the digests of its artifacts."""
         begun = time.monotonic()
         code = self.start(words, results).wait()
         assert code == 0, f"{words[0]} ends with {code}"
@@ -134,7 +134,7 @@ class Place:
 
 
 def measure(todo: Sequence[Case], jobs: int) -> Measured:
-    """A record for each kind of fault, in folders of its own."""
+    """Yield a record for each kind of fault, in a temporary folder."""
     with tempfile.TemporaryDirectory(prefix="faults_") as name:
         place = Place(Path(name))
         (place.folder / "sweep.toml").write_text(SWEEP, encoding="utf-8", newline="\n")
@@ -150,7 +150,7 @@ def _recorded(count: Counter[str]) -> Record:
 
 
 def _counted(case: Case, place: Place) -> Counter[str]:
-    """Bring about the faults of a case, and count what became of them."""
+    """Cause the faults of a case, and count their outcomes."""
     of, rng = case.of, random.Random(f"{case.of.seed} {case.name}")
     if case.name in DAMAGED:
         return _damage(rng, _damaged(place)[case.name], of.flips, of.cuts)
@@ -163,7 +163,7 @@ def _counted(case: Case, place: Place) -> Counter[str]:
 
 
 def _damaged(place: Place) -> dict[str, list[tuple[Path, Judge]]]:
-    """Each kind of file, and for each what says whether damage to it is detected."""
+    """Return the files of each kind, each with a function that returns whether damage to the file is detected."""
     store, folder = place.store(), place.folder
     records = sorted((store.root / "cache").glob("*/*.json"))
     kernels = sorted((folder / "kernels").glob("*/flexclear_*.py"))
@@ -181,7 +181,7 @@ def _damaged(place: Place) -> dict[str, list[tuple[Path, Judge]]]:
 
 
 def _damage(rng: random.Random, files: list[tuple[Path, Judge]], flips: int, cuts: int) -> Counter[str]:
-    """Flips and cuts in one kind of file, each file restored afterwards."""
+    """Count the outcomes of flips and cuts in one kind of file; each file is restored afterwards."""
     return Counter(_fault(rng, *rng.choice(files), flip=k < flips) for k in range(flips + cuts))
 
 
@@ -190,7 +190,7 @@ def _shown(store: Store) -> str:
 
 
 def _folders(place: Place) -> Counter[str]:
-    """A folder instead of each file of a run in turn: it is renamed, and the same result is shown."""
+    """Put a folder in place of each file of a run in turn: it must be renamed, and the result must be the same."""
     store, count = place.store(), Counter[str]()
     before = _artifacts(store)
     cached = [
@@ -209,7 +209,7 @@ def _folders(place: Place) -> Counter[str]:
 
 
 def _files(place: Place) -> Counter[str]:
-    """A file instead of each folder of a run in turn: it is renamed, or named in a sentence, and stays."""
+    """Put a file in place of each folder of a run in turn: it must be renamed, or named in a message, and survive."""
     store, count = place.store(), Counter[str]()
     before = _artifacts(store)
     for path in [
@@ -219,9 +219,9 @@ def _files(place: Place) -> Counter[str]:
         away = path.rename(place.folder / "away")
         path.write_text("stays", encoding="utf-8", newline="\n")
         process = place.start(["run", SCENE], stderr=subprocess.PIPE)
-        said = process.communicate()[1].decode(errors="replace")
+        output = process.communicate()[1].decode(errors="replace")
         left = [one for one in path.parent.glob(f"{path.name}*") if one.is_file()]
-        sound = process.returncode in (0, 2, 4) and "Traceback" not in said
+        sound = process.returncode in (0, 2, 4) and "Traceback" not in output
         count["detected" if sound and any(one.read_text(encoding="utf-8") == "stays" for one in left) else "used"] += 1
         if path.is_file():
             path.unlink()
@@ -234,7 +234,7 @@ def _files(place: Place) -> Counter[str]:
 
 
 def _unfinished(folder: Path) -> list[Path]:
-    """A piece of work as a journal leaves it."""
+    """Write a piece of unfinished work as a journal leaves it; return its files."""
     import numpy as np
 
     journal = Journal(folder / "parts", "key")
@@ -253,7 +253,7 @@ def _fault(rng: random.Random, path: Path, judge: Judge, *, flip: bool) -> str:
     flipped = whole[:offset] + bytes([whole[offset] ^ 1 << rng.randrange(8)]) + whole[offset + 1 :]
     path.chmod(0o644)
     path.write_bytes(flipped if flip else whole[:offset])
-    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))  # bit rot changes no time
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))  # bit rot does not change a file's times
     verdict = judge()
     path.write_bytes(whole)
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
@@ -266,7 +266,7 @@ def _artifact(store: Store, path: Path) -> Judge:
 
 
 def _same(read: Callable[[Path], object], path: Path) -> Judge:
-    """Compare what is read from a file with what was read from it before the damage."""
+    """Return a function that compares the content of a file with its content before the damage."""
     whole = read(path)
     return lambda: "detected" if (now := read(path)) is None else "harmless" if now == whole else "used"
 
@@ -279,10 +279,10 @@ def _kernel(path: Path) -> Judge:
 
 
 def _kills(place: Place, verb: str, rng: random.Random, count: int) -> Counter[str]:
-    """A command killed repeatedly on the same results.
+    """Kill a command repeatedly on the same results.
 
-    What it leaves is complete each time. The last command, which nobody kills, makes the same results as one without
-    kills, and cleans up.
+    Each killed command must leave complete files. A last command, which is not killed, must make the same results as
+    one without kills, and clean up.
     """
     words, counts, results = COMMANDS[verb][1], Counter[str](), f"killed_{verb}"
     (seconds, whole), store = place.whole(words, f"whole_{verb}"), place.store(results)
@@ -300,10 +300,10 @@ def _kills(place: Place, verb: str, rng: random.Random, count: int) -> Counter[s
 
 
 def _helpers(place: Place, verb: str, rng: random.Random, count: int, *, idle: bool = False) -> Counter[str]:
-    """One of the processes that a command has started is killed, as the system does where memory is full.
+    """Kill one of the child processes of a command, as the system does where memory is full.
 
-    idle: one that does nothing then, where there is one.  The command does without it, or ends with exit code 4 and a
-    sentence; the next one makes the same results.
+    idle: kill an idle child process, where one exists.  The command must continue without it, or end with exit code 4
+    and a message; the next command must make the same results.
     """
     words, counts, label = COMMANDS[verb][1], Counter[str](), f"{verb}_{'idle' if idle else 'helped'}"
     seconds, whole = place.whole(words, f"whole_{label}")
@@ -315,36 +315,36 @@ def _helpers(place: Place, verb: str, rng: random.Random, count: int, *, idle: b
             time.sleep(0.01)
         children = processes.children(process.pid)
         waiting = _idle(process.pid, children) if idle else children
-        if not waiting:  # nothing was brought about
+        if not waiting:  # no fault was caused
             process.communicate()
             continue
         with suppress(psutil.NoSuchProcess):
             rng.choice(waiting).kill()
-        said = process.communicate()[1].decode(errors="replace")
+        output = process.communicate()[1].decode(errors="replace")
         intact = not maintenance.inventory(store, whole=True).damaged
-        sound = process.returncode in SAID and "Traceback" not in said and intact
+        sound = process.returncode in LOST_CHILD and "Traceback" not in output and intact
         again = place.start(words, results).wait() == 0 and _artifacts(store) == whole
         if not (sound and again):
-            print(f"{verb}: {process.returncode}, then {again}: {said[-500:]}", file=sys.stderr)
+            print(f"{verb}: {process.returncode}, then {again}: {output[-500:]}", file=sys.stderr)
         counts["used" if not (sound and again) else "detected" if process.returncode else "harmless"] += 1
     return counts
 
 
 def _idle(parent: int, running: Sequence[psutil.Process]) -> list[psutil.Process]:
-    """Those of a process's children that take no processor time for a moment."""
+    """Return the children of a process that use no processor time for a moment."""
     before = {child: processes.seconds_of(child) for child in running}
     time.sleep(LOOK)
     return [p for p in processes.children(parent) if p in before and processes.seconds_of(p) - before[p] < IDLE]
 
 
 def _artifacts(store: Store) -> dict[tuple[str, str], str]:
-    """Digests of what is computed; measured times are others each time, and batches of a sweep are cut by the clock."""
+    """Return the digests of computed artifacts; measured times and the batches of a sweep differ from run to run."""
     records = (read_record(path) for path in (store.root / "cache").glob("*/*.json"))
     return {(r.stage, r.key): r.digest for r in records if r is not None and r.stage in COMPUTED}
 
 
 def _full(place: Place) -> Counter[str]:
-    """No file may be longer than so many bytes: the command says so with exit code 4, and no partial file remains."""
+    """Limit the size of files: the command must report this with exit code 4, and no partial file may remain."""
     counts = Counter[str]()
     for k, size in enumerate(FULL):
         code = place.start(["run", SCENE], f"full{k}", preexec_fn=processes.limit_files(size)).wait()
@@ -355,7 +355,7 @@ def _full(place: Place) -> Counter[str]:
 
 
 def _concurrent(place: Place) -> Counter[str]:
-    """Equal commands at once, on empty results: each ends well, and together they make one complete result."""
+    """Run equal commands at once on empty results: each must end well, and together they make one complete result."""
     codes = [process.wait() for process in [place.start(["run", SCENE], "together") for _ in range(CONCURRENT)]]
     store = place.store("together")
     sound = _artifacts(store) == _artifacts(place.store()) and not maintenance.inventory(store, whole=True).damaged

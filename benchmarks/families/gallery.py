@@ -1,4 +1,4 @@
-"""Mechanisms of many kinds, each with a question that a run of its scene answers, and a picture."""
+"""Gallery of mechanisms of many kinds, each with a question that a run of its scene answers, and a picture."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from flexclear.pipeline.post.single_run.series import derive
 from flexclear.stages import rendering
 
 PICTURES = DOCS / "gallery"
-#: of the pictures: pixels, how much finer they are drawn first, and colours, so that a page of them stays small
+#: pictures: size [pixels], factor of the size at which they are drawn first, and number of colours, for small files
 WIDTH, HEIGHT, FINER, COLOURS = 640, 480, 2, 256
 Bundles = Mapping[str, xr.Dataset]
 
@@ -31,9 +31,9 @@ Bundles = Mapping[str, xr.Dataset]
 class Entry:
     """A mechanism of the gallery.
 
-    answer: what a run, the reduced bodies and the scene say to the question, in words with numbers.
-    change: of the scene, so that the run is short.  linear: the answer is about vibrations, whose dataset it gets.
-    at: time of the picture as a share of the run.
+    answer: returns the answer to the question, in words with numbers, from a run and its scene.
+    change: edits of the scene that shorten the run.  linear: the answer reads the vibrations instead of a run.
+    moving: the vibrations are those of a steady motion.  at: time of the picture as a fraction of the run.
     """
 
     scene: str
@@ -50,12 +50,12 @@ class Entry:
         return self.scene.rpartition("/")[2]
 
 
-def _amplitude(values: xr.DataArray) -> float:
-    return 0.5 * float(values.max() - values.min())
+def _swing(angles: xr.DataArray) -> float:
+    return np.degrees(float(angles.max() - angles.min()))
 
 
 def _four_bar(run: xr.Dataset, scene: Scene) -> str:
-    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="D")))
+    swing = _swing(run["joint_position"].sel(coordinate="D"))
     torque = derive(run)["peak_drive_force"].sel(drive="motor")
     return f"The rocker swings by {swing:.1f}°; the motor needs up to {float(torque):.3g} N m."
 
@@ -73,8 +73,8 @@ def _scott_russell(run: xr.Dataset, scene: Scene) -> str:
     point = run["frame_position"].sel(frame="rod.point")
     way = float(abs(point.sel(axis="y")[-1] - point.sel(axis="y")[0]))
     off = float(abs(point.sel(axis="x")).max())
-    apart = "less than 1e-12" if off < 1e-12 else f"{off:.0e}"
-    return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {apart} m."
+    deviation = "less than 1e-12" if off < 1e-12 else f"{off:.0e}"
+    return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {deviation} m."
 
 
 def _shear_pin(run: xr.Dataset, scene: Scene) -> str:
@@ -90,12 +90,8 @@ def _stewart(run: xr.Dataset, scene: Scene) -> str:
     forces = derive(run)["peak_drive_force"]
     lengths = run["joint_position"].isel(coordinate=run["coordinate_joint"].str.startswith("leg").values)
     stroke = float((lengths.max("time") - lengths.min("time")).max())
-    hardest = float(forces.isel(drive=(run["drive_motion"] == "translation").values).sel(drive=_legs(forces)).max())
+    hardest = float(forces.isel(drive=forces["drive"].str.startswith("leg").values).max())
     return f"The legs need a stroke of {1e3 * stroke:.0f} mm and push with up to {hardest:.0f} N."
-
-
-def _legs(forces: xr.DataArray) -> list[str]:
-    return [name for name in forces["drive"].values.tolist() if name.startswith("leg")]
 
 
 def _robot_arm(run: xr.Dataset, scene: Scene) -> str:
@@ -187,13 +183,13 @@ def _bifilar(run: xr.Dataset, scene: Scene) -> str:
 
 
 def _six_bar(run: xr.Dataset, scene: Scene) -> str:
-    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="O3")))
+    swing = _swing(run["joint_position"].sel(coordinate="O3"))
     torque = derive(run)["peak_drive_force"].sel(drive="motor")
     return f"It swings by {swing:.1f}°, and the motor supplies up to {float(torque):.2g} N m."
 
 
 def _rssr(run: xr.Dataset, scene: Scene) -> str:
-    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="out")))
+    swing = _swing(run["joint_position"].sel(coordinate="out"))
     peak = float(derive(run)["peak_force"].sel(contact="B"))
     return f"It swings by {swing:.1f}°; the ball presses on its socket with up to {peak:.0f} N."
 
@@ -239,7 +235,7 @@ def _cam(run: xr.Dataset, scene: Scene) -> str:
 
 def _backlash(run: xr.Dataset, scene: Scene) -> str:
     late = run["joint_position"].isel(time=(run["time"] >= 1.0).values)
-    pinion, wheel = (np.degrees(2.0 * _amplitude(late.sel(coordinate=name))) for name in ("pinion", "wheel"))
+    pinion, wheel = (_swing(late.sel(coordinate=name)) for name in ("pinion", "wheel"))
     return f"The wheel swings by {wheel:.2f}°, {pinion / 3.0 - wheel:.2f}° less than the teeth's ratio gives."
 
 
@@ -295,30 +291,30 @@ ENTRIES = {
 
 
 def cases() -> list[Case]:
-    """A case for each entry."""
+    """Return a case for each entry."""
     return [Case(name) for name in ENTRIES]
 
 
 def scene_of(entry: Entry) -> Scene:
-    """Its scene, with its changes."""
+    """Return the scene of an entry, with its changes."""
     return load_scene(find_scene(entry.scene), entry.change)
 
 
 def solved(entry: Entry, scene: Scene, reduced: Bundles) -> xr.Dataset:
-    """What its answer is read from."""
+    """Return the dataset from which an entry's answer is read."""
     if entry.linear:
         return analyses.frequencies(scene, reduced, silent, moving=entry.moving)
     return dynamics.simulate(scene, reduced, silent)
 
 
 def measure(chosen: Sequence[Case], jobs: int) -> Measured:
-    """Question, answer, warm time of one run, and the picture, which is stored next to the page."""
+    """Yield question, answer and warm time of one run; store the picture next to the page."""
     PICTURES.mkdir(exist_ok=True)
     for case in chosen:
         entry = ENTRIES[case.name]
         scene = scene_of(entry)
         reduced = bundles(scene)
-        found = solved(entry, scene, reduced)  # once before, so that what is compiled is there
+        found = solved(entry, scene, reduced)  # a first run, which compiles
         begun = time.perf_counter()
         found = solved(entry, scene, reduced)
         seconds = time.perf_counter() - begun
@@ -348,7 +344,7 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
 
 
 def show(records: list[Record]) -> str:
-    """A paragraph and a picture for each."""
+    """Return a paragraph and a picture for each record."""
     parts = []
     for record in records:
         name = record["case"]

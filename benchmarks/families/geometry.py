@@ -1,12 +1,12 @@
-"""Which layouts of the mechanism have the sensitivities of the paper's Table 8, and what they predict besides.
+"""Layouts of the mechanism with the sensitivities of the paper's Table 8, and their other predictions.
 
-Runs with rigid rods over what the paper leaves open, and ensembles with flexible ones.
+Runs with rigid rods vary what the paper leaves open; ensembles have flexible rods.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import product
 from typing import Any
 
@@ -15,8 +15,8 @@ import xarray as xr
 
 from benchmarks import layouts
 from benchmarks.family import REFUSED, Case, Family, Record, each
-from benchmarks.layouts import DANGLE, DZ, Layout, Member, answer, deviation_row
-from benchmarks.page import Columns, table
+from benchmarks.layouts import DANGLE, DZ, Layout, answer, deviation_row
+from benchmarks.page import Columns, mean, table
 from flexclear.commands import scenes as stages
 from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
 from flexclear.papers.wang_wang_2019.models import JOINT, PLATFORM
@@ -27,47 +27,45 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
 from flexclear.stages.workplace import open_workplace
 
-#: layouts of the family whose runs are made: every so manieth of a coarser grid
+#: coarser grid [m], and stride at which layouts on this grid are simulated
 COARSE, SHOWN = 0.02, 5
 
 
 def members_rows() -> Iterator[Record]:
-    """The family on its grid: one record with its extent, and one for the layout that is taken."""
+    """Yield one record with the family's extent on its grid, and one for the chosen layout."""
     found = layouts.family()
-    record: Record = {"members": len(found), "on_the_plate": sum(layouts.on_the_plate(m.layout) for m in found)}
+    record: Record = {"members": len(found), "on_the_plate": sum(map(layouts.on_the_plate, found))}
     for name in ("ax", "ay", "bx", "by", "height", "leg"):
-        values = [getattr(m.layout, name) for m in found]
+        values = [getattr(layout, name) for layout in found]
         record |= {f"{name}_least": float(min(values)), f"{name}_most": float(max(values))}
     yield record
     yield _member(layouts.chosen(found))
 
 
 def velocity_rows() -> Iterator[Record]:
-    """Runs with clearance of some of the family, the other choices as in the scenes; and of the first layout."""
-    for member in sorted(layouts.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
-        yield _member(member) | rigid(member.layout, Open())
-    first = Member(layouts.FIRST, answer(layouts.FIRST))
-    yield _member(first) | rigid(first.layout, Open()) | {"first": True}
+    """Yield runs with clearance of some members and of the first layout; other choices are those of the scenes."""
+    for layout in layouts.by_condition(layouts.family(COARSE))[::SHOWN]:
+        yield _member(layout) | rigid(layout)
+    yield _member(layouts.FIRST) | rigid(layouts.FIRST) | {"first": True}
 
 
 def open_rows() -> Iterator[Record]:
-    """The layout that is taken, over what else the paper leaves open."""
-    layout = layouts.chosen(layouts.family()).layout
+    """Yield runs of the chosen layout over the other choices that the paper leaves open."""
+    layout = layouts.chosen(layouts.family())
     for restitution, gravity, start in product(RESTITUTION, (False, True), STARTS):
-        choice = Open(restitution, gravity, start)
         record = {"restitution": restitution, "gravity": gravity, "start": start}
-        yield record | rigid(layout, choice)
+        yield record | rigid(layout, restitution, start, gravity=gravity)
 
 
 def flexible_rows() -> Iterator[Record]:
-    """The layout that is taken, with a flexible rod and clearance."""
-    layout = layouts.chosen(layouts.family()).layout
+    """Yield ensembles of the chosen layout with a flexible rod and clearance."""
+    layout = layouts.chosen(layouts.family())
     for name in FLEXIBLE:
         yield {"set": name, "count": MEMBERS} | flexible(layout, name)
 
 
-def _member(member: Member) -> Record:
-    return asdict(member.layout) | {"leg": member.layout.leg} | asdict(member.answer)
+def _member(layout: Layout) -> Record:
+    return asdict(layout) | {"leg": layout.leg} | asdict(answer(layout))
 
 
 ROWS: dict[str, Callable[[], Iterator[Record]]] = {
@@ -79,7 +77,7 @@ ROWS: dict[str, Callable[[], Iterator[Record]]] = {
 
 
 def show(records: list[Record]) -> dict[str, str]:
-    """The parts of the page, of the groups of rows that are there."""
+    """Return the parts of the page for the groups of rows that exist."""
     rows = {name: of for name in TABLES if (of := [r for r in records if r["case"] == name])}
     return {name: TABLES[name](of) for name, of in rows.items()}
 
@@ -104,7 +102,7 @@ ERRORS: Columns = {
 
 
 def _members(rows: list[Record]) -> str:
-    """The closed form in numbers, the family's extent, the member that is taken."""
+    """Return the closed form in numbers, the family's extent and the chosen member."""
     (extent, taken), upright = rows, 1.0 / (4.0 * DZ)
     spans = "; ".join(
         f"{words} {1e3 * extent[f'{name}_least']:.0f} to {1e3 * extent[f'{name}_most']:.0f} mm"
@@ -116,7 +114,7 @@ def _members(rows: list[Record]) -> str:
         f"and height / leg = {upright:.4f}, legs {np.degrees(np.arccos(upright)):.1f} degrees from the "
         f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * layouts.STEP:g} mm are left: {spans}. "
         f"{extent['on_the_plate'] or 'None'} of them has all four joint centres over the plate, whatever way that is "
-        f"turned.\n\nTaken, as the least condition number over the stroke:\n\n"
+        f"turned.\n\nChosen: the layout with the least condition number over the stroke.\n\n"
         + table(
             [taken],
             {
@@ -124,14 +122,14 @@ def _members(rows: list[Record]) -> str:
                 "condition": lambda r: f"{r['condition']:.2f}",
                 "lift [mm]": _mm("lift"),
                 "tilt [deg]": lambda r: f"{np.degrees(r['tilt']):.2f}",
-                "legs apart by [mm]": _mm("room", 0),
+                "distance of legs [mm]": _mm("room", 0),
             },
         )
     )
 
 
 def _velocity(rows: list[Record]) -> str:
-    """Runs of members of the family, and how near they come to the velocity of Table 8."""
+    """Return the runs of the family's members, and how near their velocity comes to Table 8."""
     of = [r for r in rows if "first" not in r and "velocity" in r]
     found = [1e3 * r["velocity"] for r in of]
     columns: Columns = {
@@ -166,23 +164,19 @@ def _open(rows: list[Record]) -> str:
 
 
 def _flexible(rows: list[Record]) -> str:
-    """Ensembles next to Table 9."""
+    """Return the ensembles next to Table 9."""
     columns: Columns = {
         "mode set": lambda r: r["set"],
-        "angle [mrad]": _spread("angle", 1e3, 3),
+        "angle [mrad]": lambda r: mean(r, "angle", 1e3, 3),
         "angle, paper": lambda r: _printed(r, "angle", 1e3),
-        "z [mm]": _spread("displacement", 1e3, 4),
+        "z [mm]": lambda r: mean(r, "displacement", 1e3, 4),
         "z, paper": lambda r: _printed(r, "displacement", 1.0),
-        "v [mm/s]": _spread("velocity", 1e3, 1),
+        "v [mm/s]": lambda r: mean(r, "velocity", 1e3, 1),
         "v, paper": lambda r: _printed(r, "velocity", 1.0),
-        "peak force [N]": _spread("peak_force", 1.0, 0),
-        "acceleration [m/s²]": _spread("peak_acceleration", 1.0, 0),
+        "peak force [N]": lambda r: mean(r, "peak_force"),
+        "acceleration [m/s²]": lambda r: mean(r, "peak_acceleration"),
     }
     return table(rows, columns)
-
-
-def _spread(name: str, factor: float, digits: int) -> Callable[[Record], str]:
-    return lambda r: f"{factor * r[name]:.{digits}f} ± {factor * r[f'{name}_std']:.{digits}f}"
 
 
 def _printed(row: Record, name: str, factor: float) -> str:
@@ -195,42 +189,28 @@ TABLES = {"members": _members, "velocity": _velocity, "open": _open, "flexible":
 
 #: coefficients of restitution, none of which the paper prints
 RESTITUTION = (0.5, 0.7, 0.9)
-#: the ball starts in the middle of its socket, or so far off it [m]: nearly at rest at the bottom
+#: the ball starts in the centre of its socket, or off centre by this distance [m]: nearly at rest at the bottom
 STARTS = {"concentric": 0.0, "at the bottom": 0.45e-3}
 GRAVITY = {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}
-#: of each ensemble
+#: members of each ensemble
 MEMBERS = 4
 FLEXIBLE = {"free-free": "far_csj_free", "fixed-fixed": "far_csj_fixed", "Craig-Bampton": "far_csj_cb"}
 
 
-@dataclass(frozen=True)
-class Open:
-    """A choice of what the paper leaves open besides the layout."""
-
-    restitution: float = 0.9
-    gravity: bool = False
-    start: str = "concentric"
-
-    def edits(self) -> dict[str, Any]:
-        """As edits of a scene with clearance."""
-        found: dict[str, Any] = {"joint.A1.normal.restitution": self.restitution}
-        return found | ({"load": {"gravity": GRAVITY}} if self.gravity else {})
-
-
-def rigid(layout: Layout, choice: Open) -> Record:
-    """Largest deviations from the ideal mechanism, largest force and acceleration of a run with clearance."""
-    load = {"load": {"gravity": GRAVITY}} if choice.gravity else {}
+def rigid(layout: Layout, restitution: float = 0.9, start: str = "concentric", *, gravity: bool = False) -> Record:
+    """Return the largest deviations from the ideal mechanism, force and acceleration of a run with clearance."""
+    load: dict[str, Any] = {"load": {"gravity": GRAVITY}} if gravity else {}
+    changes = load | {"joint.A1.normal.restitution": restitution}
     try:
         ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout, load), {}, silent)
-        requested = layouts.scene("sps4/csj", layout, choice.edits(), aside=STARTS[choice.start])
-        run = dynamics.simulate(requested, {}, silent)
+        run = dynamics.simulate(layouts.scene("sps4/csj", layout, changes, aside=STARTS[start]), {}, silent)
     except SolverError as error:
         return {"verdict": REFUSED, "reason": str(error)}
     return deviation_row(max_deviation(run, ideal, PLATFORM)) | _peaks(run, ideal)
 
 
 def flexible(layout: Layout, name: str) -> Record:
-    """Means over an ensemble of each member's largest deviations from the ideal mechanism, and their spread."""
+    """Return means and standard deviations over an ensemble of each member's largest deviations from the ideal one."""
     requested = layouts.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
     ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout), {}, silent)
     members = analyses.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)

@@ -1,8 +1,8 @@
-"""What absent effects cost, and how the cost grows with the number of loops, modes, contacts, rods and outputs.
+"""Cost of absent effects, and growth of the cost with the numbers of loops, modes, contacts, rods and outputs.
 
-The N-four-bar: N + 1 upright rods on revolute joints, their tops joined by N rods. In space, planar loops with
-revolute joints alone are redundant; here the joining rods have a spherical joint at each end and may spin about their
-own axes, which leaves the planar motion as it is and every closure independent.
+The N-four-bar has N + 1 upright rods on revolute joints, whose tops are joined by N rods. In space, planar loops with
+revolute joints alone are redundant. Here the joining rods have a spherical joint at each end and may spin about their
+own axes, which leaves the planar motion unchanged and every closure independent.
 """
 
 from __future__ import annotations
@@ -26,32 +26,32 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 LOOPS = (5, 10, 20, 40, 80)
-#: of the flexible rod, of whose Craig-Bampton modes six are static; none cuts a pair of equal frequencies
+#: counts of Craig-Bampton modes (six are static) that cut no pair of equal frequencies, and the scene of the rod
 MODES, FLEXIBLE = (6, 13, 24, 48), "far_cb"
-#: of its run from which a state is taken [s]
+#: end of the run from which a state is taken [s]
 MOMENT = 1e-3
-#: joints of the scene with one contact that get its clearance, one after the other; rods that become flexible
+#: joints that get clearance, one after the other, in the scene with one contact; rods that become flexible
 LOOSE, CLEARANCE = ("A1", "A2", "A3", "A4", "C"), "csj"
 RODS = ("rod1", "rod2", "rod3", "rod4")
-#: outputs of a run, of which the least are its events' rows, too
+#: numbers of outputs of a run; a run also has rows of events
 OUTPUTS = (180, 1800, 18000)
-#: what the fullest scene loses, and the scene that never had it
+#: effects that the fullest scene loses -> the scene that never had them
 ABSENT = {"clearance and flexibility": "ideal", "flexibility": "csj", "clearance": "far_cb"}
 ROUNDS, RUNS = 25, 3
-#: from a rod's lower end to its centre of mass [m]
+#: distance from a rod's lower end to its centre of mass [m]
 HALF_ROD = 0.12
-#: evaluations of a round, for one loop or scene
+#: evaluations per round, for one loop or scene
 EVALUATIONS = 4000
 
 
 def cases() -> list[Case]:
-    """Absent effects, then numbers of loops, modes, contacts, flexible rods and outputs."""
+    """Return as cases the absent effects, then numbers of loops, modes, contacts, flexible rods and outputs."""
     grown = [Case(f"{n} {what}", n) for what, (numbers, _) in KINDS.items() for n in numbers]
     return [Case(effect) for effect in ABSENT] + grown
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each; numbers of one kind take turns."""
+    """Yield a record for each case; the numbers of one kind take turns."""
     for case in cases:
         if case.name in ABSENT:
             yield case, [_absent(case.name)]
@@ -74,7 +74,7 @@ def _absent(effect: str) -> Record:
 
 
 def stripped(full: Mechanism, effect: str) -> Mechanism:
-    """The fullest scene with a rigid rod in place of its flexible one, an ideal joint in place of the loose one."""
+    """Return the fullest scene without an effect: with a rigid rod, with an ideal joint, or with both."""
     scene = full.scene
     if "flexibility" in effect:
         scene = scene.model_copy(update={"body": scene.body | {"rod1": mechanism("csj").scene.body["rod1"]}})
@@ -82,7 +82,7 @@ def stripped(full: Mechanism, effect: str) -> Mechanism:
 
 
 def _grown(what: str, grown: Mapping[Case, Mechanism]) -> Measured:
-    """Evaluations in free flight by the kernels and, where there is such, by straight code; of outputs whole runs."""
+    """Yield times of evaluations in free flight by kernels and any specialised code; for outputs, of whole runs."""
     tasks, more = dict[str, Callable[[], float]](), dict[str, Record]()
     for case, here in grown.items():
         if what == "outputs":
@@ -92,7 +92,7 @@ def _grown(what: str, grown: Mapping[Case, Mechanism]) -> Measured:
             here.general_engine(), max(EVALUATIONS // (case.of if what == "loops" else 4), 10)
         )
         engine = here.engine() if what != "loops" else None
-        if engine is not None and engine.has_straight_code:
+        if engine is not None and engine.has_specialised_code:
             tasks[f"{case.name}, straight"] = _evaluation(engine, EVALUATIONS // 4)
         if engine is not None and what == "modes":
             arrays = engine.model.arrays
@@ -112,14 +112,14 @@ def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
 
 
 def with_outputs(count: int) -> Mechanism:
-    """The mechanism with clearance with so many outputs, and nothing else changed."""
+    """Return the mechanism with clearance and `count` outputs, otherwise unchanged."""
     full = mechanism(CLEARANCE)
     time = full.scene.time
     return full.with_scene(f"{count} outputs", edited(full.scene, {"output.interval": (time.end - time.start) / count}))
 
 
 def with_modes(count: int) -> Mechanism:
-    """The mechanism with so many modes of its flexible body, for a moment."""
+    """Return the mechanism with `count` modes of its flexible body, for a short run."""
     full = mechanism(FLEXIBLE)
     (body,) = full.scene.flexible()
     scene = edited(full.scene, {f"body.{body}.modes.count": count, "time.end": MOMENT})
@@ -127,7 +127,7 @@ def with_modes(count: int) -> Mechanism:
 
 
 def with_contacts(count: int) -> Mechanism:
-    """The mechanism with so many loose joints, for a moment."""
+    """Return the mechanism with `count` clearance joints, for a short run."""
     full = mechanism(CLEARANCE)
     loose = full.scene.joint[LOOSE[0]]
     more = {name: loose.model_copy(update={"between": full.scene.joint[name].between}) for name in LOOSE[1:count]}
@@ -136,7 +136,7 @@ def with_contacts(count: int) -> Mechanism:
 
 
 def with_flexible_rods(count: int) -> Mechanism:
-    """The mechanism with so many flexible rods, for a moment."""
+    """Return the mechanism with `count` flexible rods, for a short run."""
     full, rigid = mechanism(FLEXIBLE).scene, mechanism("ideal").scene.model_dump(mode="json")["body"]
     changes: dict[str, Any] = {"time.end": MOMENT}
     for name in RODS[1:count]:
@@ -150,11 +150,11 @@ def with_flexible_rods(count: int) -> Mechanism:
 
 
 def four_bars(loops: int, lean: float = 0.0) -> Scene:
-    """N-four-bar with rods of 1 m and 1 kg under gravity along -z, its motion in the plane of x and z.
+    """Return the N-four-bar with rods of 1 m and 1 kg under gravity along -z, its motion in the plane of x and z.
 
-    lean: angle about y by which the uprights have turned.
+    lean: angle about y by which the uprights have turned [rad].
 
-    Data: IFToMM benchmark problem A02 (links of 1 m and 1 kg, first top at 1 m/s); joints as said above.
+    Data: IFToMM benchmark problem A02 (links of 1 m and 1 kg, first top at 1 m/s); joints as in the module's text.
     """
     s, c = float(np.sin(lean)), float(np.cos(lean))
     upright, lying = {"z": [s, 0.0, c], "x": [c, 0.0, -s]}, {"z": [1.0, 0.0, 0.0], "x": [0.0, 0.0, -1.0]}
@@ -179,7 +179,7 @@ def four_bars(loops: int, lean: float = 0.0) -> Scene:
 
 
 def hinged(links: int) -> Scene:
-    """An open chain of rods of 1 m and 1 kg on hinges about y, along x at the start, under gravity along -z."""
+    """Return an open chain of rods of 1 m and 1 kg on hinges about y, along x at the start, under gravity along -z."""
     body: dict[str, Any] = {"ground": {"type": "ground", "frames": {"tip": {"axes": ACROSS}}}}
     joint: dict[str, Any] = {}
     for k in range(links):
@@ -188,7 +188,7 @@ def hinged(links: int) -> Scene:
     return _scene(f"{links} links", body, joint, 0.2, {"integrator": "dop853", "rtol": 1e-10})
 
 
-#: of hinges about the world's y
+#: axes of a frame whose hinge turns about the world's y
 ACROSS = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
 
 
@@ -200,8 +200,8 @@ def _rod(
     axes: dict[str, Any] | None = None,
     **moving: Any,
 ) -> dict[str, Any]:
-    """A rod of 1 kg and 1 m along one of its own axes; hinges: ends whose frames have the axes of one."""
-    # the small moment only keeps the spin about itself regular
+    """Return a rod of 1 kg and 1 m along one of its own axes; hinges: ends whose frames have a hinge's axes."""
+    # the small moment keeps the spin about the rod's own axis regular
     inertia = [1e-4 if axis == along else 1.0 / 12.0 for axis in "xyz"]
     frames = {
         end: {"position": [side if axis == along else 0.0 for axis in "xyz"]}
@@ -226,7 +226,7 @@ def _scene(title: str, body: dict[str, Any], joint: dict[str, Any], end: float, 
     )
 
 
-#: what there are numbers of: the numbers, and the mechanism with so many
+#: varied number -> its values, and the function that returns the mechanism with one of them
 KINDS: dict[str, tuple[Sequence[int], Callable[[int], Mechanism]]] = {
     "loops": (LOOPS, lambda n: Mechanism(f"{n} loops", four_bars(n), {})),
     "modes": (MODES, with_modes),
@@ -237,11 +237,11 @@ KINDS: dict[str, tuple[Sequence[int], Callable[[int], Mechanism]]] = {
 
 
 def show(records: list[Record]) -> str:
-    """All tables, with the exponents of the growth."""
+    """Return all tables, with the exponents of the growth."""
     absent: Columns = {
         "absent effect": lambda r: f"{r['case']}, against {r['scene']}",
         "removed [us]": lambda r: f"{r['stripped_us']:.2f}",
-        "never there [us]": lambda r: f"{r['without_us']:.2f}",
+        "never present [us]": lambda r: f"{r['without_us']:.2f}",
         "ratio": lambda r: f"{r['ratio']:.3f}",
         "spread": lambda r: percent(r["spread"]),
         "same compiled code": lambda r: "yes" if r["same_code"] else "no",
@@ -257,7 +257,7 @@ def show(records: list[Record]) -> str:
 
 
 def _columns(records: list[Record], what: str) -> Columns:
-    """What the table over numbers of a kind has; exponents are those from each record to the next."""
+    """Return the columns over numbers of a kind; exponents are those from each record to the next."""
 
     def exponent(of: Callable[[Record], Any]) -> Callable[[Record], str]:
         def to_here(r: Record) -> str:
@@ -284,8 +284,8 @@ def _columns(records: list[Record], what: str) -> Columns:
     return columns | {
         "kernels [us]": lambda r: spread(r, "us", 2),
         "exponent": exponent(lambda r: r["us"]),
-        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
-        "its exponent": exponent(lambda r: r.get("straight", {}).get("us")),
+        "specialised [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "exponent ": exponent(lambda r: r.get("straight", {}).get("us")),
     }
 
 

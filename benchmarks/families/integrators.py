@@ -1,6 +1,6 @@
-"""What each integrator costs and leaves on the mechanism with clearance, against DOP853 at 1e-13.
+"""Cost and errors of each integrator on the mechanism with clearance, against DOP853 at a tolerance of 1e-13.
 
-Errors are those of the largest force of every impact, because the paper prints it, and of the platform's velocity.
+Errors are those of the largest force of every impact, which the paper prints, and of the platform's velocity.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from flexclear.pipeline.core.system.progress import silent
 SCENE = "sps4/csj"
 RTOLS = (1e-6, 1e-8, 1e-10, 1e-12)
 REFERENCE: dict[str, Any] = {"integrator": "dop853", "rtol": 1e-13}
-#: times at which velocities are compared are multiples of this [s]
+#: velocities are compared at multiples of this time [s]
 GRID = 1e-3
 
 
 def cases() -> list[Case]:
-    """Solver tables: chosen steps of every integrator that has them, then fixed ones."""
+    """Return solver tables as cases: adaptive steps of every integrator that has them, then fixed steps."""
     found: list[dict[str, Any]] = []
     for integrator, traits in INTEGRATORS.items():
-        # at the tightest one a method of order 2 takes millions of steps
+        # at the tightest tolerance a method of order 2 takes millions of steps
         rtols = RTOLS[: None if traits.order > 2 else -1] if traits.estimates else ()
         found += [{"integrator": integrator, "rtol": rtol} for rtol in rtols]
     for integrator, traits in INTEGRATORS.items():
@@ -42,12 +42,12 @@ def cases() -> list[Case]:
 
 
 def steps(solver: dict[str, Any]) -> str:
-    """How the steps of a solver table are chosen, in words."""
+    """Return in words how the steps of a solver table are chosen."""
     return f"rtol {solver['rtol']:.0e}" if "rtol" in solver else f"step {solver['step']:.0e} s, {solver['events']}"
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each solver table: cost, impacts, errors."""
+    """Yield a record for each solver table: cost, impacts, errors."""
     known = _run(REFERENCE)
     for case in cases:
         try:
@@ -58,13 +58,13 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _run(solver: dict[str, Any]) -> xr.Dataset:
-    """One run; how far its ledger is off is one of the things to see, so that it is not refused."""
+    """Return one run; the loose ledger tolerance keeps inaccurate runs from being refused."""
     scene = load_scene(find_scene(SCENE), {"solver": {**solver, "ledger_tolerance": 1.0}})
     return dynamics.simulate(scene, {}, silent)
 
 
 def _errors(run: xr.Dataset, known: xr.Dataset) -> Record:
-    """Force: largest error of an impact's, as a share of the largest; none where there are other impacts."""
+    """Return cost and errors of a run; the force error is a fraction of the largest, None for other impacts."""
     times = np.round(np.arange(0.0, run.time.values[-1], GRID), 9)
     velocity = [d.sel(body="platform").sel(time=times, method="nearest").velocity.values for d in (run, known)]
     forces = [_forces(d) for d in (run, known)]
@@ -78,7 +78,7 @@ def _errors(run: xr.Dataset, known: xr.Dataset) -> Record:
 
 
 def _forces(run: xr.Dataset) -> np.ndarray:
-    """Largest force [N] of every impact."""
+    """Return the largest force [N] of every impact."""
     hard = (run.event_kind.values == "closing") & (run.event_approach_speed.values > IMPACT)
     return run.event_peak_force.values[hard]
 

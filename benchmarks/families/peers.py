@@ -1,7 +1,7 @@
 """One evaluation against Pinocchio's `constraintDynamics` and MuJoCo's `mj_forward`, on the same rigid loops.
 
-The N-four-bar of `growth`, leaning, in the same state in all three; the uprights' accelerations are compared.  And
-against Pinocchio's `aba` on open chains of hinged links, from 5 to 300.
+The model is the leaning N-four-bar of `growth`, in the same state in all three programs; the uprights' accelerations
+are compared. Open chains of 5 to 300 hinged links are compared with Pinocchio's `aba`.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 LOOPS = (5, 20)
 LINKS = (5, 10, 20, 40, 80, 150, 300)
-#: evaluations of a round, for one loop
+#: evaluations per round for one loop, and rounds
 EVALUATIONS, ROUNDS = 10_000, 15
 
 
 def cases() -> list[Case]:
-    """Each number of loops against each program, and each number of links of an open chain."""
+    """Return as cases each number of loops with each program, and each number of links of an open chain."""
     closed = [Case(f"{name}, {loops} loops", (name, loops)) for loops in LOOPS for name in PEERS]
     return closed + [Case(f"{name}, {links} links", (name, links)) for links in LINKS for name in CHAINS]
 
 
 def _of_chain(name: str, links: int) -> Record:
-    """Evaluations of an open chain, by the kernels and, where there is such, by straight code; and those of its run."""
+    """Return the times of an evaluation of an open chain, and the number of evaluations of its run."""
     peer, mine = CHAINS[name](links), Mechanism(name, hinged(links), {})
     engine, straight = mine.general_engine(), mine.engine()
     start, order = consistent_start(engine), [hinge.start for hinge in engine.model.numbering.coordinates[1:]]
@@ -62,9 +62,9 @@ def _of_chain(name: str, links: int) -> Record:
 
 
 def _times(peer: Peer, engine: Engine, straight: Engine, state: State, repeat: int) -> Record:
-    """Times of one evaluation by the peer, by the kernels and, where there is such, by straight code; their ratios."""
+    """Return the times of one evaluation by peer, kernels and, where it exists, specialised code, with their ratios."""
     tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
-    if straight.has_straight_code:
+    if straight.has_specialised_code:
         tasks["straight"] = partial(evaluation_time, straight, state, repeat)
     times = interleaved(tasks, ROUNDS)
     return {
@@ -82,18 +82,18 @@ def _record(name: str, loops: int) -> Record:
     uprights = [numbering.coordinates[i][0] for i, link in enumerate(links) if i and link.kind == "revolute"]
     ours = np.sort(closure_rows.evaluate(engine, state.y, state.t)[engine.model.speeds][uprights])
     times = _times(peer, engine, mine.engine(), state, max(EVALUATIONS // loops, 10))
-    apart = np.abs(np.sort(peer.hinges()) - ours).max() / np.abs(ours).max()
+    difference = np.abs(np.sort(peer.hinges()) - ours).max() / np.abs(ours).max()
     return {
         "by": name,
         "loops": loops,
-        "apart": float(apart),
+        "apart": float(difference),
         "versions": {package: version(package) for package in ("pin", "mujoco")},
         **times,
     }
 
 
 def show(records: list[Record]) -> str:
-    """The table of closed loops with the programs' versions, and that of open chains with the growth."""
+    """Return the table of closed loops with the programs' versions, and that of open chains with the growth."""
     parts = []
     if loops := [r for r in records if "loops" in r]:
         versions = loops[-1]["versions"]
@@ -107,15 +107,15 @@ def show(records: list[Record]) -> str:
 
 
 def _columns(what: str) -> Columns:
-    """Of the table over numbers of loops or of links; of links with the way of the kernels and what a run takes."""
+    """Return the columns over numbers of loops or links; links add the kernels' method and a run's evaluations."""
     chains = what == "links"
-    way: Columns = {"by": lambda r: r["way"]} if chains else {}
-    cost: Columns = {"evaluations of 0.2 s": lambda r: str(r["evaluations"])} if chains else {}
+    way: Columns = {"method": lambda r: r["way"]} if chains else {}
+    cost: Columns = {"evaluations in 0.2 s": lambda r: str(r["evaluations"])} if chains else {}
     return {
         "program": lambda r: r["by"],
         what: lambda r: str(r[what]),
         "theirs [us]": lambda r: spread(r["theirs"], "us", 1),
-        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "specialised [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
         "ratio": lambda r: f"{r['straight_ratio']:.1f}" if "straight" in r else "",
         "kernels [us]": lambda r: spread(r["ours"], "us", 2),
         "ratio ": lambda r: f"{r['ratio']:.1f}",
@@ -131,7 +131,7 @@ THIN = np.diag([1.0 / 12.0, 1.0 / 12.0, 1e-4])
 R_BAR = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 #: angle and angular velocity of the uprights, about y [rad, rad/s]
 LEAN, SPEED, GRAVITY = 0.5, 1.0, -9.81
-#: rotation of a joining rod against its upright, quaternion (w, x, y, z), and its rate, in its own axes
+#: rotation of a joining rod relative to its upright, quaternion (w, x, y, z), and its rate, in its own axes
 TURN = np.array([np.cos(0.5 * LEAN), *(-np.sin(0.5 * LEAN) * R_BAR[1])])
 TURN_RATE = -SPEED * R_BAR[1]
 
@@ -140,14 +140,14 @@ TURN_RATE = -SPEED * R_BAR[1]
 class Peer:
     """Another program's model in the same state.
 
-    evaluate: one evaluation.  hinges: angular accelerations of the uprights after one [rad/s^2].
+    evaluate: makes one evaluation.  hinges: returns the angular accelerations of the uprights [rad/s^2].
     """
 
     evaluate: Callable[[], object]
     hinges: Callable[[], np.ndarray]
 
     def time(self, repeat: int) -> float:
-        """Processor time of an evaluation [s], a call from Python each."""
+        """Return the processor time of an evaluation [s]; each evaluation is a call from Python."""
         evaluate = self.evaluate
 
         def calls() -> None:
@@ -158,7 +158,7 @@ class Peer:
 
 
 def pinocchio(loops: int) -> Peer:
-    """`constraintDynamics` with a point constraint for each loop; joints are added depth-first, as it needs them."""
+    """Return a model for `constraintDynamics`, with joints added depth-first and a point constraint for each loop."""
     import pinocchio as pin
 
     model = pin.Model()
@@ -195,7 +195,7 @@ def pinocchio(loops: int) -> Peer:
 
 
 def mujoco(loops: int) -> Peer:
-    """`mj_forward` with a `connect` constraint for each loop, which MuJoCo keeps softly; no contacts, one thread."""
+    """Return a model for `mj_forward` with a soft `connect` constraint for each loop; no contacts, one thread."""
     import mujoco as mj
 
     inertia = " ".join(str(entry) for entry in np.diag(THIN))
@@ -226,7 +226,7 @@ def mujoco(loops: int) -> Peer:
 
 
 def pinocchio_chain(links: int) -> Peer:
-    """`aba` of an open chain of hinged links (`families.growth.hinged`), bent and moving."""
+    """Return a model for `aba`: an open chain of hinged links (`families.growth.hinged`), bent and moving."""
     import pinocchio as pin
 
     model = pin.Model()
@@ -246,12 +246,12 @@ def pinocchio_chain(links: int) -> Peer:
 
 
 def bent(links: int) -> tuple[np.ndarray, np.ndarray]:
-    """Angles and rates of the hinges of a chain in its state [rad, rad/s]."""
+    """Return angles and rates of the hinges of a chain in its state [rad, rad/s]."""
     number = np.arange(links)
     return 0.3 * np.sin(number), 0.5 * np.cos(number)
 
 
-#: of open chains, by name
+#: programs for open chains, by name; then those for loops
 CHAINS: dict[str, Callable[[int], Peer]] = {"Pinocchio, aba": pinocchio_chain}
 PEERS: dict[str, Callable[[int], Peer]] = {
     "Pinocchio, constraintDynamics": pinocchio,

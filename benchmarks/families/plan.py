@@ -1,8 +1,8 @@
-"""Plans of a family of scenes: does the planned run meet the accuracy, what does it save, what does it cost?
+"""Plans for random scenes: does the planned run meet the accuracy, what does it save, what does planning cost?
 
-The full scene, the planned one and the planning are timed alike: processor time of setting up, integrating and
-observing, code and reduced bodies being there. The true error is the difference of the planned run from the full one,
-over members that start a hair apart; what the members' spread explains is given next to it.
+The full scene, the planned scene and the planning are timed alike: processor time of setting up, integrating and
+observing, with compiled code and reduced bodies at hand. The true error is the difference of the planned run from the
+full one over slightly perturbed members; the part that the members' spread explains is given next to it.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ from flexclear.pipeline.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UN
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.workplace import check, open_workplace
 
-#: the first of consecutive seeds that were never looked at before, how many, and scenes of each
+#: first of consecutive seeds that were never looked at before, number of seeds, and scenes of each
 SEED, SEEDS, SCENES = 5301, 3, 8
-#: processor time of runs over members that decide whether a plan is within what is requested [s]
+#: processor time of the ensemble runs that decide whether a plan meets the requested accuracy [s]
 DECIDING = 240.0
-#: a miss by more than this is wrong, and so much may planning cost: of the full run, or a second
+#: a miss by more than this factor is wrong; planning may take this fraction of the full run, or this many seconds
 WORST, FRACTION, SECOND = 3.0, 0.2, 1.0
-#: how a record says that the plan is the scene as it is
+#: `solver` in the record of a plan that is the unchanged scene
 AS_IT_IS = "as the scene"
-#: what a run is warmed up over, as a share of its time
+#: duration of the warm-up as a fraction of the run
 WARM = 0.002
-#: processor times of full runs between which savings are divided [s]
+#: limits of the classes of full runs by processor time [s] in the table of savings
 SIZES = (0.0, 0.3, 1.0, 3.0, np.inf)
 
 
 def cases(seed: int = SEED, seeds: int = SEEDS, scenes: int = SCENES) -> list[Case]:
-    """Scenes of consecutive seeds by number."""
+    """Return scenes of consecutive seeds as cases, ordered by the number of the scene."""
     return [Case(f"seed {s} scene {k}", (s, k)) for k in range(scenes) for s in range(seed, seed + seeds)]
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """One scene after the other, since their times are the subject."""
+    """Measure one scene after the other, since their times are the subject."""
     with tempfile.TemporaryDirectory() as folder:
         for case in cases:
             seed, number = case.of
@@ -66,12 +66,12 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
     place = open_workplace()
     try:
         task = effect_plan.task(scene)
-        outcome = place.bring(list(task.inputs.values()), 1)
-        check(outcome)
-        inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
+        done = place.bring(list(task.inputs.values()), 1)
+        check(done)
+        inputs = {name: place.store.load(done.records[below]) for name, below in task.inputs.items()}
         params = {**task.params, **task.context}
         decided, planning = _planned(params, inputs)
-        if planning > SECOND:  # that may have fetched code
+        if planning > SECOND:  # the first call may have loaded compiled code
             decided, planning = _planned(params, inputs)
     except FlexclearError as error:
         return {**drawing, "verdict": REFUSED, "reason": str(error)}
@@ -96,14 +96,14 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
     pair = ((full, inputs), (planned, fewer))
     found, members = until_decided(compared, MEMBERS if loose else (few,), affordable)
     worst = max(found, key=lambda one: (one.missed, (one.error + one.chance) / one.allowed))
-    said = verdict(worst)
-    if said == MET and any(verdict(one) == MET_TO_HORIZON for one in found):
-        said = MET_TO_HORIZON
+    outcome = verdict(worst)
+    if outcome == MET and any(verdict(one) == MET_TO_HORIZON for one in found):
+        outcome = MET_TO_HORIZON
     return {
         **drawing,
         "share": worst.error / worst.allowed,
         "chance": worst.chance / worst.allowed,
-        "judged": said,
+        "judged": outcome,
         "members": members,
         "horizon": min(one.horizon for one in found),
         "kept": [d.effect.name for d in decided.decisions if d.kept],
@@ -114,33 +114,33 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         "planned_s": planned_cpu,
         "plan_s": planning,
         "saving": full_cpu / planned_cpu,
-        "verdict": WRONG if said == MISSED and worst.error > WORST * worst.allowed else FINISHED,
-        **({} if said != MISSED else {"reason": f"misses what is wanted {worst.error / worst.allowed:.2g} times"}),
+        "verdict": WRONG if outcome == MISSED and worst.error > WORST * worst.allowed else FINISHED,
+        **({} if outcome != MISSED else {"reason": f"error is {worst.error / worst.allowed:.2g} times the accuracy"}),
     }
 
 
 def _requested(made: Drawn, full: Point, q: Quantity) -> float:
-    """The accuracy of a quantity [SI]; relative ones of its size in the full scene."""
-    asked = made.record["wanted"][q.name]
-    return float(asked["absolute"] if "absolute" in asked else asked["relative"] * effect_size.size(full, q))
+    """Return the requested accuracy of a quantity [SI]; a relative one refers to its size in the full scene."""
+    request = made.record["wanted"][q.name]
+    return float(request["absolute"] if "absolute" in request else request["relative"] * effect_size.size(full, q))
 
 
 def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float]:
-    """A plan, and the processor time that it took [s]."""
+    """Return a plan, and the processor time of planning [s]."""
     begun = time.process_time()
     found = effect_plan.decided(params, inputs, silent)
     return found, time.process_time() - begun
 
 
 def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
-    """Inputs with the bundles of fewer modes where the plan takes them."""
+    """Return the inputs with the bundles of fewer modes where the plan chooses these."""
     by_count = [level for level in effect_plan.fewer_modes(inputs) if modes and all(body in level for body in modes)]
     chosen = next((n for n in by_count if all(n[body].sizes["mode"] == count for body, count in modes.items())), {})
     return inputs | {f"bundle/{body}": chosen[body] for body in modes}
 
 
 def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any], members: int) -> tuple[Any, float]:
-    """What is watched of a scene, and the processor time of one run [s]."""
+    """Return the watched quantities of a scene, and the processor time of one run [s]."""
     plain = watched_quantities.plain(scene)
     rigid = {name: data for name, data in inputs.items() if name.removeprefix("rigid/") in plain.meshed()}
     filled = simulation.rebuild(simulation.params(plain), rigid)
@@ -155,22 +155,22 @@ def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any], members: int) 
 
 
 def show(records: list[Record]) -> dict[str, str]:
-    """The summary, and all that was missed or is not decided."""
+    """Return the summary, and the table of missed and undecided cases."""
     done = [r for r in records if "judged" in r]
     if not done:
         return {"summary": "Not measured.", "misses": ""}
-    said = {kind: sum(r["judged"] == kind for r in done) for kind in (MET, MET_TO_HORIZON, MISSED, UNDECIDED)}
-    within, decided = said[MET] + said[MET_TO_HORIZON], len(done) - said[UNDECIDED]
+    counts = {kind: sum(r["judged"] == kind for r in done) for kind in (MET, MET_TO_HORIZON, MISSED, UNDECIDED)}
+    within, decided = counts[MET] + counts[MET_TO_HORIZON], len(done) - counts[UNDECIDED]
     saved = [r["saving"] for r in done]
     same = sum(r["solver"] == AS_IT_IS for r in done)
     dearer = sum(r["saving"] < 1.0 and r["solver"] != AS_IT_IS for r in done)
     cheap = [r for r in done if r["plan_s"] <= max(SECOND, FRACTION * r["full_s"])]
     text = (
-        f"{len(done)} scenes: {said[MET]} met, {said[MET_TO_HORIZON]} met to the horizon, {said[MISSED]} missed, "
-        f"{said[UNDECIDED]} not decided. Of the {decided} decided ones {within} ({within / max(decided, 1):.0%}) are "
+        f"{len(done)} scenes: {counts[MET]} met, {counts[MET_TO_HORIZON]} met to the horizon, {counts[MISSED]} missed, "
+        f"{counts[UNDECIDED]} not decided. Of the {decided} decided ones {within} ({within / max(decided, 1):.0%}) are "
         f"within what is requested{_worst(done)}. Median saving {np.median(saved):.3g} times "
-        f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). Plans that are the "
-        f"scene as it is: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the "
+        f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). Plans that keep "
+        f"the scene: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the "
         f"full run or one second in {len(cheap)}, median {np.median([r['plan_s'] for r in done]):.2g} s."
     )
     by_mechanism: Columns = {
@@ -202,7 +202,7 @@ def show(records: list[Record]) -> dict[str, str]:
         "clearance [um]": lambda r: short(1e6 * r["clearance"]),
         "speed": lambda r: short(r["speed"]),
         "rod": lambda r: r["rod"],
-        "wanted": lambda r: ", ".join(f"{n} {_asked(of)}" for n, of in r["wanted"].items()),
+        "requested": lambda r: ", ".join(f"{n} {_asked(of)}" for n, of in r["wanted"].items()),
         "kept": lambda r: ", ".join(r["kept"]) or "nothing",
         "verdict": lambda r: r["judged"],
         "members": lambda r: str(r["members"]),
@@ -219,20 +219,20 @@ def show(records: list[Record]) -> dict[str, str]:
 
 
 def _worst(done: list[Record]) -> str:
-    """The worst miss, where there is one, in words."""
+    """Return the worst miss in words; empty without a miss."""
     missed = [r["share"] for r in done if r["judged"] == MISSED]
-    if None in missed:  # logs have no infinity
+    if None in missed:  # the log stores infinity as null
         return "; the worst miss is a planned run whose energy balance, for one of its members, is refused"
     return f"; the worst miss is {max(missed):.2g} times what is allowed" if missed else ""
 
 
 def _asked(of: dict[str, float]) -> str:
-    """An accuracy as a scene has it, absolute ones in SI."""
+    """Return an accuracy as a scene gives it, absolute ones in SI units."""
     return f"{of['absolute']:.2g}" if "absolute" in of else f"{100 * of['relative']:.2g} %"
 
 
 def _together(name: str, mine: list[Record]) -> Record:
-    """Scenes of one mechanism, or of one size, in one row."""
+    """Return one row that summarises the scenes of one mechanism, or of one size."""
     kept = [" ".join(r["kept"]) for r in mine]
     return {
         "mechanism": name,
@@ -250,7 +250,7 @@ def _together(name: str, mine: list[Record]) -> Record:
 
 
 FAMILY = Family(
-    what="plans: are planned runs within what is wanted, and what do they save",
+    what="plans: are planned runs within the requested accuracy, and what do they save",
     takes="20 min",
     page="plan.md",
     cases=cases,

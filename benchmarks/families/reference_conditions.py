@@ -1,4 +1,4 @@
-"""The verdict on reference conditions: which mode sets of rod 1 give the answers of the full rod, and at what cost."""
+"""Verdict on reference conditions: which mode sets of rod 1 give the results of the full rod, and at what cost."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.family import Family
 from benchmarks.family import Record as Row
-from benchmarks.page import Columns, png, table
+from benchmarks.page import Columns, mean, png, table
 from benchmarks.reference_conditions import claims, design, runs
 from benchmarks.reference_conditions.claims import Rows, at, far_error
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
@@ -18,21 +18,21 @@ from flexclear.papers.wang_wang_2019.models import FAR_CB, FAR_FIXED, FAR_FREE
 from flexclear.pipeline.post.plotting.style import plt
 from flexclear.pipeline.post.plotting.table import pipe_table
 
-#: a share of the compliance from which on a set counts as complete, and frequencies of the mechanism as right
+#: fraction of the compliance from which on a set is complete; error below which the mechanism's frequencies are right
 COMPLETE, RESOLVED = 0.99, 0.01
-SET: Columns = {"joint at": lambda r: f"{r['place_mm']} mm", "set": lambda r: _label(r)}
+SET: Columns = {"joint at": lambda r: f"{r['place_mm']} mm", "set": lambda r: design.label(r["condition"], r["count"])}
 COST: Columns = {"evaluations": lambda r: str(r["evaluations"]), "seconds": lambda r: f"{r['seconds']:.2f}"}
 
 
 def show(records: list[Row]) -> dict[str, str]:
-    """In short, the paper's statements, and the tables of each group of rows that is there."""
+    """Return the summary, the paper's statements, and the table of each group of rows that exists."""
     rows = {name: of for name in TABLES if (of := [r for r in records if r["case"] == name])}
     judged = {"claims": claims.judged(rows)} if "far" in rows and "clearance" in rows else {}
     return {"short": _short(rows)} | judged | {name: TABLES[name](rows) for name in rows}
 
 
 def _short(rows: dict[str, list[Row]]) -> str:
-    """Which conditions are right in each respect, with the least whole count from COUNT at every place."""
+    """Return which conditions are right in each respect, with the least whole count from COUNT on at every position."""
     lines = [f"With {COUNT} coordinates (or the next whole count), at all three places:\n"]
     if "statics" in rows:
         good = [c for c in CONDITIONS if _least(rows["statics"], c, COUNT) >= COMPLETE]
@@ -76,15 +76,12 @@ def _unsettled(rows: list[Row], place: int) -> float:
 
 
 def _enough(rows: list[Row]) -> int | None:
-    """The least count from which on Craig-Bampton has the peak force at every place."""
-    measured = {place: {r["count"] for r in rows if _is_craig_bampton(r, place)} for place in PLACES}
-    known = [n for n in (COUNT, *MOST_COMPLETE) if all(max(counts) >= n for counts in measured.values())]
+    """Return the least count from which on Craig-Bampton sets have the right peak force at every position, or None."""
+    sets = [r for r in rows if r["condition"] == "craig-bampton"]
+    most = min(max(r["count"] for r in sets if r["place_mm"] == place) for place in PLACES)
+    known = [n for n in (COUNT, *MOST_COMPLETE) if n <= most]
     good = [all(_peak_error(rows, p, "craig-bampton", n) < claims.AGREE for p in PLACES) for n in known]
     return next((n for k, n in enumerate(known) if all(good[k:])), None)
-
-
-def _is_craig_bampton(row: Row, place: int) -> bool:
-    return (row["condition"], row["place_mm"]) == ("craig-bampton", place)
 
 
 def _peaks(rows: list[Row], place: int) -> str:
@@ -94,7 +91,7 @@ def _peaks(rows: list[Row], place: int) -> str:
 
 
 def _statics(rows: dict[str, list[Row]]) -> str:
-    """Shares of the full rod's compliance, that compliance in the last line, and which sets are complete."""
+    """Return fractions of the full rod's compliance, that compliance in the last line, and the complete sets."""
     found, body = rows["statics"], []
     for condition in CONDITIONS:
         for n in (7, COUNT, max(COUNTS)):
@@ -118,7 +115,7 @@ def _nearest(rows: list[Row], place: int, condition: str, count: int) -> Row:
 
 
 def _least(rows: list[Row], condition: str, count: int) -> float:
-    """The least share of the compliance, over places and directions."""
+    """Return the least fraction of the compliance over positions and directions."""
     near = [_nearest(rows, place, condition, count) for place in PLACES]
     return min(r[d] for r in near for d in ("z", "x", "rz"))
 
@@ -128,7 +125,7 @@ def _share(value: float) -> str:
 
 
 def _frequencies(rows: dict[str, list[Row]]) -> str:
-    """Vibrations of the mechanism, and with which sets they are right."""
+    """Return the vibrations of the mechanism, and the sets with which they are right."""
     names = (FULL, *CONDITIONS)
     found = sorted(rows["frequencies"], key=lambda r: (r["place_mm"], names.index(r["condition"]), r["time"]))
     most = max(len(r["frequency"]) for r in found)
@@ -145,7 +142,7 @@ def _vibration(k: int) -> Callable[[Row], str]:
 
 
 def _frequency_error(rows: list[Row], condition: str) -> float:
-    """Largest error of the first three, as a share; a set that has fewer of them is wholly wrong."""
+    """Return the largest relative error of the first three frequencies; a set with fewer of them has error 1."""
     worst = 0.0
     for row in (r for r in rows if r["condition"] == condition):
         same = (row["place_mm"], FULL, row["time"])
@@ -156,7 +153,7 @@ def _frequency_error(rows: list[Row], condition: str) -> float:
 
 
 def _far(rows: dict[str, list[Row]]) -> str:
-    """Ideal joints: effects of the rod, errors, cost."""
+    """Return effects of the rod, errors and cost with ideal joints."""
     shown = [r for r in sorted(rows["far"], key=_order) if r["finer"] == 1 and r["condition"] != RIGID]
     columns: Columns = {
         "angle [rad]": lambda r: f"{r['angle']:.2e}",
@@ -170,22 +167,22 @@ def _far(rows: dict[str, list[Row]]) -> str:
 
 
 def _clearance(rows: dict[str, list[Row]]) -> str:
-    """Clearance: means and spreads over the members, and why the complete basis is not among the sets."""
+    """Return means and spreads over the members with clearance, and why no ensemble has the complete basis."""
     columns: Columns = {
         "members": lambda r: str(r["members"]),
-        "peak force [N]": lambda r: _spread(r, "peak_force", 1.0, 0),
-        "impacts": lambda r: _spread(r, "impacts", 1.0, 1),
-        "angle [mrad]": lambda r: _spread(r, "angle", 1e3, 3),
-        "z [mm]": lambda r: _spread(r, "displacement", 1e3, 4),
-        "v [mm/s]": lambda r: _spread(r, "velocity", 1e3, 2),
-        "acceleration [m/s²]": lambda r: _spread(r, "acceleration", 1.0, 0),
+        "peak force [N]": lambda r: mean(r, "peak_force"),
+        "impacts": lambda r: mean(r, "impacts", digits=1),
+        "angle [mrad]": lambda r: mean(r, "angle", 1e3, 3),
+        "z [mm]": lambda r: mean(r, "displacement", 1e3, 4),
+        "v [mm/s]": lambda r: mean(r, "velocity", 1e3, 2),
+        "acceleration [m/s²]": lambda r: mean(r, "acceleration"),
     }
     more = f"{' and '.join(map(str, MOST_COMPLETE))} coordinates next to {COUNT} show what more would change."
     return f"{_why_not_all(rows)}{more}\n\n{table(sorted(rows['clearance'], key=_order), {**SET, **columns, **COST})}"
 
 
 def _why_not_all(rows: dict[str, list[Row]]) -> str:
-    """Why no ensemble has the complete basis, with the numbers."""
+    """Return the reason, with numbers, why no ensemble has the complete basis."""
     if "statics" not in rows or "far" not in rows:
         return ""
     highest = 1e-3 * at(rows["statics"], 0, FULL)["highest"]
@@ -198,7 +195,7 @@ def _why_not_all(rows: dict[str, list[Row]]) -> str:
 
 
 def _mesh(rows: dict[str, list[Row]]) -> str:
-    """Frequencies of coarser meshes against the finest, and what the mesh changes in a run."""
+    """Return the frequencies of coarser meshes against the finest, and the effect of the mesh on a run."""
     *coarse, finest = rows["mesh"]
     n = len(finest["frequency"])
     columns = {"elements": lambda r: str(r["elements"]), **{f"{k + 1}": _finer(k, finest) for k in range(n)}}
@@ -224,27 +221,16 @@ def _is_mesh_study(row: Row) -> bool:
     return (row["place_mm"], row["condition"], row["count"]) == (next(iter(PLACES)), "craig-bampton", COUNT)
 
 
-def _label(row: Row) -> str:
-    """Name of a mode set."""
-    return row["condition"] if row["condition"] in (FULL, RIGID) else f"{row['condition']} {row['count']}"
-
-
 def _order(row: Row) -> tuple[int, int, int]:
     names = (RIGID, *CONDITIONS, FULL)
     return row["place_mm"], names.index(row["condition"]), row["count"]
 
 
-def _spread(row: Row, name: str, factor: float, digits: int) -> str:
-    mean = f"{factor * row[name]:.{digits}f}"
-    return mean if row["members"] == 1 else f"{mean} ± {factor * row[f'{name}_std']:.{digits}f}"
-
-
 def _or_none(names: list[str]) -> str:
-    """Names in a sentence."""
     return ", ".join(names) or "none"
 
 
-#: by group of rows
+#: group of rows -> function that returns its part of the page
 TABLES = {
     "statics": _statics,
     "frequencies": _frequencies,
@@ -255,17 +241,17 @@ TABLES = {
 }
 
 
-#: those of the paper's models where they have such modes, the others from the same palette
+#: colours of the paper's models where they have these modes, the others from the same palette
 COLORS = dict(
     zip(design.CONDITIONS, (FAR_FREE.color, FAR_FIXED.color, "#56B4E9", "#CC79A7", FAR_CB.color), strict=True)
 )
 MARKERS = dict(zip(design.CONDITIONS, "osDv^", strict=True))
-#: shares of error below this are drawn at it
+#: smaller relative errors are drawn at this value
 FLOOR = 1e-7
 
 
 def files(records: Sequence[Row]) -> dict[str, bytes]:
-    """Every figure whose rows are there, by path below docs/."""
+    """Return every figure whose rows exist, by path below docs/."""
     found = {}
     for name, (group, draw) in FIGURES.items():
         if rows := [r for r in records if r["case"] == group]:
@@ -361,9 +347,9 @@ def _draw_clearance(rows: list[Row]) -> Any:
 
 
 def _bars(ax: Any, x: list[float], rows: list[Row], condition: str) -> None:
-    mean, spread = ([r[name] for r in rows] for name in ("peak_force", "peak_force_std"))
+    peaks, spread = ([r[name] for r in rows] for name in ("peak_force", "peak_force_std"))
     style = {"color": COLORS[condition], "marker": MARKERS[condition], "linestyle": "none", "capsize": 3}
-    ax.errorbar(x, mean, yerr=spread, label=condition, **style)
+    ax.errorbar(x, peaks, yerr=spread, label=condition, **style)
 
 
 def _plain(ax: Any) -> None:
@@ -371,7 +357,7 @@ def _plain(ax: Any) -> None:
     ax.tick_params(labelsize=8)
 
 
-#: by name: the rows that a figure shows, and who draws it
+#: figure -> group of rows that it shows, and the function that draws it
 FIGURES: dict[str, tuple[str, Callable[[list[Row]], Any]]] = {
     "compliance": ("statics", _draw_compliance),
     "frequencies": ("frequencies", _draw_frequencies),

@@ -1,13 +1,12 @@
-"""Evaluations and whole runs of the paper's scenes: warm ones, and the first one with nothing compiled.
+"""Evaluations and whole runs of the paper's scenes: warm, and the first run with nothing compiled.
 
-Evaluations: against one LAPACK ``dgesv`` of the order of the maximal-coordinate system.
+Evaluations are compared with one LAPACK ``dgesv`` of the order of the maximal-coordinate system.
 
-Warm: the integration alone, and the simulate stage.  The first: as a command, from an empty folder of kernels to the
-dataset; meshes, modes, bundles and Python's bytecode, which installing makes, are made before. The same command with
-the kernels on disk is measured next to it: the difference is what compiling takes. So is that with all kernels but
-those of the scene's own wiring, as with the first mechanism of another shape. Two processes compile where there are two
-processors. Wall time means something on a machine without other work only; processor time is that of all processes
-together.
+Warm runs: the integration alone, and the simulate stage.  First runs: the command from an empty folder of kernels to
+the dataset; meshes, modes, bundles and Python's bytecode, which installing writes, exist before. The same command runs
+again with all kernels on disk: the difference is the time of compiling. A third run lacks only the kernels of the
+scene's own topology, as does the first mechanism with another topology. Two processes compile where two processors
+exist. Wall time is meaningful only on a machine without other work; processor time is the sum over all processes.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ ROUNDS = 5
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each scene; the scenes take turns, so that a slow minute of the machine slows all of them."""
+    """Yield a record for each scene; the scenes take turns, so that a slow minute of the machine slows all of them."""
     mechanisms = {case: mechanism(case.name) for case in cases}
     tasks: dict[str, Callable[[], float]] = {}
     evaluations: dict[str, int] = {}
@@ -75,13 +74,13 @@ def _stage(here: Mechanism) -> Callable[[], float]:
     return lambda: once(lambda: dynamics.simulated(here.scene, here.bundles, silent))
 
 
-#: the rest of the stage is the evaluation of every recorded row, and the dataset
+#: the stage also evaluates every recorded row and makes the dataset
 COLUMNS: Columns = {
     "scene": lambda r: r["case"],
     "integration [s]": lambda r: spread(r["integration"], "s", 4),
     "simulate stage [s]": lambda r: spread(r["stage"], "s", 3),
     "evaluations": lambda r: str(r["evaluations"]),
-    "us per evaluation, all in": lambda r: f"{r['us_per_evaluation']:.2f}",
+    "integration per evaluation [us]": lambda r: f"{r['us_per_evaluation']:.2f}",
 }
 
 
@@ -108,7 +107,7 @@ def _first_run(scene: str, folder: Path) -> Record:
     results, kernels = folder / "results", folder / "kernels"
 
     def run(kernels: Path) -> tuple[float, float]:
-        """Seconds of wall and processor time of the command; the run is not there before it."""
+        """Return wall and processor time of the command [s]; the dataset of an earlier run is deleted first."""
         shutil.rmtree(results / "cache" / "simulate", ignore_errors=True)
         command = [sys.executable, "-m", "flexclear", "run", scene, "-q", "--to", "simulate"]
         begun, environment = time.monotonic(), {**as_installed(folder), "FLEXCLEAR_KERNELS": str(kernels)}
@@ -138,8 +137,8 @@ COLD_COLUMNS: Columns = {
     "nothing compiled, wall [s]": lambda r: short(r["wall_s"]),
     "processor [s]": lambda r: short(r["processor_s"]),
     "kernels on disk, wall [s]": lambda r: short(r["warm_wall_s"]),
-    "its processor [s]": lambda r: short(r["warm_processor_s"]),
-    "another wiring, wall [s]": lambda r: short(r["another_wall_s"]),
+    "processor [s] ": lambda r: short(r["warm_processor_s"]),
+    "another topology, wall [s]": lambda r: short(r["another_wall_s"]),
     "code [kB]": lambda r: str(r["kilobytes"]),
 }
 
@@ -155,14 +154,14 @@ COLD = Family(
 )
 
 
-#: of a round, some milliseconds each: short against the drift of the machine, long against the clock
+#: counts per round, some milliseconds each: short against the machine's drift, long against the clock; and rounds
 EVALUATIONS, SOLUTIONS, TURNS = 2000, 30, 25
-#: rows of a joint in maximal coordinates; a fixed one joins two bodies to one link
+#: constraint rows of a joint in maximal coordinates; a fixed joint merges two bodies into one link
 JOINT_ROWS = {"spherical": 3, "revolute": 5, "prismatic": 5, "fixed": 0, "clearance-spherical": 0}
 
 
 def _evaluations(case: Case) -> list[Record]:
-    """Both in turns in one process, the ratio the median of the ratios of neighbours."""
+    """Return the times of both, in turns in one process; a ratio is the median of the ratios of neighbours."""
     here = mechanism(case.name)
     engines = {"": here.general_engine(), ", straight": here.engine()}
     unknowns, derivation = maximal_unknowns(here.scene, here.bundles)
@@ -178,15 +177,15 @@ def _evaluations(case: Case) -> list[Record]:
 
 
 def maximal_unknowns(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[int, str]:
-    """Order of the system in maximal coordinates, and where it comes from in words.
+    """Return the order of the system in maximal coordinates, and its derivation in words.
 
-    Its unknowns are the accelerations of every moving link (6 each, rigidly joined bodies being one, also where one of
-    them is flexible), those of the modes, and one multiplier for each row of every joint, drives included. Joints with
-    clearance are forces and have no rows.
+    The unknowns are the accelerations of every moving link (6 each; rigidly joined bodies are one link, also where one
+    of them is flexible), those of the modes, and one multiplier for each row of every joint, drives included. Joints
+    with clearance are forces and have no rows.
     """
     frames = frames_of(scene, bundles)
     groups, group_of = merge(scene, frames)
-    # rigid groups that a fixed joint ties to a flexible one move with its frame
+    # rigid groups that a fixed joint ties to a flexible one move with the frame of that body
     tied = [
         {group_of[frames[f].body] for f in joint.between} for joint in scene.joint.values() if joint.type == "fixed"
     ]
@@ -200,9 +199,9 @@ def maximal_unknowns(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[i
 
 
 def dgesv_time(order: int) -> float:
-    """Processor time of one solution of a dense system [s]; making its matrix is not counted.
+    """Return the processor time of one solution of a dense system [s], without making the matrix.
 
-    The matrix is a random one: to within 2 % its entries do not matter for the time.
+    The matrix is random: its entries change the time by less than 2 %.
     """
     random = np.random.default_rng(order)
     systems = [(random.normal(size=(order, order)).T, random.normal(size=order)) for _ in range(SOLUTIONS)]
@@ -215,7 +214,7 @@ def dgesv_time(order: int) -> float:
 
 
 def shown_evaluations(records: list[Record]) -> str:
-    """The table, and where the numbers of unknowns come from."""
+    """Return the table, and the derivation of the numbers of unknowns."""
     rows = []
     for r in records:
         cells = [r["case"], str(r["unknowns"]), spread(r["dgesv"], "us", 1)]

@@ -1,6 +1,6 @@
-"""A large solid from its recipe to its Craig-Bampton bundle on the disk, by the parts of the work.
+"""Cost of a large solid from its recipe to its Craig-Bampton bundle on the disk, by parts of the work.
 
-One thread, so that processor seconds are those of the work.
+The work uses one thread, so that processor seconds measure it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flexclear.stages.cost_point import peak_memory
 
 MATERIAL = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
 FRAMES = {name: {"on": {"region": region}, "tie": "mean"} for name, region in (("bottom", "start"), ("top", "end"))}
-#: the paper's rod with 100 083 displacements, and a compact block, whose factors are the largest for its 295 704
+#: the paper's rod with 100 083 displacements, and a compact block with 295 704 and the largest factors
 SHAPES: dict[str, dict[str, Any]] = {
     "rod": {
         "type": "cylinder",
@@ -32,7 +32,7 @@ SHAPES: dict[str, dict[str, Any]] = {
     "block": {"type": "block", "size": [0.2, 0.1, 0.1], "element": "hex8", "cells": [71, 36, 36]},
 }
 COUNT = 13
-#: parts of the work in their order, and what the stages say when each begins
+#: parts of the work in their order, and the text with which the stages report the beginning of each
 PARTS = {
     "mesh and assembly": "mesh",
     "static shapes": "static shapes",
@@ -45,22 +45,22 @@ PARTS = {
 
 
 class Parts:
-    """Processor seconds by part of the work; what a later part does again of an earlier one is its own."""
+    """Processor seconds by part of the work; earlier work that a part repeats counts for that part."""
 
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(PARTS, 0.0)
         self._now, self._since = 0, time.process_time()
 
     def __call__(self, fraction: float | None, text: str) -> None:
-        """Progress callback of the stages."""
+        """Receive the progress of the stages."""
         now = time.process_time()
         self.seconds[list(PARTS)[self._now]] += now - self._since
         self._since = now
-        self._now = max([self._now, *(k for k, said in enumerate(PARTS.values()) if said in text)])
+        self._now = max([self._now, *(k for k, words in enumerate(PARTS.values()) if words in text)])
 
 
 def _body(case: Case) -> list[Record]:
-    """Seconds by part, and the largest memory so far."""
+    """Return the seconds by part, and the peak memory so far."""
     shape, parts, begun = case.of, Parts(), time.process_time()
     recipe = {"interfaces": list(FRAMES), "shape": shape, "material": MATERIAL, "frames": FRAMES}
     mesh = kind.build(recipe, Path())
@@ -75,7 +75,7 @@ def _body(case: Case) -> list[Record]:
 
 
 def show(records: list[Record]) -> str:
-    """One column for each body."""
+    """Return a table with one column for each body."""
     rows = [["displacements", *(f"{r['displacements']:,}".replace(",", " ") for r in records)]]
     rows += [[part, *(f"{r['seconds'][part]:.0f}" for r in records)] for part in PARTS]
     rows.append(["together", *(f"{r['together']:.0f}" for r in records)])

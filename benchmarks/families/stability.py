@@ -1,4 +1,4 @@
-"""The stability atlas: hard cases of the clearance mechanism, and what became of each."""
+"""The stability atlas: hard cases of the clearance mechanism, and the outcome of each."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TEXT = """{seeds}Parameters and results of every case, to the last digit: [its l
   than {limit:g} counts as wrong); largest opening of a loop {closure:.1e} m (more than {open:g} counts as wrong).
 - {compared} finished runs were repeated at a hundred times tighter tolerance: up to the horizon the platform's
   velocity differs by at most {deviation:.1e} of its largest, median {median:.1e} (more than {far:g} counts as wrong).
-- Dearest case: {evaluations} evaluations, {seconds:.0f} s of processor time; all cases {minutes:.1f} minutes.
+- Most expensive case: {evaluations} evaluations, {seconds:.0f} s of processor time; all cases {minutes:.1f} minutes.
 - Methods: {methods}.
 
 {reasons}
@@ -33,7 +33,7 @@ TEXT = """{seeds}Parameters and results of every case, to the last digit: [its l
 
 
 def show(records: list[Record]) -> str:
-    """What finished, what was refused and why, and the worst of each sweep."""
+    """Return what finished, what was refused and why, and the worst of each sweep."""
     verdicts = Counter(r["verdict"] for r in records)
     done = [r for r in records if r["verdict"] == FINISHED]
     deviation = np.array([r["deviation"] for r in done if r["deviation"] is not None])
@@ -70,13 +70,13 @@ def _methods(done: Sequence[Record]) -> str:
 
 
 def _reasons(records: Sequence[Record]) -> str:
-    """What the cases said that did not finish, with their numbers."""
+    """Return the messages of the cases that did not finish, with their parameters."""
     lines = [
         f"- {r['verdict']} ({_place(r)}): {' '.join(r['reason'].split())}\n"
         for r in records
         if r["verdict"] != FINISHED
     ]
-    return f"What did not finish said:\n\n{''.join(lines)}" if lines else ""
+    return f"Messages of the cases that did not finish:\n\n{''.join(lines)}" if lines else ""
 
 
 def _place(record: Record) -> str:
@@ -126,7 +126,7 @@ SYMBOLS = {
 
 @dataclass(frozen=True)
 class Shade:
-    """What colours the random points: a number of a record, and the decades of its colour bar."""
+    """Colouring of the random points: a number of a record, and the decades of the colour bar."""
 
     label: str
     number: str
@@ -140,7 +140,7 @@ SHADES = (
 
 
 def files(records: Sequence[Record]) -> dict[str, bytes]:
-    """All figures, by path below docs/."""
+    """Return all figures, by path below docs/."""
     random = [r for r in records if r["sweep"] == "random"]
     with style():
         return {
@@ -152,7 +152,7 @@ def files(records: Sequence[Record]) -> dict[str, bytes]:
 
 
 def _axis(row: Record, name: str) -> float:
-    """Where a record lies on the axis of a parameter."""
+    """Return the position of a record on the axis of a parameter."""
     value = float(row["parameters"][name])
     return 1.0 - value if name == "nearness" else value
 
@@ -160,7 +160,7 @@ def _axis(row: Record, name: str) -> float:
 def _sweeps(
     rows: Sequence[Record], number: str, label: str, *, logarithmic: bool = True, limit: float | None = None
 ) -> bytes:
-    """A panel per parameter, all with one vertical axis."""
+    """Draw one panel per parameter, all with one vertical axis."""
     columns = 4
     lines = -(-len(RANGES) // columns)
     figure, axes = plt.subplots(lines, columns, figsize=(12.5, 2.5 * lines), sharey=True, squeeze=False)
@@ -204,7 +204,7 @@ def _panel(ax: Any, rows: Sequence[Record], sweep: str, number: str, floor: floa
 
 
 def _random(rows: Sequence[Record]) -> bytes:
-    """The random points in planes of two parameters each, coloured by their energy errors and by their cost."""
+    """Draw the random points in planes of two parameters each, coloured by energy error and by cost."""
     figure, axes = plt.subplots(2, len(PLANES), figsize=(12.5, 6.2))
     for line, shade in zip(axes, SHADES, strict=True):
         shown: Any = None
@@ -217,7 +217,7 @@ def _random(rows: Sequence[Record]) -> bytes:
 
 
 def _points(ax: Any, rows: Sequence[Record], x: str, y: str, shade: Shade) -> Any:
-    """One plane of the random points; returns what a colour bar needs."""
+    """Draw one plane of the random points; return the points, which a colour bar needs."""
     shown: Any = None
     for method, (symbol, _) in SYMBOLS.items():
         done = [row for row in rows if row["verdict"] == FINISHED and row["method"] == method]
@@ -240,7 +240,7 @@ def _points(ax: Any, rows: Sequence[Record], x: str, y: str, shade: Shade) -> An
 
 
 def _shaken(row: Record, name: str) -> float:
-    """Whole numbers spread a little, so that points do not hide each other; the same for the same case."""
+    """Spread whole numbers slightly, so that points do not hide each other; equal cases get equal offsets."""
     value = _axis(row, name)
     return value + 0.6 * (row["parameters"]["restitution"] - 0.5) if name == "joints" else value
 
@@ -256,7 +256,7 @@ def _name_axes(ax: Any, x: str, y: str) -> None:
 
 
 def _legend(figure: Any) -> None:
-    """Symbols of methods and verdicts."""
+    """Draw the symbols of methods and verdicts."""
     entries = [("o", SOFT, text) if s == "o" else (s, SOFT, text) for s, text in SYMBOLS.values()]
     entries += [(mark, color, verdict) for verdict, (mark, color) in MARKS.items()]
     handles = [

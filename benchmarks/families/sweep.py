@@ -1,4 +1,4 @@
-"""What a point of a sweep costs beyond its kernels, how workers share points, and what a worker keeps in memory."""
+"""Cost of a sweep's point beyond its kernels, speed-up by two workers, and memory of a worker."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import psutil
@@ -24,12 +25,12 @@ from flexclear.stages.simulation import params
 from flexclear.stages.sweeps.sweep_engine import Job, engine
 from flexclear.stages.sweeps.sweep_points import Family as Points
 
-#: points that are timed of each kind, after two that are not
+#: timed points of each kind; two earlier points are not timed
 POINTS = 24
 
 
 class Kind(NamedTuple):
-    """A scene, what is kept of it, the place that is varied and its range; words: for the page."""
+    """A scene, its recorded quantities, the varied key path and its range; words: description on the page."""
 
     scene: str
     words: str
@@ -55,9 +56,9 @@ KINDS = {
         "checks/pendulum", "length, final position", ("bob.position.final",), "body.bob.com.0", (-2.0, -1.0), {}
     ),
 }
-#: points of the sweep that one and two workers share, and how often
+#: points of the sweep that one and two workers compute, and number of repeats
 SHARED, TURNS = 80, 3
-#: numbers of points after which the memory of a worker is looked at
+#: numbers of points after which the memory of a worker is read
 LOOKS = (500, 5000)
 
 
@@ -67,7 +68,7 @@ def _measured(case: Case) -> list[Record]:
 
 
 def _point(kind: Kind) -> Record:
-    """Processor time of a point, and that of its kernels."""
+    """Return the processor times of a point and of its kernels."""
     run, values = _runner(kind), np.linspace(*kind.ends, POINTS + 2)
     every, kernels = [], []
     with _timed_kernels() as spent:
@@ -89,7 +90,7 @@ def _point(kind: Kind) -> Record:
 
 
 def _runner(kind: Kind) -> Callable[[float], None]:
-    """Runs a point as a worker does."""
+    """Return a function that runs a point as a worker does."""
     scene = with_numbers(load_scene(TREE / "flexclear" / "scenes" / f"{kind.scene}.toml"), kind.set)
     runner = Runner({}, [parse_recorded(name, scene.owners()) for name in kind.keep])
 
@@ -103,8 +104,8 @@ def _runner(kind: Kind) -> Callable[[float], None]:
 
 @contextmanager
 def _timed_kernels() -> Iterator[list[float]]:
-    """Adds up the processor time [s] of compiled functions that are called meanwhile."""
-    spent, plain = [0.0], {name: getattr(Engine, name) for name in ("evaluate", "advance", "observe")}
+    """Sum the processor time [s] of the compiled functions that are called inside this context."""
+    spent = [0.0]
 
     def timed(function: Callable[..., None]) -> Callable[..., None]:
         def call(*given: Any) -> None:
@@ -114,17 +115,13 @@ def _timed_kernels() -> Iterator[list[float]]:
 
         return call
 
-    for name, function in plain.items():
-        setattr(Engine, name, timed(function))
-    try:
+    kernels: dict[str, Any] = {name: timed(getattr(Engine, name)) for name in ("evaluate", "advance", "observe")}
+    with patch.multiple(Engine, **kernels):
         yield spent
-    finally:
-        for name, function in plain.items():
-            setattr(Engine, name, function)
 
 
 def _workers() -> Record:
-    """Rate of two workers over that of one, in turns; started and compiled beforehand."""
+    """Return the rate of two workers over that of one, measured in turns; both are started and compiled beforehand."""
     kind = KINDS["clearance, peak"]
     scene = load_scene(TREE / "flexclear" / "scenes" / f"{kind.scene}.toml")
     family = Points("family", params(scene), bundles(scene), kind.keep, 0, False)
@@ -143,7 +140,7 @@ def _workers() -> Record:
 
 
 def _memory() -> Record:
-    """Resident memory of a worker [MB] after some and after many points."""
+    """Return the resident memory of a worker [MB] after some and after many points."""
     run, found = _runner(KINDS["stroke, final"]), []
     ends = np.linspace(*KINDS["stroke, final"].ends, LOOKS[-1])
     for k, end in enumerate(ends, start=1):
@@ -154,7 +151,7 @@ def _memory() -> Record:
 
 
 def show(records: list[Record]) -> dict[str, str]:
-    """The table of points, and sentences about workers and memory."""
+    """Return the table of points, and sentences about workers and memory."""
     points = [record for record in records if "all_ms" in record]
     columns: dict[str, Callable[[Record], str]] = {
         "points": lambda r: f"`{r['scene']}`, {r['words']}",
@@ -162,19 +159,19 @@ def show(records: list[Record]) -> dict[str, str]:
         "kernels": lambda r: f"{r['kernels_ms']:.1f}",
         "the rest": lambda r: f"{r['rest_ms']:.1f} ± {percent(r['spread'])}",
     }
-    said = []
+    sentences = []
     for record in records:
         if "ratio" in record:
-            said.append(
-                f"Two workers do {record['points']} points with clearance {record['ratio']:.2f} times as fast as one, "
-                f"with {record['load']:.1f} processes of the whole machine wanting its cores meanwhile."
+            sentences.append(
+                f"Two workers compute {record['points']} points with clearance {record['ratio']:.2f} times as fast as "
+                f"one, at a load average of {record['load']:.1f} for the whole machine."
             )
         if "megabytes" in record:
             few, many = (
                 f"{value:.0f} MB after {n}" for value, n in zip(record["megabytes"], record["looks"], strict=True)
             )
-            said.append(f"A worker takes {few} points of the ideal mechanism, and {many}.")
-    return {"points": table(points, columns), "workers": "\n".join(said)}
+            sentences.append(f"A worker takes {few} points of the ideal mechanism, and {many}.")
+    return {"points": table(points, columns), "workers": "\n".join(sentences)}
 
 
 FAMILY = Family(

@@ -1,4 +1,4 @@
-"""One case: a run or an ensemble of a scene, reduced to what the verdict needs."""
+"""One case: a run or an ensemble of a scene, reduced to the data that the verdict needs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ JOINT, BODY = "A1", "platform"
 
 
 def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
-    """Motion of the platform and force of A1 at the regular times of one run, evaluations, processor time."""
+    """Return the platform's motion and the force of A1 at the regular times of one run, and the cost of the run."""
     scene, reduced = rebuild(params, inputs), bundles(inputs)
     found = analyses.cost(scene, reduced, progress)
     run = found.run
@@ -33,7 +33,7 @@ def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
 
 
 def members(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
-    """Members of an ensemble: motion of the platform, peak contact force, impacts; cost of one run."""
+    """Return the platform's motion, peak contact forces and impacts of ensemble members, and the cost of one run."""
     scene, reduced = rebuild(params, inputs), bundles(inputs)
     found = analyses.ensemble(scene, reduced, progress)
     names = ["position", "quaternion", "velocity", "peak_acceleration", "peak_force", "impact_count"]
@@ -41,5 +41,5 @@ def members(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
 
 def _costs(found: Cost) -> dict[str, float]:
-    """Evaluations of a run, and the median processor time of its integration [s]."""
+    """Return the evaluations of a run and the median processor time of its integration [s]."""
     return {"evaluations": int(found.run.attrs["evaluations"]), "seconds": float(np.median(found.integration))}

@@ -1,4 +1,4 @@
-"""The paper's statements about mode sets, each with a number, a threshold, and whether it holds at each place.
+"""The paper's statements about mode sets, each with a rule, a threshold and its outcome at each position.
 
 Source of the statements: Wang & Wang (2019), secs. 6 and 7, Tables 7 to 10.
 """
@@ -13,19 +13,19 @@ import numpy as np
 
 from benchmarks.families.geometry import JOINTS
 from benchmarks.family import Record as Row
-from benchmarks.page import Columns, table
+from benchmarks.page import Columns, mean, table
 from benchmarks.reference_conditions.design import FULL, PLACES, RIGID
 from flexclear.pipeline.post.plotting.table import pipe_table
 
-#: two answers agree, or one is right, when they differ by less than this share of the effect in question
+#: two results agree, or one is right, when they differ by less than this fraction of the effect in question
 AGREE = 0.1
-#: an effect is small next to another below this share of it
+#: an effect is small relative to another one below this fraction
 SMALL = 0.01
-#: two ensembles differ when their means do by more than this many times the larger of their standard deviations
+#: two ensembles differ when their means differ by more than this multiple of the larger standard deviation
 DIFFER = 2.0
-#: FAR costs as much as ideal up to this factor (the paper: 1.15 to 1.21), FAR-CSJ twice CSJ within this factor of two
+#: FAR costs as much as ideal up to this factor (the paper: 1.15 to 1.21), FAR-CSJ as twice CSJ likewise
 COST = 1.5
-#: shares below this are equal in words
+#: smaller fractions are printed as "under" this value
 SHOWN = 1e-4
 #: largest deviations from the ideal mechanism: of the platform's angle, height and velocity, of the force at A1
 EFFECTS = ("angle", "displacement", "velocity", "force")
@@ -33,7 +33,7 @@ EFFECTS = ("angle", "displacement", "velocity", "force")
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement. test: of the rows at one place, whether it holds and the numbers that say so, in words."""
+    """A statement of the paper.  test: returns, for the rows at one position, the outcome and its numbers in words."""
 
     paper: str
     rule: str
@@ -42,25 +42,25 @@ class Claim:
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of one place: ideal joints, clearance."""
+    """Rows of one position of the joint: with ideal joints, with clearance."""
 
     far: list[Row]
     clearance: list[Row]
 
     def free(self, group: str = "far") -> Row:
-        """Free-free set with the fewest coordinates, the paper's choice as far as it prints it."""
+        """Return the free-free set with the fewest coordinates, the paper's choice as far as it is printed."""
         return self._fewest(group, "free-free")
 
     def fixed(self, group: str = "far") -> Row:
-        """Fixed-fixed set likewise."""
+        """Return the fixed-fixed set with the fewest coordinates."""
         return self._fewest(group, "fixed-fixed")
 
     def named(self, group: str, condition: str) -> Row:
-        """The one row of a condition without a count."""
+        """Return the one row of a condition without a count."""
         return next(row for row in getattr(self, group) if row["condition"] == condition)
 
     def best(self) -> Row:
-        """The most complete Craig-Bampton set with clearance."""
+        """Return the most complete Craig-Bampton set with clearance."""
         return max((r for r in self.clearance if r["condition"] == "craig-bampton"), key=lambda r: r["count"])
 
     def _fewest(self, group: str, condition: str) -> Row:
@@ -68,23 +68,23 @@ class Rows:
 
 
 def at(rows: list[Row], place: int, condition: str, count: int = 0) -> Row:
-    """The row of a condition at a place with the least count that is not below `count`."""
+    """Return the row of a condition at a position with the least count that is not below `count`."""
     of = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition) and r.get("finer", 1) == 1]
     return min((r for r in of if r["count"] >= count), key=lambda r: r["count"])
 
 
 def off(row: Row, full: Row) -> dict[str, float]:
-    """How far the largest effects of a mode set are from those of the full rod, as shares of these."""
+    """Return the differences of a mode set's largest effects from the full rod's, as fractions of the latter."""
     return {name: abs(row[name] / full[name] - 1.0) for name in EFFECTS}
 
 
 def far_error(rows: list[Row], row: Row) -> float:
-    """The worst of the largest effects of a set, as a share of the full rod's."""
+    """Return the worst error of a set's largest effects, as a fraction of the full rod's."""
     return max(off(row, at(rows, row["place_mm"], FULL)).values())
 
 
 def verdicts(groups: dict[str, list[Row]]) -> list[tuple[Claim, dict[int, tuple[bool, str]]]]:
-    """Every claim with its outcome at each place [mm]."""
+    """Return every claim with its outcome at each position [mm]."""
     found = []
     for claim in CLAIMS:
         found.append((claim, {place: claim.test(numbers_of(groups, place)) for place in PLACES}))
@@ -92,7 +92,7 @@ def verdicts(groups: dict[str, list[Row]]) -> list[tuple[Claim, dict[int, tuple[
 
 
 def numbers_of(groups: dict[str, list[Row]], place: int) -> Rows:
-    """The rows at one place [mm] of the prismatic joint, on the paper's mesh."""
+    """Return the rows at one position [mm] of the prismatic joint, on the paper's mesh."""
     far, clearance = (
         [r for r in groups[name] if r["place_mm"] == place and r["finer"] == 1] for name in ("far", "clearance")
     )
@@ -100,7 +100,7 @@ def numbers_of(groups: dict[str, list[Row]], place: int) -> Rows:
 
 
 def judged(groups: dict[str, list[Row]]) -> str:
-    """Every claim with its rule and the numbers of each place."""
+    """Return every claim with its rule and the numbers of each position, as Markdown."""
     lines = []
     for claim, outcomes in verdicts(groups):
         lines.append(f"**{claim.paper}** {sentence(outcomes)}")
@@ -111,7 +111,7 @@ def judged(groups: dict[str, list[Row]]) -> str:
 
 
 def sentence(outcomes: dict[int, tuple[bool, str]]) -> str:
-    """Where a claim holds, in words."""
+    """Return in words where a claim holds."""
     holds = [place for place, (good, _) in outcomes.items() if good]
     fails = [place for place in outcomes if place not in holds]
     if not fails:
@@ -125,18 +125,18 @@ def _listed(places: list[int]) -> str:
     return " and ".join(f"{place} mm" for place in places)
 
 
-def _alike(rows: Rows) -> tuple[bool, str]:
+def _consistent(rows: Rows) -> tuple[bool, str]:
     full = rows.named("far", FULL)
-    apart = {name: abs(rows.free()[name] - rows.fixed()[name]) / full[name] for name in EFFECTS}
-    worst = max(apart, key=lambda n: apart[n])
+    difference = {name: abs(rows.free()[name] - rows.fixed()[name]) / full[name] for name in EFFECTS}
+    worst = max(difference, key=lambda n: difference[n])
     found = [_percent(row["velocity"] / full["velocity"]) for row in (rows.free(), rows.fixed())]
-    return apart[worst] < AGREE, (
-        f"they differ by {_percent(apart[worst])} of the full rod's effect ({worst}); of its effect on the velocity "
-        f"they find {found[0]} (free-free) and {found[1]} (fixed-fixed)"
+    return difference[worst] < AGREE, (
+        f"they differ by {_percent(difference[worst])} of the full rod's effect ({worst}); of its effect on the "
+        f"velocity they find {found[0]} (free-free) and {found[1]} (fixed-fixed)"
     )
 
 
-def _suited(which: str) -> Callable[[Rows], tuple[bool, str]]:
+def _right(which: str) -> Callable[[Rows], tuple[bool, str]]:
     def test(rows: Rows) -> tuple[bool, str]:
         found = off(getattr(rows, which)(), rows.named("far", FULL))
         return max(found.values()) < AGREE, "off by " + ", ".join(f"{_percent(s)} ({n})" for n, s in found.items())
@@ -154,22 +154,22 @@ def _dominates(rows: Rows) -> tuple[bool, str]:
 
 def _insensitive(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
-    apart = {name: abs(free[name] - fixed[name]) / fixed[name] for name in ("angle", "displacement", "velocity")}
-    return max(apart.values()) < AGREE, ", ".join(f"{name} {_percent(a)}" for name, a in apart.items())
+    difference = {name: abs(free[name] - fixed[name]) / fixed[name] for name in ("angle", "displacement", "velocity")}
+    return max(difference.values()) < AGREE, ", ".join(f"{name} {_percent(a)}" for name, a in difference.items())
 
 
-def _apart(rows: Rows) -> tuple[bool, str]:
+def _sensitive(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
     good = all(_differ(free, fixed, name) for name in ("peak_force", "acceleration"))
     return good, (
-        f"peak force {_mean(free, 'peak_force')} N and {_mean(fixed, 'peak_force')} N, "
-        f"acceleration {_mean(free, 'acceleration')} m/s² and {_mean(fixed, 'acceleration')} m/s²"
+        f"peak force {mean(free, 'peak_force')} N and {mean(fixed, 'peak_force')} N, "
+        f"acceleration {mean(free, 'acceleration')} m/s² and {mean(fixed, 'acceleration')} m/s²"
     )
 
 
 def _differ(a: Row, b: Row, name: str) -> bool:
-    apart, spread = abs(a[name] - b[name]), max(a[f"{name}_std"], b[f"{name}_std"])
-    return bool(apart > AGREE * abs(b[name]) and apart > DIFFER * spread)
+    difference, spread = abs(a[name] - b[name]), max(a[f"{name}_std"], b[f"{name}_std"])
+    return bool(difference > AGREE * abs(b[name]) and difference > DIFFER * spread)
 
 
 def _fixed_is_right(rows: Rows) -> tuple[bool, str]:
@@ -177,12 +177,12 @@ def _fixed_is_right(rows: Rows) -> tuple[bool, str]:
     off_by = {w: getattr(rows, w)("clearance")["peak_force"] - best["peak_force"] for w in ("free", "fixed")}
     return abs(off_by["fixed"]) < abs(off_by["free"]), (
         f"peak force off by {off_by['free']:+.0f} N (free-free) and {off_by['fixed']:+.0f} N (fixed-fixed) of "
-        f"{_mean(best, 'peak_force')} N, which itself changed by {unsettled(rows):.0f} N with the last coordinates"
+        f"{mean(best, 'peak_force')} N, which itself changed by {unsettled(rows):.0f} N with the last coordinates"
     )
 
 
 def unsettled(rows: Rows) -> float:
-    """Change of the mean peak force [N] from the second most complete Craig-Bampton set to the most complete one."""
+    """Return the change of the mean peak force [N] from the second most to the most complete Craig-Bampton set."""
     line = sorted((r for r in rows.clearance if r["condition"] == "craig-bampton"), key=lambda r: r["count"])
     return float(abs(line[-1]["peak_force"] - line[-2]["peak_force"])) if len(line) > 1 else float("nan")
 
@@ -190,7 +190,7 @@ def unsettled(rows: Rows) -> float:
 def _softens(rows: Rows) -> tuple[bool, str]:
     best, rigid = rows.best(), rows.named("clearance", RIGID)
     fall = 1.0 - best["peak_force"] / rigid["peak_force"]
-    return fall > AGREE, f"peak force {rigid['peak_force']:.0f} N rigid, {_mean(best, 'peak_force')} N flexible"
+    return fall > AGREE, f"peak force {rigid['peak_force']:.0f} N rigid, {mean(best, 'peak_force')} N flexible"
 
 
 def _enlarges(rows: Rows) -> tuple[bool, str]:
@@ -215,22 +215,18 @@ def _percent(fraction: float) -> str:
     return f"{100.0 * fraction:.3g} %" if fraction >= SHOWN else f"under {100.0 * SHOWN:g} %"
 
 
-def _mean(row: Row, name: str) -> str:
-    return f"{row[name]:.0f} ± {row[f'{name}_std']:.0f}"
-
-
 CLAIMS = (
     Claim(
         "With ideal joints, free-free and fixed-fixed modes give consistent answers (Table 7).",
         f"The effects of the rod's flexibility differ by less than {100.0 * AGREE:g} % of that of the full rod.",
-        _alike,
+        _consistent,
     ),
     Claim(
         "With ideal joints, free-free modes are suitable.",
         f"Largest effects on angle, height, velocity and force at A1 are within {100.0 * AGREE:g} % of the full rod's.",
-        _suited("free"),
+        _right("free"),
     ),
-    Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _suited("fixed")),
+    Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _right("fixed")),
     Claim(
         "Next to clearance, the rod's flexibility hardly moves the platform (Tables 7 and 8).",
         f"Angle and displacement change by less than {100.0 * SMALL:g} % of what clearance does to them.",
@@ -244,7 +240,7 @@ CLAIMS = (
     Claim(
         "With clearance, contact force and acceleration do depend on it.",
         f"Means differ by more than {100.0 * AGREE:g} %, and than {DIFFER:g} standard deviations of the members.",
-        _apart,
+        _sensitive,
     ),
     Claim(
         "The reference condition to impose is fixed-fixed.",
@@ -279,7 +275,7 @@ LAYOUT: Columns = {"layout": lambda r: "first" if r.get("first") else str(r["lay
 
 
 def rows_of(rows: list[Row], layout: int) -> Rows:
-    """Rows of one layout; with ideal joints the most complete set represents the full rod."""
+    """Return the rows of one layout; with ideal joints the most complete set represents the full rod."""
     here = [r for r in rows if r["layout"] == layout]
     far, clearance = ([r for r in here if r["clearance"] == which] for which in (False, True))
     most = max((r for r in far if r["condition"] == "craig-bampton"), key=lambda r: r["count"])
@@ -287,15 +283,15 @@ def rows_of(rows: list[Row], layout: int) -> Rows:
 
 
 def layout_verdicts(rows: list[Row]) -> list[tuple[Claim, dict[int, tuple[bool, str]]]]:
-    """Every claim with its outcome for each layout."""
+    """Return every claim with its outcome for each layout."""
     of = {layout: rows_of(rows, layout) for layout in sorted({r["layout"] for r in rows})}
     return [(claim, {layout: claim.test(here) for layout, here in of.items()}) for claim in CLAIMS]
 
 
 def of_layouts(rows: list[Row]) -> str:
-    """How many identified layouts each statement holds for, what that says of it, and the numbers behind it.
+    """Return the number of identified layouts for which each statement holds, the overall verdict, and example numbers.
 
-    Rows that say `first` are those of the layout that was assumed before, whose verdict is next to it.
+    Rows marked `first` belong to the layout that was assumed earlier; its outcome has a column of its own.
     """
     identified = [row for row in rows if not row.get("first")]
     before = layout_verdicts([row for row in rows if row.get("first")])
@@ -319,11 +315,11 @@ def _verdict(good: int, of: int, own: bool | None) -> str:
         return "**holds**"
     if good == 0 and own is not True:
         return "**does not hold**"
-    return "hangs on the layout"
+    return "depends on the layout"
 
 
 def _numbers(claim: Claim, outcomes: dict[int, tuple[bool, str]]) -> str:
-    """The first and last outcome of either kind: what is typical of those that hold and of those that do not."""
+    """Return a claim with its first outcome of either kind, holding and not holding, as examples."""
     lines = [f"- {claim.paper}"]
     for holds in (True, False):
         of = {layout: numbers for layout, (good, numbers) in outcomes.items() if good == holds}
@@ -334,7 +330,7 @@ def _numbers(claim: Claim, outcomes: dict[int, tuple[bool, str]]) -> str:
 
 
 def _peaks(rows: list[Row]) -> str:
-    """Peak contact forces of each layout."""
+    """Return a table of the peak contact forces of each layout."""
     layouts = sorted({r["layout"] for r in rows})
 
     def peak(condition: str, count: int | None) -> dict[int, Row]:
@@ -356,6 +352,4 @@ def _peaks(rows: list[Row]) -> str:
 
 
 def _peak(name: str, line: Row) -> str:
-    row = line[name]
-    mean = f"{row['peak_force']:.0f}"
-    return mean if row["members"] == 1 else f"{mean} ± {row['peak_force_std']:.0f}"
+    return mean(line[name], "peak_force")

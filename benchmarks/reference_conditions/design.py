@@ -1,4 +1,4 @@
-"""What is compared: mode sets of the rod, places of its prismatic joint, and the runs that this takes."""
+"""Mode sets of the rod that are compared, positions of its prismatic joint, and the runs of the comparison."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import xarray as xr
 
-from benchmarks.layouts import FIRST, Layout, chosen, edits, family
+from benchmarks.layouts import FIRST, Layout, by_condition, chosen, edits, family
 from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
@@ -28,22 +28,22 @@ TOP = "top"
 FULL, RIGID = "full", "rigid"
 #: reference conditions, in the order of every table; the paper's two first
 CONDITIONS = ("free-free", "fixed-fixed", "pinned-pinned", "cantilever", "craig-bampton")
-#: coordinates that the sets are compared with, and at which convergence is looked at; a count that would cut a pair of
+#: number of modal coordinates in the comparison, and those of the convergence study; a count that would cut a pair of
 #: equal frequencies is raised to the next whole one
 COUNT, COUNTS = 13, (7, 13, 25, 49)
-#: of these, those that are run: a run costs with the third power of the count, and with clearance is an ensemble
+#: counts of COUNTS that are simulated: the cost of a run grows with their third power, and clearance needs ensembles
 RUN_COUNTS = (7, 13, 25)
-#: with clearance, the most complete sets; the last is the reference, and the one before it shows how far it is settled
+#: largest counts with clearance; the last is the reference, and its difference from the other shows the convergence
 MOST_COMPLETE = (25, 37)
-#: ensembles of sets beyond COUNT have this share of the members: a run with 37 coordinates costs ten of those with 13
+#: fraction of the members in ensembles of these largest sets: a run with 37 coordinates costs ten of those with 13
 LARGE_SETS = 0.5
-#: factors of the recipe's elements
+#: factors of the recipe's number of elements
 FINER = (1, 2, 4)
-#: layouts of the mechanism: that of the scenes, and every so manieth of the identified family on this grid [m]
+#: grid [m] of the identified family of layouts, and the stride at which its members are taken
 LAYOUT_GRID, EVERY = 0.02, 10
-#: there, the sets: the paper's two as few as it has them, and Craig-Bampton, of which the last represents the full rod
+#: mode sets of these layouts: the paper's two with its fewest coordinates; the last one represents the full rod
 LAYOUT_SETS = (("free-free", 7), ("fixed-fixed", 7), ("craig-bampton", 13), ("craig-bampton", 25))
-#: times at which the assembled mechanism's frequencies are taken: the start and the full stroke [s]
+#: times of the assembled mechanism's frequencies [s]: start and full stroke
 TIMES = (0.0, 0.09)
 
 
@@ -51,8 +51,8 @@ TIMES = (0.0, 0.09)
 class Case:
     """One scene with one mode set.
 
-    place: of the prismatic joint [mm].  condition: of the modes, FULL or RIGID.  finer: factor of the elements.
-    layout: of the mechanism, where it is not that of the scenes.
+    place: position of the prismatic joint [mm].  condition: reference condition of the modes, FULL or RIGID.  finer:
+    factor of the number of elements.  layout: of the mechanism, where it differs from that of the scenes.
     """
 
     place: int
@@ -63,14 +63,14 @@ class Case:
     members: int = field(default=0)
     layout: Layout | None = None
 
-    @property
-    def label(self) -> str:
-        """Name in progress reports and tables."""
-        return self.condition if self.condition in (FULL, RIGID) else f"{self.condition} {self.count}"
+
+def label(condition: str, count: int) -> str:
+    """Return the name of a mode set in progress reports and tables."""
+    return condition if condition in (FULL, RIGID) else f"{condition} {count}"
 
 
 def modes(case: Case) -> dict[str, Any]:
-    """The scene's table of modes."""
+    """Return the scene's table of modes."""
     interfaces = [PLACES[case.place], TOP]
     if case.condition == FULL:
         return {"reference": "craig-bampton", "count": "all", "interfaces": interfaces}
@@ -78,7 +78,7 @@ def modes(case: Case) -> dict[str, Any]:
 
 
 def scene(case: Case) -> Scene:
-    """The paper's scene in the case's layout, with the joint at its place and the rod of its mode set."""
+    """Return the paper's scene with the layout, position of the prismatic joint and mode set of a case."""
     stem, folder = ("", "sps4") if case.place == 0 else (f"prismatic_{case.place}mm", "sps4/variants")
     moved: dict[str, Any] = {}
     if case.layout is not None:
@@ -94,7 +94,7 @@ def scene(case: Case) -> Scene:
 
 
 def task(case: Case) -> Task:
-    """The run (or ensemble) of a case as a task of the store."""
+    """Return the run (or ensemble) of a case as a task of the store."""
     given = scene(case)
     graph = Graph(given, shown=False, recipe={"elements": case.finer} if case.finer != 1 else {})
     module = "benchmarks.reference_conditions.cases"
@@ -106,20 +106,20 @@ def task(case: Case) -> Task:
         inputs={f"bundle/{body}": made for body, made in graph.bundle.items()},
         modules=(module, *simulation.modules(given)),
         folder="",
-        part=f"{case.place} mm, {case.label}" + (", clearance" if case.clearance else ""),
+        part=f"{case.place} mm, {label(case.condition, case.count)}" + (", clearance" if case.clearance else ""),
     )
 
 
 @cache
 def rod(finer: int) -> xr.Dataset:
-    """The paper's rod in cells."""
+    """Return the mesh of the paper's rod with `finer` times the elements of its recipe."""
     recipe = read_toml(Path(scene(Case(0, FULL)).flexible()[ROD].mesh))
     return kind.build(recipe | {"elements": finer * recipe["elements"]})
 
 
 @cache
 def solved(case: Case) -> xr.Dataset:
-    """Modes (schema MODES) of a case; InputError for counts that cut a pair."""
+    """Return the modes (schema MODES) of a case; raise InputError for counts that cut a pair."""
     table = modes(case)
     count = None if table["count"] == "all" else table["count"]
     return solve(rod(case.finer), table["reference"], count, table["interfaces"])
@@ -127,7 +127,7 @@ def solved(case: Case) -> xr.Dataset:
 
 @cache
 def is_whole(case: Case) -> bool:
-    """Whether the count of a case cuts no pair of equal frequencies."""
+    """Return True when the count of a case cuts no pair of equal frequencies."""
     try:
         solved(case)
     except InputError as error:
@@ -138,18 +138,18 @@ def is_whole(case: Case) -> bool:
 
 
 def whole(place: int, condition: str, count: int) -> int:
-    """The least whole count that is not below `count`."""
+    """Return the least whole count that is not below `count`."""
     return next(n for n in itertools.count(count) if is_whole(Case(place, condition, n)))
 
 
 def _sets(place: int) -> list[tuple[int, str, int]]:
-    """Places, conditions and counts that are run wherever the joint is: all of COUNT, the paper's two of fewest."""
+    """Return the sets that run at every position: all conditions with COUNT, the paper's two also with 7."""
     sets = [(c, COUNT) for c in CONDITIONS] + [(c, 7) for c in CONDITIONS[:2]]
     return [(place, c, whole(place, c, n)) for c, n in sets]
 
 
 def far() -> list[Case]:
-    """Ideal joints: rigid, every condition, the full rod; at the first place in all counts and meshes."""
+    """Return the cases with ideal joints: rigid, every condition, full rod; at 0 mm all counts and meshes."""
     found = []
     for place in PLACES:
         found += [Case(place, RIGID), Case(place, FULL), *(Case(*key) for key in _sets(place))]
@@ -159,7 +159,7 @@ def far() -> list[Case]:
 
 
 def clearance(members: int) -> list[Case]:
-    """Clearance at A1: likewise, as ensembles."""
+    """Return the corresponding cases with clearance at A1, as ensembles."""
     found = []
     for place in PLACES:
         found += [(place, RIGID, COUNT), *_sets(place)]
@@ -171,14 +171,12 @@ def clearance(members: int) -> list[Case]:
 
 @cache
 def layouts() -> tuple[Layout, ...]:
-    """The identified layout that is taken, members of its family by falling regularity, and last the first layout."""
-    members = sorted(family(LAYOUT_GRID), key=lambda member: member.answer.condition)
-    found = [chosen(family()), *members[::EVERY]]
-    return (*(member.layout for member in found), FIRST)
+    """Return the chosen layout, members of its family by rising condition number, and last the first layout."""
+    return (chosen(family()), *by_condition(family(LAYOUT_GRID))[::EVERY], FIRST)
 
 
 def of_layout(layout: Layout, members: int) -> list[Case]:
-    """All runs of one layout: ideal joints, then clearance; ensembles have half the members."""
+    """Return all runs of one layout: ideal joints, then clearance in ensembles of half the members."""
     members = max(2, members // 2)
     sets = [(RIGID, COUNT), *((c, whole(0, c, n)) for c, n in LAYOUT_SETS)]
     far = [Case(0, *key, layout=layout) for key in sets]
@@ -186,7 +184,7 @@ def of_layout(layout: Layout, members: int) -> list[Case]:
 
 
 def _share(members: int, condition: str, count: int) -> int:
-    """Members of an ensemble: fewer where a run is dear; a rigid rod has one run."""
+    """Return the number of members: fewer where a run is expensive, 0 for a rigid rod, which has one run."""
     if condition == RIGID:
         return 0
     # whole counts may lie a little above COUNT

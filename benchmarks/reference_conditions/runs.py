@@ -1,8 +1,8 @@
-"""All runs brought up to date through the store, and the numbers of the verdict taken from them."""
+"""Bring all runs up to date through the store, and compute the numbers of the verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from typing import Any
 
@@ -11,7 +11,6 @@ import xarray as xr
 
 import flexclear as fc
 from benchmarks import family, layouts
-from benchmarks.family import Measured
 from benchmarks.family import Record as Row
 from benchmarks.layouts import deviation_row
 from benchmarks.reference_conditions import design
@@ -21,24 +20,23 @@ from flexclear.stages.workplace import Workplace, check, open_workplace
 
 #: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
 DIRECTIONS = ("z", "x", "rz")
-#: vibrations of the mechanism that are compared
+#: number of compared vibrations of the mechanism
 VIBRATIONS = 6
 
 
 def cases(members: int) -> list[family.Case]:
-    """The groups of rows that the page has."""
-    return [family.Case(name, members if name in ENSEMBLES else None) for name in GROUPS]
+    """Return one case for each group of rows on the page."""
+    return [family.Case(name, (members,) if name in ENSEMBLES else ()) for name in GROUPS]
 
 
-def measure(cases: Sequence[family.Case], jobs: int) -> Measured:
-    """The rows of each group."""
-    for case in cases:
-        rows = GROUPS[case.name]
-        yield case, list(rows() if case.of is None else rows(case.of))
+@family.each
+def measure(case: family.Case) -> list[Row]:
+    """Return the rows of a group."""
+    return list(GROUPS[case.name](*case.of))
 
 
 def bring(cases: list[design.Case], place: Workplace) -> dict[design.Case, xr.Dataset]:
-    """Datasets of the cases, from the cache where fresh."""
+    """Return the datasets of the cases, from the cache where they are up to date."""
     tasks = {case: design.task(case) for case in cases}
     outcome = place.bring(list(tasks.values()))
     check(outcome)
@@ -46,7 +44,7 @@ def bring(cases: list[design.Case], place: Workplace) -> dict[design.Case, xr.Da
 
 
 def identity(case: design.Case) -> Row:
-    """What a row is about."""
+    """Return the fields that identify a row."""
     reference = case.condition not in (design.FULL, design.RIGID)
     return {
         "place_mm": case.place,
@@ -57,9 +55,9 @@ def identity(case: design.Case) -> Row:
 
 
 def static_rows() -> Iterator[Row]:
-    """The full rod's compliance [m/N, rad/(N m)] of the top with the prismatic joint's place held; shares of it.
+    """Yield the full rod's compliance [m/N, rad/(N m)] at the top, with the frame of the prismatic joint held.
 
-    Over all whole counts.
+    Further rows hold the fraction of this compliance that each mode set has, for all whole counts.
     """
     for place in design.PLACES:
         full = design.solved(design.Case(place, design.FULL))
@@ -79,14 +77,14 @@ def _compliance(values: xr.DataArray, place: int) -> Row:
 
 
 def mesh_rows() -> Iterator[Row]:
-    """Frequencies [Hz] of the Craig-Bampton set at 0 mm on finer meshes, the finest last."""
+    """Yield frequencies [Hz] of the Craig-Bampton set at 0 mm on finer meshes, the finest last."""
     for finer in design.FINER:
         found = design.solved(design.Case(0, "craig-bampton", design.COUNT, finer=finer))["frequency"]
         yield {"elements": finer * design.rod(1).sizes["cell"], "frequency": found.values.tolist()}
 
 
 def frequency_rows() -> Iterator[Row]:
-    """Lowest frequencies [Hz] of the assembled mechanism, drives held, at each of `TIMES`."""
+    """Yield the lowest frequencies [Hz] of the assembled mechanism with held drives, at each of `TIMES`."""
     for where in design.PLACES:
         sets = [design.Case(where, c, design.whole(where, c, design.COUNT)) for c in design.CONDITIONS] + [
             design.Case(where, design.FULL)
@@ -99,7 +97,7 @@ def frequency_rows() -> Iterator[Row]:
 
 
 def far_rows() -> Iterator[Row]:
-    """Ideal joints: deviation from the rigid mechanism, and from the mechanism with the full rod."""
+    """Yield the deviations, with ideal joints, from the rigid mechanism and from the mechanism with the full rod."""
     runs = bring(design.far(), open_workplace())
     for case, run in runs.items():
         rigid, full = runs[design.Case(case.place, design.RIGID)], runs[design.Case(case.place, design.FULL)]
@@ -113,9 +111,9 @@ def far_rows() -> Iterator[Row]:
 
 
 def clearance_rows(members: int) -> Iterator[Row]:
-    """Clearance at A1: means and standard deviations over the members of each set, one run of the rigid rod.
+    """Yield, with clearance at A1, means and standard deviations over the members of each set; one run for a rigid rod.
 
-    members: of each ensemble; of sets beyond 13 coordinates, half of them.
+    members: size of each ensemble; sets of 25 or more coordinates have half as many.
     """
     place = open_workplace()
     runs = bring(design.clearance(members), place)
@@ -125,7 +123,7 @@ def clearance_rows(members: int) -> Iterator[Row]:
 
 
 def _with_clearance(case: design.Case, run: xr.Dataset, ideal: xr.Dataset) -> Row:
-    """Means and standard deviations over the members of one set, or the one run of the rigid rod."""
+    """Return means and standard deviations over the members of one set, or the one run of the rigid rod."""
     if case.condition == design.RIGID:
         spread = {"peak_force": [float(run.attrs["peak_force"])], "impacts": [int(run.attrs["impacts"])]}
         effects = [max_deviation(run, ideal, BODY)]
@@ -141,7 +139,7 @@ def _with_clearance(case: design.Case, run: xr.Dataset, ideal: xr.Dataset) -> Ro
 
 
 def layout_rows(members: int) -> Iterator[Row]:
-    """Ideal joints and clearance for each of `design.layouts`; of ideal joints deviations from rigid."""
+    """Yield runs with ideal joints (their deviations from rigid) and with clearance for each of `design.layouts`."""
     place = open_workplace()
     for number, layout in enumerate(design.layouts()):
         runs = bring(design.of_layout(layout, members), place)
@@ -158,12 +156,12 @@ def layout_rows(members: int) -> Iterator[Row]:
 
 
 def _costs(run: xr.Dataset) -> Row:
-    """Evaluations and processor time of the integration [s] of one run."""
+    """Return evaluations and processor time of the integration [s] of one run."""
     return {"evaluations": int(run.attrs["evaluations"]), "seconds": float(run.attrs["seconds"])}
 
 
 def _largest(run: xr.Dataset, other: xr.Dataset) -> float:
-    """Largest difference of the force at A1 [N]."""
+    """Return the largest difference of the force at A1 [N]."""
     return float(np.linalg.norm(run["joint_force"].values - other["joint_force"].values, axis=1).max())
 
 

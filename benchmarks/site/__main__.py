@@ -14,12 +14,12 @@ from flexclear.pipeline.core.workflow.fingerprint import TREE
 
 
 def readme() -> str:
-    """The README as the first page, with its links as from docs/."""
+    """Return the README as first page, with links relative to docs/."""
     page = (TREE / "README.md").read_text(encoding="utf-8")
     return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)
 
 
-#: page below docs/ -> what makes its text
+#: page below docs/ -> function that returns its text
 PAGES: dict[str, Callable[[], str]] = {
     "index.md": readme,
     "reference/python.md": reference.python,
@@ -30,7 +30,7 @@ PAGES: dict[str, Callable[[], str]] = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """1 where a page is not what it would be now, and only a comparison was asked for."""
+    """Write or compare the pages; return 1 when a comparison finds outdated pages, else 0."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.site", description=__doc__)
     parser.add_argument("--check", action="store_true", help="tell which pages are out of date; write nothing")
     options = parser.parse_args(arguments)
@@ -46,14 +46,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def stale() -> dict[str, str]:
-    """Pages that are not what their sources say, and what they would be."""
+    """Return the new texts of the outdated pages, by page."""
     made = {page: make() for page, make in PAGES.items()}
-    return {page: text for page, text in made.items() if _written(page) != text}
-
-
-def _written(page: str) -> str | None:
-    path = DOCS / page
-    return path.read_text(encoding="utf-8") if path.is_file() else None
+    present = {page: (DOCS / page).read_text(encoding="utf-8") for page in made if (DOCS / page).is_file()}
+    return {page: text for page, text in made.items() if present.get(page) != text}
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""docs/reference: every key of scenes, mesh recipes and sweeps, from the schemas that files are checked against."""
+"""Pages of docs/reference: every key of scenes, mesh recipes and sweeps, from the schemas that validate the files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.sweep import Sweep
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.structure.fe.recipe import Recipe
 
-#: unit of a bare number
+#: unit of a number without unit, by quantity
 SI = {
     "length": "m",
     "time": "s",
@@ -32,11 +32,11 @@ SI = {
     "area": "m^2",
     "second moment of area": "m^4",
 }
-#: wherever all of these may stand, any law of time may
+#: a value that allows all of these classes allows any law of time
 _LAW_KINDS = {"Constant", "Step", "Harmonic"}
-#: names that are not made of words
+#: headings of classes whose names are not made of words
 _NAMES = {"LuGre": "LuGre", "Pid": "PID", "SampledPid": "Sampled PID"}
-#: a definition's name where two modules have a class of one name
+#: name of a JSON schema definition where two modules have a class of the same name
 _MODULE = re.compile(r"^flexclear__.*__(\w+?)__(?:recipe|beam_recipe)__(\w+)$|^flexclear__.*__(\w+)$")
 HEADS = {
     "scene": (
@@ -67,7 +67,7 @@ EDITS = """## Edits of another file
 
 
 def page(kind: str) -> str:
-    """The page of scenes, recipes or sweeps."""
+    """Return the page of the keys of scenes, recipes or sweeps."""
     found = _schema(kind)
     definitions = found.pop("$defs", {})
     title, text = HEADS[kind]
@@ -89,7 +89,7 @@ def _schema(kind: str) -> dict[str, Any]:
 
 
 def _order(schema: Any, definitions: dict[str, Any]) -> list[str]:
-    """Definitions in the order in which they are met from the top."""
+    """Return the names of definitions in the order in which they are first referenced from the top."""
     waiting, found = [schema], dict[str, None]()
     while waiting:
         for name in _references(waiting.pop(0)):
@@ -128,7 +128,7 @@ def _heading(name: str, part: dict[str, Any]) -> str:
 
 
 def _kind(part: dict[str, Any]) -> str:
-    """What distinguishes this part from others of its family: `type`, `law` or `integrator`, where it is one word."""
+    """Return the constant `type`, `law` or `integrator` that distinguishes a part within its family, or no text."""
     for key in ("type", "law", "integrator"):
         entry = part.get("properties", {}).get(key, {})
         if "const" in entry:
@@ -163,7 +163,7 @@ def _meaning(entry: dict[str, Any]) -> str:
 
 
 def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
-    """What may be written there, in words."""
+    """Return the permitted values of an entry in words."""
     if "const" in entry:
         return f"`{json.dumps(entry['const'])}`"
     if "enum" in entry:
@@ -183,7 +183,7 @@ def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
 
 
 def _with_unit(quantity: str) -> str:
-    """A quantity with the SI unit that a bare number of it has."""
+    """Return a quantity with the SI unit of its bare numbers."""
     return f"{quantity} [{SI[quantity]}]" if SI.get(quantity) else quantity
 
 
@@ -204,7 +204,7 @@ def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
 
 
 def _examples(kind: str) -> dict[str, str]:
-    """For each kind of part the shortest one that a scene or recipe of this project has, as TOML."""
+    """Return the shortest example of each kind of part among the scenes or recipes of this project, as TOML."""
     found: dict[str, str] = {}
     folders = {"scene": ("scenes",), "recipe": ("meshes", "scenes"), "sweep": ("scenes/sweeps",)}[kind]
     for path in sorted(path for folder in folders for path in (TREE / folder).rglob("*.toml")):
@@ -241,6 +241,6 @@ def _inline(value: Any) -> str:
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of words; bars in cells are written so that they stay in them."""
+    """Return a Markdown table of texts; bars in cells are escaped."""
     lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,4 +1,4 @@
-"""A hook of MkDocs: links that lead out of docs/ lead to the sources at the project's address, or become text."""
+"""MkDocs hook: links that lead out of docs/ become text, since the site does not hold their targets."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ _OUTSIDE = re.compile(r"\[([^\]\n]+)\]\(((?:\.\./)+|(?=examples/|SECURITY))([^)\
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The page with such links as the name and the path of what they lead to."""
-    return _OUTSIDE.sub(_told, markdown)
+    """Return the page with each link out of docs/ replaced by its text and the path of its target."""
+    return _OUTSIDE.sub(_as_text, markdown)
 
 
-def _told(found: re.Match[str]) -> str:
-    """Links to pages of this folder stay; others become words."""
+def _as_text(found: re.Match[str]) -> str:
+    """Return a link to a page of docs/ unchanged, and any other link as text with its path."""
     words, up, path = found.groups()
     if up and path.endswith(".md") and path.partition("/")[0] not in ("CONTRIBUTING.md", "README.md", "CHANGELOG.md"):
         return found[0]

@@ -1,4 +1,4 @@
-"""docs/datasets.md: every dataset, variable and coordinate as their schemas say, and recipes for reading them."""
+"""Pages on datasets, quantities and Python functions, written from schemas and docstrings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from flexclear.pipeline.post.sections.verdict import VERDICT
 from flexclear.pipeline.post.single_run.schema import POST
 
 RECIPES = DOCS / "examples" / "datasets"
-#: datasets in the order of their making: heading, where the file is, schema
+#: datasets in the order in which they are computed: heading, location of the file, schema
 DATASETS: dict[str, tuple[str, Schema]] = {
     "Run": ("`run.nc`, from `flexclear run` and `flexclear.run`", artifacts.RUN),
     "What follows from a run": ("`post.nc`", POST),
@@ -62,7 +62,7 @@ the recipes run as tests.
 
 
 def datasets() -> str:
-    """The page."""
+    """Return docs/datasets.md: every dataset, variable and coordinate of the schemas, and recipes for reading them."""
     parts = [
         DATASETS_HEAD,
         "## Recipes\n\n",
@@ -130,7 +130,7 @@ This page is written from the schema of runs (`python -m benchmarks.site`).
 
 
 def quantities() -> str:
-    """The page."""
+    """Return docs/reference/quantities.md: every quantity with its unit, and the reductions of sweeps."""
     parts = [QUANTITIES]
     for dim, owner in OWNERS.items():
         rows = [
@@ -181,7 +181,7 @@ and `fc.ResourceError` where the machine lacks memory or disk. The command ends 
 
 
 def python() -> str:
-    """The page."""
+    """Return docs/reference/python.md: every public function with its signature, docstring and example."""
     names = [name for name in public.__all__ if inspect.isfunction(getattr(fc, name, None))]
     return PYTHON + "".join(_section(name) for name in names) + PROMISES
 

@@ -3,14 +3,14 @@ effect (`effects`).
 
 A kernel's code depends only on the kinds of parts present. All else is in four flat arrays that kernels take:
 
-- ``h`` (integers): a header with sizes and offsets, then the wiring tables;
+- ``h`` (integers): a header with sizes and offsets, then the topology tables;
 - ``f`` (floats): the numbers of the scene;
 - ``w`` (floats): the work space, with the integrator's state and stages;
 - ``n`` (integers): values that change during a run.
 
 Kernels read and write these arrays by the names that are declared here (`fields`).  Python reads the same rows by the
 names of their fields (`named`), and rows of the record by their contents (`integrate.recording`).  ``h[m.NV]`` is a
-size, ``h[m.FORCE]`` the index in w where an array begins, ``h[m.LINKS.place]`` that of a table in its array, and
+size, ``h[m.FORCE]`` the index in w where an array begins, ``h[m.LINKS.at]`` that of a table in its array, and
 ``m.LINKS.parent`` the offset of a field in a row of the table.
 
 Arrays are flat, since calls and compilation cost in proportion to their arguments.  No two overlap, and the compiler
@@ -45,7 +45,7 @@ from flexclear.pipeline.core.scene.event_kinds import STICKING as STICKING
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.kernels import kernel
 
-_place = count()
+_index = count()
 #: tables in h, f and w, in the order of the arrays
 TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
 #: indices in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
@@ -61,26 +61,26 @@ LENGTHS: dict[int, tuple[int, str]] = {}
 _ROWS: dict[type, np.dtype[Any]] = {}
 
 
-def _places(number: int) -> list[int]:
+def _indices(number: int) -> list[int]:
     """Return the next indices of the header of h."""
-    return [next(_place) for _ in range(number)]
+    return [next(_index) for _ in range(number)]
 
 
 def _sizes(declared: str) -> list[int]:
     """Return the next indices of the header of h, for sizes."""
     names = declared.split()
-    places = _places(len(names))
-    SIZES.update(zip(names, places, strict=True))
-    return places
+    indices = _indices(len(names))
+    SIZES.update(zip(names, indices, strict=True))
+    return indices
 
 
 def _stretches(declared: str) -> list[int]:
     """Return the next indices of h's header, for stretches of w: "name:length", or the name where `_floats` sets it."""
     indices = []
     for name, _, length in (one.partition(":") for one in declared.split()):
-        STRETCHES[name] = place = next(_place)
-        LENGTHS[place] = (1, length)
-        indices.append(place)
+        STRETCHES[name] = index = next(_index)
+        LENGTHS[index] = (1, length)
+        indices.append(index)
     return indices
 
 
@@ -97,7 +97,7 @@ def _floats(stretch: int, declared: str) -> range:
     return range(len(names))
 
 
-def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str = "Layout", **place: int) -> Any:
+def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str = "Layout", **at: int) -> Any:
     """Declare a row: the offset of each field, and its `size`, preceded by its header index if it is of a table.
 
     declared: "name", "name:length" or "name:rowsxcolumns" of each field.  number: type of the entries.
@@ -106,24 +106,24 @@ def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str =
     fields = {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
     begins = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
     make: Any = namedtuple
-    row = make(kind, [*place, *fields, "size"])
+    row = make(kind, [*at, *fields, "size"])
     _ROWS[row] = np.dtype([(name, number, shape) for name, shape in fields.items()])
-    return row(*place.values(), *begins)
+    return row(*at.values(), *begins)
 
 
 def _table(array: str, declared: str, count: str = "") -> Any:
-    """Declare a table: its `place` (index) in the header, `size` of its rows, and offset of each field.
+    """Declare a table: its index `at` in the header, the `size` of its rows, and the offset of each field.
 
     count: number of rows of a table in w, written as in `LENGTHS`.
     """
-    table = layout(declared, np.int64 if array == "h" else np.float64, "Table", place=next(_place))
+    table = layout(declared, np.int64 if array == "h" else np.float64, "Table", at=next(_index))
     TABLES[array].append(table)
     if count:
-        LENGTHS[table.place] = (table.size, count)
+        LENGTHS[table.at] = (table.size, count)
     return table
 
 
-wiring, numbers, work = partial(_table, "h"), partial(_table, "f"), partial(_table, "w")
+topology, numbers, work = partial(_table, "h"), partial(_table, "f"), partial(_table, "w")
 
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:
@@ -166,65 +166,65 @@ class Room:
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: the function that the steps evaluate, EVALUATE's or one that stores only what they read (`specialise`)
-EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES = ADDRESSES = _places(7)
+EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES = ADDRESSES = _indices(7)
 
-# Wiring in h ---------------------------------------------------------------------------------------------------------
+# Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
 #: component: independent mechanism that it belongs to, -1 for the ground; leaf: 1 when it carries no other link; first:
 #: 1 when no other child of its parent has a larger number
-LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by component leaf first")
-SITES = wiring("link port")  # port: or -1
+LINKS = topology("parent joint q0 c0 n_speeds flex inboard_port carried_by component leaf first")
+SITES = topology("link port")  # port: or -1
 #: data0: first of its numbers; inboard: 1 when modes move the inboard frame; coupled: 1 when modes have common entries
 #: of the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis:
 #: entries of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that
 #: basis; book: index in the ledger of its damping loss
-FLEXES = wiring(
+FLEXES = topology(
     "link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0 book"
 )
-BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
-MOMENTS = wiring("mode")  # mode i of int rho S_ki S_lj, row after row
-MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: index in MOMENTS after its last one
-PORTS = wiring("flex column shapes")  # column, shapes: the first ones, of moving shapes
-PAIRS = wiring("momentum column entry")  # entry: index in the mass matrix's envelope
-KNOWN_PAIRS = wiring("momentum column drive coordinate")
+BASIS = topology("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
+MOMENTS = topology("mode")  # mode i of int rho S_ki S_lj, row after row
+MOMENT_ROWS = topology("end")  # per body and row (3k + l) n + j of these: index in MOMENTS after its last one
+PORTS = topology("flex column shapes")  # column, shapes: the first ones, of moving shapes
+PAIRS = topology("momentum column entry")  # entry: index in the mass matrix's envelope
+KNOWN_PAIRS = topology("momentum column drive coordinate")
 #: rows of the mass matrix, or of the modal blocks that articulated inertias factor; rows of joint coordinates then hold
 #: 1/sqrt(D). first: column; origin: index of column 0, which may lie before that of the first
-ENVELOPE = wiring("first origin")
+ENVELOPE = topology("first origin")
 #: threes: groups of three solved rows, adjacent in JACOBIAN and SPREAD and evaluated together; the last group may end
 #: with zeros.  coupling: index of its coupling, or -1; path0, n_path: of its links in PATHS
-CLOSURES = wiring(
+CLOSURES = topology(
     "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling path0 n_path"
 )
-CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
-SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
-ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 for its first joint
-KNOWN_ENTRIES = wiring("closure drive column sign part")
+CLOSURE_ROWS = topology("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
+SUPPORT = topology("coordinate")  # coordinates on which a closure depends
+ENTRIES = topology("slot column sign part")  # slot: in the support; part: of a coupling, 1 for its first joint
+KNOWN_ENTRIES = topology("closure drive column sign part")
 #: links between the ground and a closure's ends, leaves first; slot, shapes, carrier: slots of the first coordinate of
 #: the link's joint, of its first moving shape, and of its parent's, or -1
-PATHS = wiring("link slot shapes carrier")
-CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
-COMMON = wiring("a b")  # slots of a common coordinate
-CLOSURE_ENVELOPE = wiring("first origin")  # of the solved rows
+PATHS = topology("link slot shapes carrier")
+CLOSURE_PAIRS = topology("a b common0 n_common")  # b >= a
+COMMON = topology("a b")  # slots of a common coordinate
+CLOSURE_ENVELOPE = topology("first origin")  # of the solved rows
 #: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
-CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; the gauge of a stop
-LAWS = wiring("piece0 n_pieces")  # the drives' laws first
-PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
+CONTACTS = topology("outer inner normal friction surfaces bristle")  # surfaces: their kind; the gauge of a stop
+LAWS = topology("piece0 n_pieces")  # the drives' laws first
+PIECE_HARMONICS = topology("harmonic0 n_harmonics")
 #: a: site, -1 where the reaction acts on the world; gauge, measured: of the joint coordinate that it acts along, and of
 #: one that it measures, or -1; internal0: first of its states; follows: 1 when it turns with its frame; look0, bend0:
 #: its first of LOOKS and LOAD_BENDS; book: index in the ledger of its work, which its loss follows
-LOADS = wiring("a b law0 number0 gauge measured internal0 follows look0 bend0 book")
-LOOKS = wiring("index")  # arguments of expressions: index of a site, or of a gauge
-LOAD_KINDS = wiring("load0 n_loads")
+LOADS = topology("a b law0 number0 gauge measured internal0 follows look0 bend0 book")
+LOOKS = topology("index")  # arguments of expressions: index of a site, or of a gauge
+LOAD_KINDS = topology("load0 n_loads")
 #: measurement of a joint coordinate between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: index of the angle with its full turns among the internal states or -1
-GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
+GAUGES = topology("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
 #: quantities on which steps end: the vector of `components` numbers from `offset` on in the table of w with this header
 #: index.  contact: one that must be closed, or -1; bearing: one whose load is the scale, or -1
-GUARDS = wiring("table offset components contact bearing")
-BODIES, FRAMES = wiring("link"), wiring("link")  # moving bodies and named frames: for the record, no step reads them
-GROUPS = wiring("group")  # error group of each state variable
-BOOKS = wiring("work loss load")  # of each independent mechanism: indices in the ledger (`DRIVE_WORK`, ...)
-DRIVES = wiring("book")  # index in the ledger of each drive's work
+GUARDS = topology("table offset components contact bearing")
+BODIES, FRAMES = topology("link"), topology("link")  # moving bodies and named frames: no step reads them
+GROUPS = topology("group")  # error group of each state variable
+BOOKS = topology("work loss load")  # of each independent mechanism: indices in the ledger (`DRIVE_WORK`, ...)
+DRIVES = topology("book")  # index in the ledger of each drive's work
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
 #: inertia about the centre of mass (xx yy zz xy xz yz), link axes; borne, reaching: mass of the link and all beyond,
@@ -344,11 +344,11 @@ GUARDED = work("start:3 end:3", "n_guards")  # watched values of guards, at the 
 #: by the names that effects declare (`effects.effect`); those of effects that a mechanism lacks are empty
 OF_EFFECTS: dict[str, Any] = {}
 for _effect in EFFECTS:
-    for _array, _tables in (("h", _effect.wiring), ("f", _effect.numbers)):
+    for _array, _tables in (("h", _effect.topology), ("f", _effect.numbers)):
         OF_EFFECTS |= {name: _table(_array, rows) for name, rows in _tables.items()}
     OF_EFFECTS |= {name: work(rows, number) for name, (number, rows) in _effect.work.items()}
     _stretches(" ".join(_effect.stretches))
-HEADER = next(_place)
+HEADER = next(_index)
 
 # the ledger before the contacts' variables (three deflections of each contact with bristles follow those): work of
 # drives, loss of modal damping, both of the first independent mechanism; BOOKS has the indices for the others
@@ -421,7 +421,7 @@ NAMED: dict[str, Any] = {
 } | OF_EFFECTS
 #: header indices of the offsets of stretches of w, and of tables
 INDICES = {f"at_{name}": index for name, index in STRETCHES.items()}
-INDICES |= {f"at_{name}": table.place for name, table in NAMED.items()}
+INDICES |= {f"at_{name}": table.at for name, table in NAMED.items()}
 ARRAYS = {name: array for name, table in NAMED.items() for array in TABLES if table in TABLES[array]}
 #: shapes of fields that are tuples, and their numbers of entries
 TUPLES: dict[tuple[int, ...], int] = {(3,): 3, (3, 3): 9}

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.linalg
@@ -134,6 +135,7 @@ def exact_frequencies(
     fixed = [int(d) for d in held[0]] + [size - 6 + int(d) for d in held[1]]
     free = np.setdiff1d(np.arange(size), fixed)
 
+    @cache  # roots next to each other are bracketed by the same steps
     def below(omega: float) -> int:
         D = _assembled(pieces, lumps, omega, parts)[np.ix_(free, free)]
         # unit diagonal: extension is a million times stiffer than bending

@@ -225,7 +225,7 @@ def made(scene: Scene) -> tuple[Engine, float]:
 def test_an_angle_differs_by_as_much_whatever_the_size(size: float) -> None:
     engine, difference = made(Scene.model_validate(swinging_bar(size)))
     # 2.5e-8 of the size, in rad
-    assert difference / arms(engine.model)[0] == pytest.approx(2.5e-8, rel=1e-12)
+    assert difference / arms(engine.model.mechanism)[0] == pytest.approx(2.5e-8, rel=1e-12)
 
 
 def test_a_ball_differs_by_a_thousandth_of_its_clearance() -> None:

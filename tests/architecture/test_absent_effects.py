@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.compile.sources import (
     batched,
     kernels,
     sources,
-    straight,
+    specialised,
     tangent,
 )
 from flexclear.pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
@@ -31,7 +31,7 @@ from flexclear.pipeline.dynamics.effects.declared import EFFECTS as DECLARED
 from flexclear.pipeline.dynamics.effects.effect import PACKAGE
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.specialise.wiring import wiring
+from flexclear.pipeline.dynamics.specialise.topology import topology_of
 from tests.analytic.mechanism_runs import bundles
 from tests.processes import printed
 
@@ -216,7 +216,7 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
 
 
 def generated(parts: Parts, scheme: Scheme = SCHEME) -> dict[str, str]:
-    """Files of a mechanism whose wiring has no code of its own."""
+    """Files of a mechanism whose topology has no code of its own."""
     return sources(parts, scheme) | kernels(parts)
 
 
@@ -253,7 +253,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
 def test_lines_of_generated_files_tell_all_that_they_import(case: str) -> None:
     """As Python's own parser finds it."""
     parts, _ = CASES[case]
-    alone = straight(parts, ((1, 2),)), straight(parts, (), DESCRIBED), batched(parts, (), 2), tangent(parts, ())
+    alone = specialised(parts, ((1, 2),)), specialised(parts, (), DESCRIBED), batched(parts, (), 2), tangent(parts, ())
     for text in (*generated(parts).values(), *alone):
         assert imported(text) == fingerprint.imported(text.encode(), "entry", package=False)[0]
 
@@ -284,10 +284,10 @@ def digest(scene: Scene) -> str:
     return " ".join(digests(parts_of(scene), scheme_of(scene.solver)).values())
 
 
-def straight_code(scene: Scene) -> str:
-    """Made for the wiring of a mechanism."""
+def specialised_code(scene: Scene) -> str:
+    """Made for the topology of a mechanism."""
     model = tabulate(build(scene, bundles(scene)))
-    return straight(model.parts, wiring(model.arrays, model.arrays.h))
+    return specialised(model.parts, topology_of(model.arrays, model.arrays.h))
 
 
 #: one number of every kind that a scene has
@@ -322,7 +322,7 @@ def test_no_number_of_a_scene_is_compiled_in(root: Path, place: str) -> None:
     known, changed = load_scene(path_of(root, CSJ)), load_scene(path_of(root, CSJ), {place: NUMBERS[place]})
     assert changed != known
     assert digest(changed) == digest(known)
-    assert straight_code(changed) == straight_code(known)
+    assert specialised_code(changed) == specialised_code(known)
 
 
 def without_leg(table: dict[str, Any], k: int) -> dict[str, Any]:

@@ -19,18 +19,18 @@ def arrays() -> tuple[np.ndarray, ...]:
     """h, f, w, n with every stretch and ROWS rows of every table at an offset of its own; entries are all different."""
     h, sizes = np.zeros(m.HEADER, np.int64), {"h": m.HEADER, "f": 0, "w": 0}
     for name, table in TABLES.items():
-        h[table.place] = sizes[ARRAYS[name]]
+        h[table.at] = sizes[ARRAYS[name]]
         sizes[ARRAYS[name]] += ROWS * table.size
     for place in m.STRETCHES.values():
         h[place] = sizes["w"]
         sizes["w"] += m.AWAITED_TIME + 1  # the most named floats that a stretch has
     for k, place in enumerate(m.SIZES.values()):
         h[place] = -1 - k
-    wiring = np.arange(m.HEADER, sizes["h"]) * 10
+    topology = np.arange(m.HEADER, sizes["h"]) * 10
     f, w = (np.arange(float(sizes[array])) + start for array, start in (("f", 0.25), ("w", 0.5)))
     n = np.arange(m.INTEGERS + 2 * ROWS)
     n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + ROWS
-    return np.concatenate([h, wiring]), f, w, n
+    return np.concatenate([h, topology]), f, w, n
 
 
 def test_names_are_those_of_memory_and_none_means_two_things() -> None:
@@ -53,7 +53,7 @@ def test_python_has_each_field_of_each_row(name: str) -> None:
     given = arrays()
     h = given[0]
     table, array = TABLES[name], dict(zip("hfwn", given, strict=True))[ARRAYS[name]]
-    begin = h[table.place]
+    begin = h[table.at]
     rows = m.named(table, array[begin : begin + ROWS * table.size])
     for field, (_, shape) in row_fields(name).items():
         held = getattr(getattr(Data(*given), name)[1], field)
@@ -87,7 +87,7 @@ def test_compiled_kernels_do_as_interpreted_ones() -> None:
     for a, b, before in zip(plain, coded, arrays(), strict=True):
         np.testing.assert_array_equal(a, b)
         assert (a is plain[2] or a is plain[3]) != np.array_equal(a, before)
-    links = m.named(m.LINKS, plain[0][plain[0][m.LINKS.place] :][: ROWS * m.LINKS.size])
+    links = m.named(m.LINKS, plain[0][plain[0][m.LINKS.at] :][: ROWS * m.LINKS.size])
     assert plain[3][m.EVALUATION] == links["joint"][2]
 
 

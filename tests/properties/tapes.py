@@ -10,7 +10,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.tape import Branch, Loop, Symbol
-from flexclear.pipeline.dynamics.specialise.wiring import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
+from flexclear.pipeline.dynamics.specialise.topology import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,

@@ -29,9 +29,9 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.specialise import straight
+from flexclear.pipeline.dynamics.specialise import program
+from flexclear.pipeline.dynamics.specialise.topology import topology_of
 from flexclear.pipeline.dynamics.specialise.trace import Trace
-from flexclear.pipeline.dynamics.specialise.wiring import wiring
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
 from tests.properties.articulated_chains import Evaluated, Long, bending, evaluated, reduced, rods, tabulated
@@ -204,7 +204,7 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
     def energy(speeds: np.ndarray) -> Any:
         w[u] = speeds
         plain(h.tolist(), model.arrays.f.astype(np.longdouble), w, found.space.n)
-        return sum(w[int(h[m.ENERGY.place]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
+        return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 
     units = np.eye(len(found.stretch(m.U)))[: model.nv]
     alone = [energy(unit) for unit in units]
@@ -233,13 +233,15 @@ def test_flexible_bodies_have_the_mass_that_their_energy_says(name: str) -> None
 
 @pytest.mark.parametrize("name", ["branches", "held shapes in a loop", "driven loop", "stiffened"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_straight_code_of_flexible_bodies_computes_what_kernels_do(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(straight, "LONGEST", 200_000)
+def test_specialised_code_of_flexible_bodies_computes_what_kernels_do(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(program, "LONGEST", 200_000)
     found, _ = bent(name)
     model, h, w, n = found.model, found.h, found.w.copy(), found.space.n.copy()
     y, dy = int(h[m.Y]), int(h[m.SLOPES])
     w[dy : dy + model.ny] = 0.0
-    tape = straight.program(rates_kernel(model), wiring(model.arrays, h))
+    tape = program.program(rates_kernel(model), topology_of(model.arrays, h))
     tapes.run(tape, h, {"f": model.arrays.f, "w": w, "n": n}, y, dy)
     assert apart(w[dy : dy + model.ny], found.rates) < ROUNDING
 
@@ -336,7 +338,7 @@ def test_the_bound_of_what_is_borne_is_no_larger_than_a_straight_chain_needs() -
 def borne(found: Evaluated, parents: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Mass of each moving link and all beyond, and polar moment about its origin in an evaluated pose."""
     space, numbers = found.space, found.model.arrays.table(m.LINK_NUMBERS)
-    frames = m.named(m.LINK_FRAMES, space.w[space.h[m.LINK_FRAMES.place] :][: len(parents) * m.LINK_FRAMES.size])
+    frames = m.named(m.LINK_FRAMES, space.w[space.h[m.LINK_FRAMES.at] :][: len(parents) * m.LINK_FRAMES.size])
     centres = frames["origin"] + np.einsum("ijk,ik->ij", frames["axes"], numbers["com"])
     spins = 0.5 * numbers["inertia"][:, :3].sum(axis=1)
     mass, polar = np.zeros(len(parents)), np.zeros(len(parents))

@@ -28,7 +28,7 @@ def turned(mechanism: Mechanism) -> dict[str, float]:
     """Angle of every body about the world's z [rad]."""
     found = {}
     for link in mechanism.links[1:]:
-        for name, place in link.places.items():
+        for name, place in link.placements.items():
             R = link.start.R @ place.R
             found[name] = float(np.arctan2(R[1, 0], R[0, 0]))
     return found
@@ -84,7 +84,7 @@ def test_hints_that_say_nothing_of_a_loop_leave_its_way_to_the_first_guess_and_n
         R, frames = matrix(turn), table["body"]["world"]["frames"] | {"c": frame((0.3, -0.1, 0.0))}
         table["body"]["world"]["frames"] = {n: frame(R @ one["position"], turn) for n, one in frames.items()}
         links = start_of(table).links
-        where = {name: R.T @ link.start.p for link in links[1:] for name in link.places}
+        where = {name: R.T @ link.start.p for link in links[1:] for name in link.placements}
         found.add(tuple(np.round(where["right"] - where["left"], 6) + 0.0))
     assert len(found) == 1
 
@@ -105,7 +105,9 @@ def test_bodies_that_have_a_pose_stay_where_they_are() -> None:
     mechanism = start_of(table)
     link = mechanism.links[mechanism.link_of["crank"]]
     given = np.array([np.cos(0.9), np.sin(0.9), 0.0])
-    assert (link.start.R @ link.places["crank"].R)[:, 0] == pytest.approx(given, abs=1e-15)  # rounding of a rotation
+    assert (link.start.R @ link.placements["crank"].R)[:, 0] == pytest.approx(
+        given, abs=1e-15
+    )  # rounding of a rotation
     assert turned(mechanism)["rocker"] == pytest.approx(angles(0.9)[2], abs=1e-10)
 
 
@@ -130,7 +132,7 @@ def test_a_slider_crank_finds_both_ends_of_its_guide() -> None:
         start = {"joint": {"main": {"position": f"{a} rad"}, "guide": {"near": 0.4 * sign}}}
         mechanism = start_of(scene(bodies, joints, start=start))
         link = mechanism.links[mechanism.link_of["slider"]]
-        place = link.start.of(link.places["slider"]).p + mechanism.origin
+        place = link.start.of(link.placements["slider"]).p + mechanism.origin
         # loops are closed to 1e-11 of the mechanism's size
         assert place == pytest.approx([r * np.cos(a) + sign * np.sqrt(l**2 - (r * np.sin(a)) ** 2), 0, 0], abs=1e-10)
 

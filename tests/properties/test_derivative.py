@@ -13,17 +13,17 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.specialise import dual, straight
+from flexclear.pipeline.dynamics.specialise import dual, program
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.derivative import tangent
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Tape, UnsuitedError
-from flexclear.pipeline.dynamics.specialise.wiring import (
+from flexclear.pipeline.dynamics.specialise.topology import (
     RATES,
     RATES_CHANGE,
     STATE,
     STATE_CHANGE,
     start,
-    wiring,
+    topology_of,
 )
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties import tapes
@@ -46,22 +46,22 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarr
     begin[model.speeds] += 0.1 * random.normal(size=model.nv)
     w[y : y + model.ny] = begin
     keep_independent(model, h, y, dy, w.copy(), n.copy(), kernel)
-    laws = slice(h[m.LAW.place], h[m.LAW.place] + m.LAW.size * model.arrays.size(m.N_LAWS))
+    laws = slice(h[m.LAW.at], h[m.LAW.at] + m.LAW.size * model.arrays.size(m.N_LAWS))
     impacts = slice(h[m.LATCHED], h[m.LATCHED] + len(model.contacts))
     w[laws], w[impacts], n[n[m.MODE] :] = 0.1 * random.normal(size=laws.stop - laws.start), 0.1, closed
     df, dw = f * random.normal(size=len(f)), np.zeros(len(w))
     dw[laws], dw[impacts] = random.normal(size=laws.stop - laws.start), random.normal(size=len(model.contacts))
     direction = random.normal(size=model.ny) * np.maximum(np.abs(begin), 1e-3)
-    made = straight.program(kernel, wiring(model.arrays, h), longest=straight.LONGEST_DIFFERENTIATED)
+    made = program.program(kernel, topology_of(model.arrays, h), longest=program.LONGEST_DIFFERENTIATED)
 
     exact = {"f": f, "w": w.copy(), "n": n.copy(), "df": df, "dw": dw}
     exact["w"][vy : vy + model.ny] = direction
-    tapes.run(tangent(made, straight.LONGEST_DIFFERENTIATED), h, exact, y, dy, (vy, vdy))
+    tapes.run(tangent(made, program.LONGEST_DIFFERENTIATED), h, exact, y, dy, (vy, vdy))
     moved = {"f": f + 1j * STEP * df, "w": w + 1j * STEP * dw, "n": n.copy()}
     moved["w"][y : y + model.ny] += 1j * STEP * direction
     tapes.run(made, h, moved, y, dy, operations=tapes.COMPLEX)
     assert np.allclose(exact["w"][dy : dy + model.ny], moved["w"][dy : dy + model.ny].real, rtol=1e-9, atol=1e-9)
-    touch = slice(h[m.TOUCH.place], h[m.TOUCH.place] + m.TOUCH.size * len(model.contacts))
+    touch = slice(h[m.TOUCH.at], h[m.TOUCH.at] + m.TOUCH.size * len(model.contacts))
     dw[y : y + model.ny] = direction
     numbers, given = dual.seeded(w, dw[None, :]), dual.seeded(f, df[None, :])
     dual.plain(kernel)(h.tolist(), given, numbers, n.tolist(), y, dy)

@@ -91,8 +91,8 @@ def compiled(law: Any, t: float, piece: int) -> np.ndarray:
         np.zeros(m.INTEGERS + 1, dtype=np.int64),
     )
     f = np.concatenate([tables[m.PIECES].ravel(), np.array(tables[m.HARMONICS]).ravel()])
-    h[m.N_LAWS], h[m.LAW.place], h[m.PIECES.place], h[m.HARMONICS.place] = 1, 0, 0, tables[m.PIECES].size
-    h[m.PIECE_HARMONICS.place], n[m.ACTIVE], n[m.INTEGERS] = m.HEADER, m.INTEGERS, piece
+    h[m.N_LAWS], h[m.LAW.at], h[m.PIECES.at], h[m.HARMONICS.at] = 1, 0, 0, tables[m.PIECES].size
+    h[m.PIECE_HARMONICS.at], n[m.ACTIVE], n[m.INTEGERS] = m.HEADER, m.INTEGERS, piece
     w = np.zeros(3)
     LAWS_OF_TIME(np.concatenate([h, fractions]), f, w, n, t)
     return w

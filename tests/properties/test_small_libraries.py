@@ -16,8 +16,8 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee as scipy_order
 from flexclear.pipeline.core.numerics.rotations import cross, matrix_to_quaternion, quaternion_to_matrix, turned
 from flexclear.pipeline.dynamics.contact.restitution import root
 from flexclear.pipeline.dynamics.integrate.phi_functions import PHI_COUNT, phi_functions
+from flexclear.pipeline.dynamics.model.index_tables import reverse_cuthill_mckee
 from flexclear.pipeline.dynamics.model.interface_basis import _families
-from flexclear.pipeline.dynamics.model.wiring import reverse_cuthill_mckee
 from tests.properties.kernels import from_python
 
 

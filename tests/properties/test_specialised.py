@@ -1,4 +1,4 @@
-"""Straight code for one wiring computes what the kernels do, with any numbers, and is made again for no number."""
+"""Straight code for one topology computes what the kernels do, with any numbers, and is made again for no number."""
 
 from contextlib import suppress
 from ctypes import CFUNCTYPE, c_void_p
@@ -22,19 +22,19 @@ from flexclear.pipeline.dynamics.model import initial, selection
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_code
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
 from flexclear.pipeline.dynamics.specialise import dual
-from flexclear.pipeline.dynamics.specialise import straight as tracing
+from flexclear.pipeline.dynamics.specialise import program as tracing
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program
-from flexclear.pipeline.dynamics.specialise.straight import program
+from flexclear.pipeline.dynamics.specialise.program import program
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
+from flexclear.pipeline.dynamics.specialise.topology import topology_of
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
-from flexclear.pipeline.dynamics.specialise.wiring import wiring
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
 
@@ -45,9 +45,9 @@ ROUNDING = 1e-9
 
 
 def rates_kernel(model: Model) -> Any:
-    """The kernel that the straight code is made from."""
+    """The kernel that the specialised code is made from."""
     scope: dict[str, Any] = {}
-    exec(sources.straight(model.parts, ()).partition("WIRING")[0], scope)
+    exec(sources.specialised(model.parts, ()).partition("TOPOLOGY")[0], scope)
     return scope["rates"]
 
 
@@ -76,19 +76,19 @@ def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     model = tabulate(build(load_scene(TREE / "scenes/checks/pendulum.toml"), {}))
     monkeypatch.setattr(tracing, "LONGEST", 10)
     with pytest.raises(UnsuitedError, match="too long"):
-        program(rates_kernel(model), wiring(model.arrays, model.arrays.work_space(m.Room(2, 0)).h))
+        program(rates_kernel(model), topology_of(model.arrays, model.arrays.work_space(m.Room(2, 0)).h))
 
 
 def description_kernel(model: Model) -> Any:
     """The kernel of what is recorded of an evaluation."""
     scope: dict[str, Any] = {}
-    exec(sources.straight(model.parts, (), sources.DESCRIBED).partition("WIRING")[0], scope)
+    exec(sources.specialised(model.parts, (), sources.DESCRIBED).partition("TOPOLOGY")[0], scope)
     return scope["description"]
 
 
 def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
     """Of two work spaces, as share of the largest number of a stretch."""
-    stretches, worst = [*m.STRETCHES.values(), *(table.place for table in m.TABLES["w"])], 0.0
+    stretches, worst = [*m.STRETCHES.values(), *(table.at for table in m.TABLES["w"])], 0.0
     for begin, end in pairwise(sorted({int(h[index]) for index in stretches} | {len(one)})):
         a, b = one[begin:end], other[begin:end]
         worst = max(worst, float(np.abs(a - b).max(initial=0.0)) / max(1.0, float(np.abs(a).max(initial=0.0))))
@@ -99,7 +99,7 @@ def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
     """Places in w of all that steps read of an evaluation besides its rates."""
     sizes = {m.TOUCH: len(model.contacts), m.LOAD_BENDS: model.arrays.size(m.N_LOAD_BENDS)}
     sizes |= {m.NAMED[name]: model.arrays.size(m.SIZES["n_bearings"]) for name in ("bends", "bearing")}
-    stretches = {table.place: table.size * rows for table, rows in sizes.items()}
+    stretches = {table.at: table.size * rows for table, rows in sizes.items()}
     rows, kept = model.arrays.size(m.N_CLOSURE_ROWS), int(h[m.N_KEPT_ROWS])
     stretches |= {m.RESIDUAL: rows, m.RESIDUAL_RATE: rows, m.PIVOT: 1}
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[:kept]
@@ -122,9 +122,9 @@ def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPa
     kernel, described, start = rates_kernel(model), description_kernel(model), initial.start_state(model)
     space.w[y : y + model.ny] = start
     keep_independent(model, h, y, dy, space.w.copy(), space.n.copy(), kernel)
-    wired = wiring(model.arrays, h)
-    tape, whole = program(kernel, wired), program(kernel, wired, whole=True)
-    record = program(described, wired, describes=True)
+    topology = topology_of(model.arrays, h)
+    tape, whole = program(kernel, topology), program(kernel, topology, whole=True)
+    record = program(described, topology, describes=True)
     start[model.speeds] += 0.1 * np.random.default_rng(1).normal(size=model.nv)
     for closed in (0, 1):
 
@@ -160,9 +160,9 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pyte
     """A stroke with impacts, as exactly as its own tolerance tells, with equal events; so for what is too long."""
     alone = engine(integrator)
     with monkeypatch.context() as patch:
-        patch.setattr(straight_code, "INTERPRETED", True)
+        patch.setattr(specialised_code, "INTERPRETED", True)
         general = engine(integrator)
-    assert (alone.has_straight_code, general.has_straight_code) == (True, False)
+    assert (alone.has_specialised_code, general.has_specialised_code) == (True, False)
     straight, kernels = (integrate(one, consistent_start(one), silent) for one in (alone, general))
     assert alone.h[m.RATES] != alone.h[m.EVALUATE]
     assert straight.events["kind"].tolist() == kernels.events["kind"].tolist()
@@ -188,16 +188,16 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pyte
 def test_friction_of_ideal_joints_is_iterated_by_the_kernels_too(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, rates = load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), []
     for general in (False, True):
-        monkeypatch.setattr(straight_code, "INTERPRETED", general)
+        monkeypatch.setattr(specialised_code, "INTERPRETED", general)
         one = engine_of(scene, {}, silent)
-        assert one.has_straight_code == (not general)
+        assert one.has_specialised_code == (not general)
         rates.append(closure_rows.evaluate(one, consistent_start(one), one.start))
     assert apart(one.model, *rates) < ROUNDING
 
 
 def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tracing, "LONGEST", 10)
-    monkeypatch.setattr(straight_code, "_known", {})
+    monkeypatch.setattr(specialised_code, "_known", {})
     scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
         patch.setenv("FLEXCLEAR_KERNELS", folder)
@@ -205,7 +205,7 @@ def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeyp
         patch.setattr(files, "loaded", {})
         patch.setattr(functions, "loaded", files.loaded)
         one = engine_of(scene, {}, silent)
-        assert not one.has_straight_code
+        assert not one.has_specialised_code
         assert integrate(one, consistent_start(one), silent).time[-1] == 0.01
         made = sensitivities(scene, {}, silent, ["hinge.velocity.final"], ["load.gravity.acceleration.1"])
         # as long as it hangs still, its rate grows with gravity
@@ -227,7 +227,7 @@ def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
 
 
 @pytest.mark.parametrize("lanes", [1, 4])
-def test_equal_wirings_give_equal_code(lanes: int) -> None:
+def test_equal_topologies_give_equal_code(lanes: int) -> None:
     """The tape is written in one order, whatever the places of objects in memory are."""
 
     def where(builder: ir.IRBuilder, array: str) -> ir.AllocaInstr:
@@ -235,7 +235,7 @@ def test_equal_wirings_give_equal_code(lanes: int) -> None:
 
     def reported() -> str:
         model = tabulate(build(load_scene(TREE / "scenes/sps4/csj.toml"), {}))
-        made, builder = program(rates_kernel(model), wiring(model.arrays, model.arrays.h)), function()
+        made, builder = program(rates_kernel(model), topology_of(model.arrays, model.arrays.h)), function()
         Emitter(builder, made, lambda array, place, lane: where(builder, array), lanes, exact=lanes > 1).emit()
         return str(builder.module)
 
@@ -244,7 +244,7 @@ def test_equal_wirings_give_equal_code(lanes: int) -> None:
 
 def test_friction_of_ideal_joints_is_in_what_steps_evaluate_and_not_in_linear_analyses() -> None:
     parts = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {})).parts
-    assert "joint_friction" in sources.straight(parts, ())
+    assert "joint_friction" in sources.specialised(parts, ())
     assert "joint_friction" not in sources.rates(parts)
 
 

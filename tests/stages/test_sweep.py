@@ -69,7 +69,7 @@ def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Pat
 @pytest.fixture
 def evaluated_as_points(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs and sections evaluate as points do, each operation rounded as it is; else they differ by rounding."""
-    monkeypatch.setattr(engine, "Straight", partial(engine.Straight, exact=True))
+    monkeypatch.setattr(engine, "SpecialisedCode", partial(engine.SpecialisedCode, exact=True))
 
 
 @pytest.mark.usefixtures("evaluated_as_points")

@@ -102,7 +102,7 @@ def entry(
     return Entry({name: loaded[path.stem].address for name, path in files.items()})
 
 
-def straight(name: str, source: str, report: Callable[[str], None]) -> int:
+def specialised(name: str, source: str, report: Callable[[str], None]) -> int:
     """Return the address of specialised code for one topology; name and source: of `sources`; 0 when LLVM yields none.
 
     Raises UnsuitedError when code for several lanes, or with tangents, is impossible.

@@ -70,7 +70,7 @@ def _needed(scene: Scene) -> int:
 @cache
 def _composed(parts: Parts, scheme: Scheme, alone: bool) -> frozenset[str]:
     """Return the modules that the generated files of parts import; cached, since many scenes share them."""
-    texts = [*sources.sources(parts, scheme).values(), *sources.kernels(parts).values(), sources.straight(parts, ())]
+    texts = [*sources.sources(parts, scheme).values(), *sources.kernels(parts).values(), sources.specialised(parts, ())]
     texts += [] if alone else [sources.batched(parts, (), lanes=2), sources.tangent(parts, ())]
     return frozenset().union(*map(_reached, texts))
 

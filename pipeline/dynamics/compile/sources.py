@@ -31,7 +31,7 @@ from flexclear.pipeline.dynamics.effects import (
 from flexclear.pipeline.dynamics.effects.effect import PACKAGE, Effect
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.specialise.wiring import Wiring
+    from flexclear.pipeline.dynamics.specialise.topology import Topology
 
 DYNAMICS = "flexclear.pipeline.dynamics"
 #: modules of calls by address, and of functions assembled from LLVM code
@@ -164,42 +164,42 @@ def kernels(parts: Parts) -> dict[str, str]:
     return {"evaluate": file.calling("evaluate", "t, y, dy", formulas), "describe": described}
 
 
-def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bool = False) -> str:
+def specialised(parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False) -> str:
     """Return the source of specialised code for one topology.
 
     name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
     exact: True for the same bits as in each of several lanes.
     """
     file = _description(parts) if name == DESCRIBED else _equations(parts)
-    for taken in ("straight", "NAME"):
-        file.take(f"{DYNAMICS}.specialise.straight", taken)
+    for taken in ("llvm_text", "NAME"):
+        file.take(f"{DYNAMICS}.specialise.program", taken)
     options = {SPECIALISED: f"exact={exact}", WHOLE: "whole=True", DESCRIBED: "describes=True"}[name]
     level = 3 if name == SPECIALISED else 0
-    return _of_wiring(file, wiring, STRAIGHT, FILES, kernel=file.kernel, options=options, level=level)
+    return _of_topology(file, topology, ONE_TOPOLOGY, FILES, kernel=file.kernel, options=options, level=level)
 
 
-def batched(parts: Parts, wiring: Wiring, lanes: int) -> str:
+def batched(parts: Parts, topology: Topology, lanes: int) -> str:
     """Return the source of the function that advances several steppers of one topology (`compile.lanes`)."""
     file = _equations(parts)
     file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
-    return _of_wiring(file, wiring, LANES, lanes=lanes)
+    return _of_topology(file, topology, LANES, lanes=lanes)
 
 
-def tangent(parts: Parts, wiring: Wiring) -> str:
+def tangent(parts: Parts, topology: Topology) -> str:
     """Return the source of the right-hand side for one topology with its tangents."""
     file = _equations(parts)
     file.take(f"{DYNAMICS}.specialise", "batched")
     file.take(f"{DYNAMICS}.fields", "data")
     change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
-    return _of_wiring(file, wiring, CHANGES, law_changes=f"{file.take(PRESCRIBED, 'make_law_changes')}({change})")
+    return _of_topology(file, topology, CHANGES, law_changes=f"{file.take(PRESCRIBED, 'make_law_changes')}({change})")
 
 
-def _of_wiring(
-    file: Composition, wiring: Wiring, template: str, using: tuple[str, str] = CALLS, **values: object
+def _of_topology(
+    file: Composition, topology: Topology, template: str, using: tuple[str, str] = CALLS, **values: object
 ) -> str:
-    file.what += ", for one wiring"
-    function = template.format(wiring="".join(f"    {row},\n" for row in wiring), **values)
+    file.what += ", for one topology"
+    function = template.format(topology="".join(f"    {row},\n" for row in topology), **values)
     return file.text(function, _formulas(file.parts), using)
 
 
@@ -337,13 +337,13 @@ def _formulas(parts: Parts) -> str:
 
 
 # laws of time are not specialised: their pieces change with time, and their number with the scene's numbers
-STRAIGHT = """WIRING = (
-{wiring})
-files.assembles(__name__, NAME, lambda: straight({kernel}, WIRING, {options}), {level})
+ONE_TOPOLOGY = """TOPOLOGY = (
+{topology})
+files.assembles(__name__, NAME, lambda: llvm_text({kernel}, TOPOLOGY, {options}), {level})
 """
-CHANGES = """WIRING = (
-{wiring})
-law_changes, differentiated = {law_changes}, batched.differentiated(rates, WIRING)
+CHANGES = """TOPOLOGY = (
+{topology})
+law_changes, differentiated = {law_changes}, batched.differentiated(rates, TOPOLOGY)
 
 
 @calls.exported("evaluate")
@@ -356,9 +356,9 @@ def specialised(h, f, w, n, t, y, dy):
         differentiated(h, f, w, n, y, dy, k * d.f_change, k * d.w_change, y + k * size, dy + k * size)
     return 0
 """
-LANES = """WIRING = (
-{wiring})
-run = make_lanes(*batched.batched(rates, WIRING, {lanes}), {lanes})
+LANES = """TOPOLOGY = (
+{topology})
+run = make_lanes(*batched.batched(rates, TOPOLOGY, {lanes}), {lanes})
 
 
 @calls.exported("lanes")

@@ -25,7 +25,7 @@ class Effect:
     kinds: for a scene with the effect the kinds by which its code is composed, often none; None for other scenes.
     family: package below `dynamics` whose members these kinds are.
     named: family members that it names in a scene: family, name, and key path in the scene.
-    wiring, numbers: rows of its tables in h and f by table name (`memory`). A table in h adds a size ``n_<table>`` to
+    topology, numbers: rows of its tables in h and f by table name (`memory`). A table in h adds a size ``n_<table>`` to
     the header, a ledger the size ``<name>_slot``.  work: likewise in w, each after the number of its rows.
     stretches: arrays in w, each with its length, as `memory` writes them.
     compose: arguments that it adds to generated files, or replaces, by the point in `compile.sources` where it does so.
@@ -52,7 +52,7 @@ class Effect:
     kinds: Callable[[Scene], Iterable[str] | None]
     family: str = ""
     named: Callable[[Scene], Iterable[tuple[str, str, str]]] = lambda scene: ()
-    wiring: Mapping[str, str] = field(default_factory=dict)
+    topology: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, str] = field(default_factory=dict)
     work: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     stretches: tuple[str, ...] = ()
@@ -74,7 +74,7 @@ class Effect:
     @property
     def sizes(self) -> list[str]:
         """Names of the effect's sizes in the header."""
-        return [*(f"n_{table}" for table in self.wiring), *([f"{self.name}_slot"] if self.ledger else [])]
+        return [*(f"n_{table}" for table in self.topology), *([f"{self.name}_slot"] if self.ledger else [])]
 
     @property
     def modules(self) -> set[str]:

@@ -250,5 +250,6 @@ def acting(bench: Bench) -> np.ndarray:
     moments, forces = carried_wrenches(bench.engine)
     loads, touch = (bench.engine.table(table) for table in (m.LOAD, m.TOUCH))
     length = bench.model.length
-    pushes = [length * forces, length * loads["force"], touch["force"] * (length / arms(bench.model))[:, None]]
+    reach = length / arms(bench.model.mechanism)  # ends of angles have torques
+    pushes = [length * forces, length * loads["force"], reach[:, None] * touch["force"]]
     return np.concatenate([v.ravel() for v in [*pushes, moments, loads["moment"]]])

@@ -295,7 +295,7 @@ def _rounding(bench: Bench, at: Tangent) -> float:
 
 def _require_turning_frames(bench: Bench) -> None:
     """Raise SolverError for a body with bushings only: its coordinates do not move with the drives."""
-    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.places}
+    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.placements}
     for name, load in bench.scene.forces().items():
         mounted = loose & {frame.partition(".")[0] for frame in load.between} if isinstance(load, Bushing) else ()
         for body in mounted:

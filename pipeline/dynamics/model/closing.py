@@ -108,7 +108,7 @@ def close(
 def _rounding(mechanism: Mechanism) -> float:
     """Return the rounding of the largest coordinates of the scene, as a fraction of the mechanism's size."""
     reach = [mechanism.origin, *(link.start.p for link in mechanism.links)]
-    reach += [frame.place.p for frame in mechanism.frames.values()]
+    reach += [frame.placement.p for frame in mechanism.frames.values()]
     return float(np.finfo(float).eps * np.max(np.abs(reach)) / mechanism.length)
 
 

@@ -20,7 +20,6 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
-    from flexclear.pipeline.dynamics.model.model import Model
 
 #: default impact floor, far below approach speeds in common machines [m/s or rad/s]; and its ratio to the size of a
 #: mechanism of 10 cm [1/s]: in a mechanism of micrometres 1 um/s would be fast
@@ -122,7 +121,7 @@ def _reduced_mass(masses: Sequence[float]) -> float | None:
     return 1.0 / inverse if inverse > 0.0 else None
 
 
-def arms(model: Model) -> np.ndarray:
+def arms(mechanism: Mechanism) -> np.ndarray:
     """Return the factor that makes each contact's gap a length: 1, or the size [m] for ends of angles."""
-    turning = [getattr(contact.joint, "coordinate", None) for contact in model.contacts]
-    return np.array([model.length if one is not None and one.turning else 1.0 for one in turning])
+    turning = [getattr(contact.joint, "coordinate", None) for contact in mechanism.contacts]
+    return np.array([mechanism.length if one is not None and one.turning else 1.0 for one in turning])

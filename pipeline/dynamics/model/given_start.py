@@ -92,7 +92,7 @@ def given_links(mechanism: Mechanism) -> set[int]:
     return {0} | {
         i
         for i, link in enumerate(mechanism.links)
-        if any(getattr(bodies[name], "pose", None) is not None for name in link.group.places)
+        if any(getattr(bodies[name], "pose", None) is not None for name in link.group.placements)
     }
 
 
@@ -184,7 +184,7 @@ def corrected_starts(mechanism: Mechanism, now: Sequence[Placement]) -> list[str
         amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > INPUT_DIGITS else []
         if amounts:
             corrections.append(
-                (distance + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}")
+                (distance + turned, f"{', '.join(mechanism.links[i].group.placements)} {' and '.join(amounts)}")
             )
     if not corrections:
         return []

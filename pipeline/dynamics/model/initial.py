@@ -316,7 +316,7 @@ def centre_of(model: Model, name: str) -> Centre:
     i, body = model.mechanism.link_of[name], model.scene.body[name]
     link = model.links[i]
     if isinstance(body, RigidBody):
-        placement = link.places[name]
+        placement = link.placements[name]
         return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))

@@ -103,7 +103,7 @@ def _read_index(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort
     if sort == "frame":
         return numbering.site(mechanism.site(name))
     i = mechanism.link_of[name]
-    place = mechanism.links[i].places[name].of(Placement(np.array(scene.rigid()[name].com)))
+    place = mechanism.links[i].placements[name].of(Placement(np.array(scene.rigid()[name].com)))
     return numbering.site(Site(i, place, None))
 
 

@@ -267,7 +267,7 @@ def _refuse_motion(model: Model, twists: np.ndarray) -> None:
     """Raise InputError for a motion without mass; twists: of all links in this motion, (links, 6)."""
     sizes = np.abs(twists).max(axis=1)
     links = [link for link, size in zip(model.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
-    names = sorted({name for link in links for name in link.places})
+    names = sorted({name for link in links for name in link.placements})
     raise InputError(
         f"[body.{names[0]}.inertia]",
         f"the acceleration of {', '.join(names)} is undetermined: the joints allow a rotation about an axis "

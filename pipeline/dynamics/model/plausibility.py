@@ -29,7 +29,7 @@ def offsets(mechanism: Mechanism) -> Iterator[tuple[Contact, np.ndarray, Placeme
     for contact in mechanism.contacts:
         if contact.joint.type == STOP or contact.joint.type not in ROUND:
             continue
-        outer, inner = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+        outer, inner = (mechanism.links[s.link].start.of(s.placement) for s in (contact.outer, contact.inner))
         away = inner.p - outer.p
         if contact.joint.type == "clearance-revolute":
             away = away - (away @ outer.R[:, 2]) * outer.R[:, 2]
@@ -65,7 +65,7 @@ def refuse_overlap(mechanism: Mechanism) -> None:
             refuse_depth(scene, contact, depth)
     for contact in mechanism.contacts:
         if contact.joint.type == "ball-on-plane":
-            plane, ball = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+            plane, ball = (mechanism.links[s.link].start.of(s.placement) for s in (contact.outer, contact.inner))
             depth = contact.joint.radius - float((ball.p - plane.p) @ plane.R[:, 2])
             if depth > SAME_POINT * contact.joint.radius:
                 refuse_depth(scene, contact, depth)
@@ -130,5 +130,5 @@ def _position(mechanism: Mechanism, frame: str) -> np.ndarray:
     """Return the start position of a frame, from the kernels' origin [m]."""
     there = mechanism.frames[frame]
     link = mechanism.links[mechanism.link_of[there.body]]
-    position: np.ndarray = link.start.of(link.places[there.body]).point(there.place.p)
+    position: np.ndarray = link.start.of(link.placements[there.body]).point(there.placement.p)
     return position

@@ -13,8 +13,8 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.arrays import envelope_size
+from flexclear.pipeline.dynamics.model.index_tables import closure_envelope, threes
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.wiring import closure_envelope, threes
 
 #: rows below this fraction of their natural length are rounding: the square root of the rounding in a cancelling sum,
 #: 1e-13 at worst, with some digits to spare

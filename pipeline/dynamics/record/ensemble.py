@@ -27,7 +27,7 @@ from flexclear.pipeline.dynamics.model.contacts import arms
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
-from flexclear.pipeline.dynamics.run.evaluation import straight_code
+from flexclear.pipeline.dynamics.run.evaluation import specialised_code
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
@@ -82,7 +82,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     def run_member(k: int, alive: Progress, place: Place | None) -> Member:
         """Run a member with an engine of its own, so that the result does not depend on previous members."""
         mine = another(engine)
-        mine.straight.place = place
+        mine.specialised.place = place
         last, trajectory, switched = follow(mine, starts[k], alive, heir, judges and judges.run)
         return _member(last, trajectory, names) | {"switched": np.array(switched)}
 
@@ -118,10 +118,10 @@ def places_of(engine: Engine, members: int, threads: int, progress: Progress) ->
 
     Copies of the engine by `another` evaluate with the same bits in both cases.
     """
-    engine.straight.exact, rows = True, engine.selected.tobytes()
+    engine.specialised.exact, rows = True, engine.selected.tobytes()
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
     together = members >= FEW * threads and engine.staged
-    if together and straight_code.made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
+    if together and specialised_code.made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
         return Places(lanes, threads)
     engine.settle(progress)
     return None
@@ -137,7 +137,7 @@ def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
     """
     model = engine.model
     engine.attempt(start, engine.start)
-    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model)
+    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model.mechanism)
     clearance = min((joint.clearance for joint in model.scene.contacts().values()), default=0.0)
     pressed = max(least, depths[depths > 0.0].min(initial=np.inf))
     return Ensemble(perturbation=min(max(least, FRACTION_OF_CLEARANCE * clearance), FRACTION_OF_CLEARANCE * pressed))

@@ -12,14 +12,14 @@ from flexclear.pipeline.dynamics.model.model import Model
 def load_series(model: Model, seen: Observed) -> Variables:
     """Return forces and moments on the (second) frame, lengths and powers, with loads in the order of the scene."""
     force, moment = seen.loads["force"], seen.loads["moment"]
-    wiring = model.arrays.table(m.LOADS)
+    topology = model.arrays.table(m.LOADS)
     power = np.zeros(seen.loads.shape)
     for end, sign in (("a", -1.0), ("b", 1.0)):
-        held = wiring[end] >= 0
-        site = seen.sites[:, wiring[end][held]]
+        held = topology[end] >= 0
+        site = seen.sites[:, topology[end][held]]
         at_origin = site["velocity"] - np.cross(site["omega"], site["origin"])
         power[:, held] += sign * np.sum(site["omega"] * moment[:, held] + at_origin * force[:, held], axis=-1)
-    origin = seen.sites[:, wiring["b"]]["origin"]
+    origin = seen.sites[:, topology["b"]]["origin"]
     names = [name for name, _ in model.loads]
     shown = [names.index(name) for name in model.scene.forces()]
     series = {
@@ -44,8 +44,8 @@ def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndar
 
 def turning_loads(model: Model, names: list[str], *, measured: bool = False) -> list[bool]:
     """Return True for each load that acts along an angle; measured: for each whose measured coordinate is an angle."""
-    wiring, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
-    looks = np.where((wiring["measured"] >= 0) & measured, wiring["measured"], wiring["gauge"])
+    topology, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
+    looks = np.where((topology["measured"] >= 0) & measured, topology["measured"], topology["gauge"])
     rows = dict(zip((name for name, _ in model.loads), looks.tolist(), strict=True))
     return [rows[name] >= 0 and bool(gauges[int(rows[name])]["turning"]) for name in names]
 

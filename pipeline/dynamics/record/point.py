@@ -107,8 +107,8 @@ class Runner:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
         # exact: the number of points evaluated together depends on the machine and on their durations
-        engine.straight.exact = True
-        engine.straight.place = place
+        engine.specialised.exact = True
+        engine.specialised.place = place
         if in_sections(self.recorded):
             values, count = _sections(scene, engine, self.recorded, alive)
             return [values], count
@@ -149,7 +149,7 @@ class Runner:
         jacobian = offset_jacobian(engine, start)
         given = model.scene.ensemble or (None if self.scaled else Ensemble())
         offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.members)
-        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model)
+        per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model.mechanism)
         return [perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3)) for moved in offsets]
 
 

@@ -160,7 +160,7 @@ def _rank(matrix: np.ndarray) -> int:
 def _closure_jacobian(engine: Engine) -> np.ndarray:
     """Return the rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
     model, columns = engine.model, _columns(engine)
-    rows = engine.view(m.ROWS.place).reshape(-1, m.ROWS.size)
+    rows = engine.view(m.ROWS.at).reshape(-1, m.ROWS.size)
     J = np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), model.nv + len(model.drives)))
     closures, entries, support = (model.arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
     for c in closures:
@@ -177,7 +177,7 @@ def _closure_jacobian(engine: Engine) -> np.ndarray:
 
 def _columns(engine: Engine) -> np.ndarray:
     """Return the twists of all columns after an evaluation, shape (columns, 6)."""
-    return engine.view(m.COLUMNS.place).reshape(-1, m.COLUMNS.size)
+    return engine.view(m.COLUMNS.at).reshape(-1, m.COLUMNS.size)
 
 
 def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:

@@ -200,8 +200,8 @@ def follow(
         except StiffError as stiff:
             progress(None, f"{stiff}; continuing with {heir}")
             reasons.append(str(stiff))
-            straight, engine, left = engine.straight, other(heir), stiff.handover
-            engine.straight.exact = straight.exact
+            specialised, engine, left = engine.specialised, other(heir), stiff.handover
+            engine.specialised.exact = specialised.exact
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:

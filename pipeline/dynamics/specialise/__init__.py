@@ -1,1 +1,1 @@
-"""Specialised right-hand side of one topology: kernels run on symbols, and the operations become straight code."""
+"""Specialised right-hand side of one topology: kernels run on symbols, and the operations become specialised code."""

@@ -12,16 +12,16 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics.kernels import Kernel
-from flexclear.pipeline.dynamics.specialise import wiring as wired
+from flexclear.pipeline.dynamics.specialise import topology as topologies
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.derivative import tangent
-from flexclear.pipeline.dynamics.specialise.straight import LONGEST_DIFFERENTIATED, places, program
+from flexclear.pipeline.dynamics.specialise.program import LONGEST_DIFFERENTIATED, places, program
 
 _INTEGER = ir.IntType(64)
 
 
-def differentiated(rates: Callable, wiring: wired.Wiring) -> Any:
-    """Return run(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code: `straight`, with its tangent.
+def differentiated(rates: Callable, topology: topologies.Topology) -> Any:
+    """Return run(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code with its tangent.
 
     f0, w0: offsets in f and w of the changes of the numbers, and of those of laws, impact rates and contacts.
     change, rates_change: indices in w of the changes of the state and of its rates.
@@ -32,7 +32,7 @@ def differentiated(rates: Callable, wiring: wired.Wiring) -> Any:
         typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any, f0: Any, w0: Any, change: Any, rates: Any
     ) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            plain = program(kernel, wiring, longest=LONGEST_DIFFERENTIATED)
+            plain = program(kernel, topology, longest=LONGEST_DIFFERENTIATED)
             tape = tangent(plain, LONGEST_DIFFERENTIATED)
             Emitter(builder, tape, places(builder, tape, [values])).emit()
             return context.get_dummy_value()
@@ -43,14 +43,14 @@ def differentiated(rates: Callable, wiring: wired.Wiring) -> Any:
     return run
 
 
-def batched(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any]:
+def batched(rates: Callable, topology: topologies.Topology, lanes: int) -> tuple[Any, Any]:
     """Build compiled functions note(h, f, numbers, lane) and run(addresses, numbers).
 
     `run` evaluates several states, each of a mechanism with its own numbers, which `note` has copied to
     adjacent positions: `numbers` has room for all of f in all lanes.
     addresses: of all h, then of all f, w and n, then all indices of y and dy, shape (6 lanes,).
     """
-    traced = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
+    traced = cache(lambda: program(rates, topology))  # both functions are typed and written, and the tape is long
 
     @intrinsic
     def note(typingctx: Any, h: Any, f: Any, numbers: Any, lane: Any) -> Any:
@@ -58,7 +58,7 @@ def batched(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
             h, f, numbers, lane = values
             begins = dict[int, Any]()
             for k, index in enumerate(_numbers(traced())):
-                stretch, inside = wired.split(index)
+                stretch, inside = topologies.split(index)
                 if stretch not in begins:
                     begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
                 value = builder.load(builder.gep(begins[stretch], [_INTEGER(inside)]))

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.specialise import wiring as wired
+from flexclear.pipeline.dynamics.specialise import topology as topologies
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.rules import RULES
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape, Undecided
@@ -23,9 +23,9 @@ from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Loop, Sym
 #: largest number of operations of a tangent per operation of its tape
 LONGEST_TANGENT = 8
 #: work arrays in w, besides the state, with given changes
-GIVEN = {m.LAW.place, m.LATCHED}
+GIVEN = {m.LAW.at, m.LATCHED}
 #: work arrays in w, besides the rates, with stored changes
-STORED = {m.TOUCH.place}
+STORED = {m.TOUCH.at}
 
 
 def tangent(program: Program, longest: int) -> Program:
@@ -38,9 +38,9 @@ def tangent(program: Program, longest: int) -> Program:
     stores = [(array, forward.value(index), forward.value(value)) for array, index, value in program.stores]
     changes = list[tuple[str, Any, Any]]()
     for array, index, value in program.stores:
-        stretch, inside = wired.split(index) if array == "w" else (-1, 0)
-        if stretch == wired.RATES:
-            changes.append(("w", wired.start(wired.RATES_CHANGE) + inside, forward.change(value)))
+        stretch, inside = topologies.split(index) if array == "w" else (-1, 0)
+        if stretch == topologies.RATES:
+            changes.append(("w", topologies.start(topologies.RATES_CHANGE) + inside, forward.change(value)))
         elif stretch in STORED:
             changes.append(("dw", index, forward.change(value)))
     return Program(forward.tape.block, [*stores, *changes])
@@ -51,9 +51,9 @@ def _seed(tape: Tape, array: str, index: Any) -> Any:
     if array == "f":
         return tape.write(FLOAT, "load", "df", index)
     if array == "w" and not isinstance(index, Symbol):
-        stretch, inside = wired.split(index)
-        if stretch == wired.STATE:
-            return tape.write(FLOAT, "load", "w", wired.start(wired.STATE_CHANGE) + inside)
+        stretch, inside = topologies.split(index)
+        if stretch == topologies.STATE:
+            return tape.write(FLOAT, "load", "w", topologies.start(topologies.STATE_CHANGE) + inside)
         if stretch in GIVEN:
             return tape.write(FLOAT, "load", "dw", index)
     return 0.0

@@ -55,12 +55,12 @@ def _is_due(period: float, elapsed: float) -> bool:
 
 def require_controlled(model: Model, trajectory: Trajectory, seen: Observed) -> None:
     """Raise SolverError for a controlled coordinate far beyond the size of its reference and the mechanism."""
-    wiring, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
+    topology, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
     for k, (name, _) in enumerate(model.loads):
         load = model.scene.load.get(name)
         if not isinstance(load, (Pid, SampledPid)):
             continue
-        looked_at = wiring[k]["measured"] if wiring[k]["measured"] >= 0 else wiring[k]["gauge"]
+        looked_at = topology[k]["measured"] if topology[k]["measured"] >= 0 else topology[k]["gauge"]
         turning = bool(gauges[int(looked_at)]["turning"])
         law = pieces_of(load.reference, "angle" if turning else "length")
         asked = size(law, float(trajectory.time[0]), float(trajectory.time[-1]), 0)

@@ -7,7 +7,7 @@ from flexclear.pipeline.dynamics.effects.effect import Effect
 GEARS = Effect(
     "gears",
     lambda scene: () if scene.gear else None,
-    wiring={"couplings": "first second"},  # gauges of two joint coordinates; the second follows the first
+    topology={"couplings": "first second"},  # gauges of two joint coordinates; the second follows the first
     numbers={"coupling_numbers": "ratio offset"},  # second coordinate = ratio * first + offset
     compose={
         "closures": {"closures": "<equations.make_coupled_closing>({file.tree})"},

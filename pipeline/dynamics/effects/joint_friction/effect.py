@@ -22,7 +22,7 @@ JOINT_FRICTION = Effect(
     lambda scene: sorted({law for _, law, _ in _named(scene)}) or None,
     "contact.friction",
     _named,
-    wiring={
+    topology={
         # site_a, site_b: of its frames; link: the link whose inboard joint it is, or -1; reversed: 1 when that link is
         # on the side of the first frame; closure: its closure, or -1
         "rubbing": "site_a site_b link reversed closure entry0 n_entries momentum0 n_momenta column0 n_columns loop0 "

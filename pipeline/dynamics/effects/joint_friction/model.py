@@ -13,9 +13,9 @@ from flexclear.pipeline.dynamics.model.components import Floors, Group
 from flexclear.pipeline.dynamics.model.contacts import bristle, friction_law
 from flexclear.pipeline.dynamics.model.filling import Filling
 from flexclear.pipeline.dynamics.model.guards import Guard, speeds
+from flexclear.pipeline.dynamics.model.index_tables import closure_route, uncommon
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
-from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 Rows = list[tuple[int, ...]]
 BENDS = m.NAMED["bends"]
@@ -43,9 +43,9 @@ def guards(mechanism: Mechanism) -> Iterator[Guard]:
             row = bearing * BENDS.size
             yield from speeds(BENDS, row + BENDS.sliding, 3, law.kinks(joint.friction))
             if law.bristle(joint.friction) is not None:
-                yield (BENDS.place, row + BENDS.sliding, 3, -1, -1), 0.0, law.stick_speed(joint.friction)
+                yield (BENDS.at, row + BENDS.sliding, 3, -1, -1), 0.0, law.stick_speed(joint.friction)
             for pressing, count in PRESSES.items():
-                yield (BENDS.place, row + getattr(BENDS, pressing), count, -1, bearing), 0.0, 0.0
+                yield (BENDS.at, row + getattr(BENDS, pressing), count, -1, bearing), 0.0, 0.0
             bearing += 1
 
 

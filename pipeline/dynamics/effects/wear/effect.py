@@ -10,7 +10,7 @@ from flexclear.pipeline.dynamics.effects.effect import Effect
 WEAR = Effect(
     "wear",
     lambda scene: () if scene.worn() else None,
-    wiring={"worn": "contact"},  # contacts with wear
+    topology={"worn": "contact"},  # contacts with wear
     compose={"forces": {"contacts": "<contact.wearing>({file.given[contacts]})"}},
     changeable=("joint.wear",),
     fill="model:fill",

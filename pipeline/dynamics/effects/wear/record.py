@@ -19,10 +19,10 @@ def wear_series(model: Model, seen: Observed) -> Series:
     ledger, first = seen.state[:, model.speeds.stop :], model.arrays.size(m.SIZES["wear_slot"])
     rows = model.arrays.table(m.NAMED["worn"])["contact"]
     books = m.named(LEDGER, ledger[:, first : first + LEDGER.size * len(rows)])
-    wiring, offset = model.arrays.table(m.CONTACTS)[rows], seen.touch["offset"][:, rows]
+    topology, offset = model.arrays.table(m.CONTACTS)[rows], seen.touch["offset"][:, rows]
     length = np.linalg.norm(offset, axis=-1, keepdims=True)
     outer = np.divide(offset, length, out=np.zeros_like(offset), where=length > 0.0)
-    R_WO, R_WI = (seen.sites["axes"][:, wiring[side]] for side in ("outer", "inner"))
+    R_WO, R_WI = (seen.sites["axes"][:, topology[side]] for side in ("outer", "inner"))
     inner = np.einsum("tkji,tkjl,tkl->tki", R_WI, R_WO, outer)
     dims = ("time", "worn")
     return {

@@ -70,7 +70,7 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
     pivots[m.LAST_PIVOT] = ratio if better else present
     pivots[m.LEAST_PIVOT] = WORN * ratio if better else WORN * present
     if better:
-        engine.view(m.INDEPENDENCE.place)[:] = 0.0  # that of other rows
+        engine.view(m.INDEPENDENCE.at)[:] = 0.0  # that of other rows
         engine.control[[m.PASS_TIME, m.MOST_REACH, m.LEFT]] = NEVER, NEVER, 1.0
     return better
 

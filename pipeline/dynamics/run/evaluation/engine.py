@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.model.initial import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
-from flexclear.pipeline.dynamics.run.evaluation.straight_code import Straight, address, equations, made
+from flexclear.pipeline.dynamics.run.evaluation.specialised_code import SpecialisedCode, address, equations, made
 
 #: selections of closure rows with specialised steps, per integration
 SELECTIONS = 4
@@ -41,7 +41,7 @@ class Engine:
 
     h: topology with the selected rows.  w, n: floats and integers of the work array.  lengths: of the sections of w.
     selected: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
-    straight: specialised code for this topology.
+    specialised: specialised code for this topology.
     """
 
     model: Model
@@ -56,10 +56,10 @@ class Engine:
     start: float
     end: float
     rtol: float
-    straight: Straight
+    specialised: SpecialisedCode
 
     @property
-    def has_straight_code(self) -> bool:
+    def has_specialised_code(self) -> bool:
         """True when evaluations use code specialised for the topology."""
         return "evaluate" not in self.entry.addresses
 
@@ -120,9 +120,9 @@ class Engine:
 
     def connect(self) -> None:
         """Connect the functions for the selected rows: specialised code for the steps where it exists."""
-        rows, known = self.selected.tobytes(), self.straight
+        rows, known = self.selected.tobytes(), self.specialised
         alone = rows in known.rows
-        if self.has_straight_code:
+        if self.has_specialised_code:
             self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
         self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
@@ -130,7 +130,7 @@ class Engine:
     @property
     def staged(self) -> bool:
         """True when the engine can step together with others."""
-        return bool(self.method.staged and self.has_straight_code)
+        return bool(self.method.staged and self.has_specialised_code)
 
     def settle(self, progress: Progress) -> None:
         """Let further steps use specialised code for the selected rows, at a place together with other engines.
@@ -138,28 +138,28 @@ class Engine:
         The selections that the integration has met decide, so an interrupted integration continues with the same code
         as an uninterrupted one.
         """
-        straight, rows, changes = self.straight, self.selected.tobytes(), self.h[m.N_CHANGES]
-        if self.has_straight_code or changes:
-            if straight.place is not None and straight.group is None and self.staged:
-                where = made(self.model, self.h, rows, progress, lanes=straight.place.width, exact=straight.exact)
-                straight.group = straight.place.group(rows, where, len(self.model.arrays.f)) if where else None
-            if rows not in straight.rows and (len(straight.rows) < SELECTIONS or changes):
-                straight.rows.append(rows)
-            for met in straight.rows:
-                address(self.model, self.h, straight, met, progress=progress)
+        specialised, rows, changes = self.specialised, self.selected.tobytes(), self.h[m.N_CHANGES]
+        if self.has_specialised_code or changes:
+            if specialised.place is not None and specialised.group is None and self.staged:
+                where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
+                specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
+            if rows not in specialised.rows and (len(specialised.rows) < SELECTIONS or changes):
+                specialised.rows.append(rows)
+            for met in specialised.rows:
+                address(self.model, self.h, specialised, met, progress=progress)
         self.connect()
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row, in this thread."""
-        if self.has_straight_code:
-            self.h[m.DESCRIBE] = address(self.model, self.h, self.straight, self.selected.tobytes(), DESCRIBED)
+        if self.has_specialised_code:
+            self.h[m.DESCRIBE] = address(self.model, self.h, self.specialised, self.selected.tobytes(), DESCRIBED)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
         given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
         function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
-        group, record = self.straight.group, _record(outputs, rows, events)
+        group, record = self.specialised.group, _record(outputs, rows, events)
         if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
             group.advance(self.entry.addresses["advance"], [*self._arrays(), *record])
         else:
@@ -180,7 +180,7 @@ class Engine:
 
     def table(self, table: Any) -> np.ndarray:
         """Return a table of the work array with named fields, not copied, shape (rows,)."""
-        return m.named(table, self.view(table.place))
+        return m.named(table, self.view(table.at))
 
     @property
     def control(self) -> np.ndarray:
@@ -257,7 +257,9 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     solver, space = model.scene.solver, model.arrays.work_space(method.room)
     entry.connect(space.h)
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, solver.rtol, Straight())
+    engine = Engine(
+        model, entry, method, *space, selected, mobility, time.start, time.end, solver.rtol, SpecialisedCode()
+    )
     engine.control[m.LENGTH] = model.length
     engine.connect()
     return engine
@@ -266,8 +268,8 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
 def another(engine: Engine) -> Engine:
     """Return a new engine of the same model, in the state before any run."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
-    made.straight.exact = engine.straight.exact
-    made.straight.addresses = engine.straight.addresses.copy()
+    made.specialised.exact = engine.specialised.exact
+    made.specialised.addresses = engine.specialised.addresses.copy()
     return made
 
 

@@ -188,7 +188,7 @@ def handover(part: Engine, here: Moment) -> Handover:
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:
     """Return the moment at the end of a stretch from the work space."""
-    watched, events = part.view(m.WATCH.place).copy(), list[np.ndarray]()
+    watched, events = part.view(m.WATCH.at).copy(), list[np.ndarray]()
     table = m.named(m.WATCH, watched)
     for c in range(len(part.model.contacts)):
         if part.modes[c]:

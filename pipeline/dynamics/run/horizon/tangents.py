@@ -230,9 +230,9 @@ class _Jumps:
 
     def _starts(self, engine: Engine) -> np.ndarray:
         """Return the changes of the start times of laws' pieces, not copied, (directions, pieces)."""
-        begin, pieces = engine.h[m.PIECES.place] + m.PIECES.start, len(engine.model.arrays.table(m.PIECES))
+        begin, pieces = engine.h[m.PIECES.at] + m.PIECES.start, len(engine.model.arrays.table(m.PIECES))
         return self._numbers(engine)[:, begin : begin + m.PIECES.size * pieces : m.PIECES.size]
 
     def _touch(self, engine: Engine, c: int, offset: int) -> np.ndarray:
         """Return the changes of a field of a contact's row in TOUCH, (directions,)."""
-        return self._work(engine)[:, engine.h[m.TOUCH.place] + m.TOUCH.size * c + offset].copy()
+        return self._work(engine)[:, engine.h[m.TOUCH.at] + m.TOUCH.size * c + offset].copy()

@@ -130,7 +130,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
     """Return what prevents a smooth pass at speed, in words; nothing when the pass is smooth."""
     model = engine.model
     closed = [contact.name for contact, mode in zip(model.contacts, engine.modes, strict=True) if mode]
-    flexible = [name for link in model.links if link.flexible for name in link.places]
+    flexible = [name for link in model.links if link.flexible for name in link.placements]
     causes, remedies = list[str](), list[str]()
     if closed:
         causes.append(f"the closed contact of {', '.join(closed)}")

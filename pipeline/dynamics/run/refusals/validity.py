@@ -84,7 +84,7 @@ def doubts(engine: Engine) -> list[str]:
         # the last evaluation may be of a step that was rejected, at speeds that the motion never had
         engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
         coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
-        if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.place)))):
+        if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.at)))):
             return []
         time = engine.control[m.TIME : m.TIME + 1]
         return [text for body in flexibles(engine.model) for text in _judged(body, time, coordinates, frames)]

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: sizes of the header, then the rows of each table of h
-Wiring = tuple[tuple[int, ...], ...]
+Topology = tuple[tuple[int, ...], ...]
 #: tables that only laws of time, error norms and the record read
 LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
 SIZES = m.ADDRESSES[0]
@@ -25,7 +25,7 @@ STRETCH = 40
 STATE, RATES, STATE_CHANGE, RATES_CHANGE = range(m.HEADER + 1, m.HEADER + 5)
 
 
-def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
+def topology_of(arrays: Arrays, h: np.ndarray) -> Topology:
     """Return the topology in h, with the closure rows that its selection keeps."""
     sizes = h[:SIZES].copy()
     sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
@@ -39,11 +39,11 @@ def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
     return (tuple(sizes.tolist()), *tables)
 
 
-def header(wired: Wiring) -> list[int]:
+def header(topology: Topology) -> list[int]:
     """Return the array h of a topology, with work array numbers in place of all offsets in f and w."""
-    h = [*wired[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
-    for table, rows in zip(m.TABLES["h"], wired[1:], strict=True):
-        h[table.place] = len(h)
+    h = [*topology[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
+    for table, rows in zip(m.TABLES["h"], topology[1:], strict=True):
+        h[table.at] = len(h)
         h += rows
     return h
 
@@ -60,7 +60,7 @@ def start(stretch: int) -> int:
 
 def ground(h: list[int]) -> dict[int, Any]:
     """Return the entries of w for the ground, which no kernel changes: its frame, at rest, and zero inertia."""
-    frame, own = h[m.LINK_FRAMES.place], h[m.OWN.place]
+    frame, own = h[m.LINK_FRAMES.at], h[m.OWN.at]
     axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
     return {
         **{index: 0.0 for index in range(frame, frame + m.FRAME.size)},

@@ -23,18 +23,18 @@ from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.model.mobility import Mobility
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
-from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
+from flexclear.pipeline.dynamics.specialise.topology import Topology, topology_of
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
-_known: dict[tuple[Parts, Wiring, str, int, bool, bool], int] = {}
+_known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
 
 @dataclass
-class Straight:
+class SpecialisedCode:
     """Code for one topology (`Engine.settle`), shared by the engines of one work array.
 
     exact: whether one state and several at once must give the same bits.
@@ -59,18 +59,23 @@ def equations(model: Model, mobility: Mobility) -> dict[str, str]:
     """
     if INTERPRETED:
         return sources.kernels(model.parts)
-    wired = wiring(model.arrays, model.arrays.h)
+    topology = topology_of(model.arrays, model.arrays.h)
     names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
-    return {name: sources.straight(model.parts, wired, name) for name in names}
+    return {name: sources.specialised(model.parts, topology, name) for name in names}
 
 
 def address(
-    model: Model, h: np.ndarray, straight: Straight, rows: bytes, name: str = SPECIALISED, progress: Progress = silent
+    model: Model,
+    h: np.ndarray,
+    code: SpecialisedCode,
+    rows: bytes,
+    name: str = SPECIALISED,
+    progress: Progress = silent,
 ) -> int:
     """Return the address of specialised code for closure rows, by its name (`compile.sources`)."""
-    known = straight.addresses
+    known = code.addresses
     if (rows, name) not in known:
-        known[rows, name] = made(model, h, rows, progress, name, exact=straight.exact)
+        known[rows, name] = made(model, h, rows, progress, name, exact=code.exact)
     return known[rows, name]
 
 
@@ -88,16 +93,20 @@ def made(
     h, parts, of_steps = h.copy(), model.parts, name == SPECIALISED
     changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
     selection.write(model, h, np.frombuffer(rows, dtype=bool))
-    with _making:  # engines may run side by side
-        wired = wiring(model.arrays, h)
-        key = (parts, wired, name, lanes, exact, changes)
+    with _making:  # engines may run concurrently
+        topology = topology_of(model.arrays, h)
+        key = (parts, topology, name, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
-                source = sources.batched(parts, wired, lanes)
+                source = sources.batched(parts, topology, lanes)
             else:
-                source = sources.tangent(parts, wired) if changes else sources.straight(parts, wired, name, exact=exact)
+                source = (
+                    sources.tangent(parts, topology)
+                    if changes
+                    else sources.specialised(parts, topology, name, exact=exact)
+                )
             try:
-                _known[key] = functions.straight(name, source, partial(progress, None))
+                _known[key] = functions.specialised(name, source, partial(progress, None))
             except UnsuitedError:
                 if changes:
                     raise
