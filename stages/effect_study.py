@@ -100,7 +100,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     progress(None, "comparing")
     dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
-    return result | effect_sizes.chart("effects", dataset, f"What each effect does: {params['title']}")
+    return result | effect_sizes.chart("effects", dataset, f"Effect sizes: {params['title']}")
 
 
 def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -118,4 +118,4 @@ def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     result: dict[str, Any] = {"nc": results} | files("matters", matters.table(results))
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
     shown = listed.assign_coords(effect=listed["words"].values)
-    return result | effect_sizes.chart("matters", shown, f"What each effect does: {params['title']}")
+    return result | effect_sizes.chart("matters", shown, f"Effect sizes: {params['title']}")

@@ -63,16 +63,16 @@ def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     data = answer.dataset()
     if name == "accuracy":
         caption = "Error against processor time; the star is this scene"
-        return ShownAnswer("What accuracy costs", sentences(data), "accuracy.png", caption)
+        return ShownAnswer("Accuracy against cost", sentences(data), "accuracy.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
         caption = "Errors of energy and loops over time, and their limits"
         table = prose(("check", *columns), rows)
-        return ShownAnswer("Is it stable", data.attrs["answer"], "stability.png", caption, table)
+        return ShownAnswer("Is the integration stable", data.attrs["answer"], "stability.png", caption, table)
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
-    caption = "Change of each quantity without the effect; thin lines: what of it may be chance"
+    caption = "Change of each quantity without the effect; thin lines: part that may be due to chance"
     text, table = matters.sentence(data, requested), scenes.tables(answer, "matters.md")
     return ShownAnswer("Which effects matter", text, "matters.png", caption, table)
 
@@ -92,7 +92,7 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool
     else:
         answer = getattr(Answers(scene, workplace, given, questions=1), name)
     if answer is None:
-        raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
+        raise InputError(str(scene.path or scene.name), "has no effect that can be removed, or [view] watch is empty")
     words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
     return answered(answer.dataset(), words.text, picture, words.table)

@@ -169,11 +169,11 @@ REFUSED: dict[str, tuple[Table, tuple[str, ...]]] = {
     ),
     "against a pose": (
         without_drive(driven(0.9, 0.9)) | {"start": {"joint": {"j0": {"position": 1.5}}}},
-        ("[start.joint.j0.position]", "0.9 rad in the poses given", "1.5 rad by its own start", "leave out the poses"),
+        ("[start.joint.j0.position]", "0.9 rad in the given poses", "1.5 rad by its own start", "remove the poses"),
     ),
     "out of reach": (
         without_drive(loose(0.9, joint={"j3": {"position": 0.2}})),
-        ("[start.joint.j3.position]", "not at the positions given", "for example, at j3"),
+        ("[start.joint.j3.position]", "at the given positions", "for example at j3"),
     ),
     "no flexible body": (
         loose(0.9, modal={"crank": {"coordinate": [1.0]}}),
@@ -182,7 +182,7 @@ REFUSED: dict[str, tuple[Table, tuple[str, ...]]] = {
     "elsewhere": (loose(0.9, at="rest"), ("start.at", "equilibrium")),
     "deformed twice": (
         loose(0.9, at="equilibrium", modal={"rod": {"coordinate": [1.0]}}),
-        ("start", "modal.rod.coordinate: give one of them"),
+        ("start", "modal.rod.coordinate both determine the deformation"),
     ),
 }  # fmt: skip
 
@@ -208,7 +208,9 @@ def test_lengths_that_cannot_meet_where_the_drive_is_are_refused() -> None:
     """With the crank turned away its pin is 0.7 m from the pivot, and coupler and rocker reach 0.55 m."""
     table = loose(np.pi)
     table["body"]["rocker"]["frames"]["far"] = frame((0.15, 0.0, 0.0))
-    with pytest.raises(InputError, match=r"\[drive.motor.law\]: the joints fit together, but not where the drives"):
+    with pytest.raises(
+        InputError, match=r"\[drive.motor.law\]: the joints can be assembled, but not at the positions of the drives"
+    ):
         start_of(table)
 
 
@@ -216,5 +218,7 @@ def test_a_second_drive_out_of_reach_is_distinguished_from_joints_that_do_not_fi
     """From the poses given: the rocker's drive begins where the crank's does not let it."""
     table = driven(0.9, 0.9)
     table["drive"]["far"] = {"joint": "j3", "law": angles(0.9)[2] + 0.01}
-    with pytest.raises(InputError, match=r"\[drive\.\w+\.law\]: the joints fit together, but not where the drives"):
+    with pytest.raises(
+        InputError, match=r"\[drive\.\w+\.law\]: the joints can be assembled, but not at the positions of the drives"
+    ):
         start_of(table)

@@ -198,7 +198,7 @@ def test_a_repeated_law_starts_over_and_goes_on_after_its_last_period() -> None:
 
 def test_a_repeated_law_must_cover_its_period() -> None:
     short = {"type": "repeated", "period": 0.8, "times": 2, "start": 0.1, "law": {"type": "spline", **CYCLE}}
-    with pytest.raises(ValueError, match=r"known between 0.1 and 0.6 s only, not over its period from 0.1 to 0.9 s"):
+    with pytest.raises(ValueError, match=r"defined between 0.1 and 0.6 s only, not over its period from 0.1 to 0.9 s"):
         pieces(TypeAdapter(Law).validate_python(short))
 
 

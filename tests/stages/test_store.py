@@ -115,7 +115,7 @@ def test_a_failed_read_back_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     path = tmp_path / "a.bin"
     publish(path, b"old")
     monkeypatch.setattr(Path, "read_bytes", lambda self: b"not what was written")
-    with pytest.raises(OSError, match="does not read back"):
+    with pytest.raises(OSError, match="cannot be read back"):
         publish(path, b"new")
     monkeypatch.undo()
     assert path.read_bytes() == b"old"
@@ -237,7 +237,7 @@ def test_what_is_shown_shares_no_bytes_with_the_cache(store: Store, said: list[s
     assert shown.read_bytes() == kept.read_bytes()
     assert shown.with_name("run.edited.nc").read_bytes() == kept.read_bytes() + b"edited"
     (reported,) = said
-    assert "run.nc was edited; the edit is stored as run.edited.nc" in reported
+    assert "run.nc was edited; the edited file is now run.edited.nc" in reported
 
 
 def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Store, said: list[str]):

@@ -75,4 +75,4 @@ def changed(before: Scene, after: Scene) -> str:
         if (frames := list(after.rigid()[body].frames.items()))
     }
     moved = ", ".join(f"{body} by up to {size:.2g} m" for body, size in away.items() if size > 0.0)
-    return f"frames were moved within their frame_tolerance so that the joints fit: {moved}"
+    return f"frames were moved within their frame_tolerance to assemble the joints: {moved}"

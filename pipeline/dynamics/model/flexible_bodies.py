@@ -93,7 +93,7 @@ def shortening(mechanism: Mechanism, link: int, frame: str | None = None) -> np.
     if "frame_shortening" not in bundle:
         raise InputError(
             f"[body.{body}.stiffening]",
-            "the bundle of its mesh says nothing about the shortening of a bent body",
+            "the bundle of its mesh has no shortening of bent bodies",
             "stiffening is for beams; remove it",
         )
     if frame is None:

@@ -387,6 +387,6 @@ def require_bodies(scene: Scene) -> None:
         if scene.joint and name not in held:
             raise InputError(
                 f"[body.{name}]",
-                f"'{name}' is joined to nothing: no joint, load or path names a frame of it",
-                'join it to another body; if it is to fly freely, add a joint of type "free"',
+                f"'{name}' is not connected: no joint, load or path names a frame of the body",
+                'connect it to another body, or add a joint of type "free"',
             )

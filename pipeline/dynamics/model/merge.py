@@ -138,7 +138,7 @@ def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group],
             angle = np.degrees(np.arccos(np.clip((np.trace(A.R.T @ B.R) - 1.0) / 2.0, -1.0, 1.0)))
             raise InputError(
                 f"[joint.{name}.between]",
-                f"other fixed joints hold '{joint.between[0]}' and '{joint.between[1]}' "
+                f"other fixed joints place '{joint.between[0]}' and '{joint.between[1]}' "
                 f"{np.linalg.norm(A.p - B.p):.3g} m and {angle:.3g} deg apart",
                 "remove a fixed joint, or correct the frames",
             )
@@ -201,14 +201,14 @@ def start_places(
                 raise InputError(
                     f"[body.{name}.pose]",
                     "contradicts the poses of the bodies that it is fixed to",
-                    "give one body of a rigid group its pose; the others follow",
+                    "give only one body of a rigid group a pose",
                 )
             known.setdefault(i, here)
     _propagate(scene, group_of, frames, groups, known)
     missing = [groups[i].host for i in range(len(groups)) if i not in known]
     if missing:
         raise InputError(
-            f"[body.{missing[0]}.pose]", f"nothing says where {', '.join(missing)} start", "give a pose, or a joint"
+            f"[body.{missing[0]}.pose]", f"{', '.join(missing)} have no start pose", "give poses, or joints"
         )
     return [known[i] for i in range(len(groups))]
 

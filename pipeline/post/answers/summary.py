@@ -53,7 +53,7 @@ def _effects(compared: xr.Dataset) -> list[str]:
         difference, error = float(last["difference"][j]), float(first["error"][j]) + float(last["error"][j])
         if np.isfinite(difference):
             unit = str(compared["unit"].values[j])
-            text = f"differs by <b class='n'>{measured(difference, np.nan, unit)}</b>; how exact that is is not known"
+            text = f"differs by <b class='n'>{measured(difference, np.nan, unit)}</b>; its error is unknown"
             if np.isfinite(error):
                 size = float(first["largest"][j])
                 text = in_words(Influence(difference, error), size, unit, of="the ideal mechanism")
@@ -80,7 +80,7 @@ def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
         return []
     end, horizon = float(run["time"].values[-1]), float(run["horizon"])
     later = (
-        " Later values are those of this one run; use averages over several runs (<code>[ensemble]</code>) there."
+        " Later values hold for this run only; use averages over several runs (<code>[ensemble]</code>)."
         if min(horizon, end if members is None else members) < end
         else ""
     )

@@ -89,7 +89,7 @@ def _coupling(mechanism: Mechanism, name: str) -> Coupling:
     kinds = (first.coordinate.turning, second.coordinate.turning)
     ratio = measured(gear.ratio, dimensions.get(kinds, "angle per length"), f"[gear.{name}.ratio]")
     if ratio == 0.0:
-        raise InputError(path, "its ratio is 0: the second coordinate would be held", "give a ratio, or drive it")
+        raise InputError(path, "its ratio is 0, which would hold the second coordinate", "give a ratio, or drive it")
     return Coupling(name, ratio, second, first)
 
 

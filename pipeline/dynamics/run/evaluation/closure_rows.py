@@ -107,7 +107,7 @@ def diagnosis(engine: Engine) -> str:
         return "no loop is closed"
     J = scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
     if not J.size:
-        return "no closure holds anything that the tree's joints leave free"
+        return "the closures constrain no free coordinate of the tree"
     if not np.isfinite(J).all():
         return "the closures cannot be evaluated"
     U, values, _ = np.linalg.svd(J)
