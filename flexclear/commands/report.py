@@ -172,7 +172,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
 def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
     """Return the answers that succeed, by name; report why another one fails."""
     result = {}
-    for name in ("accuracy", "stability", "matters") if answers.questions else ("stability",):
+    for name in ("accuracy", "stability", "effects") if answers.questions else ("stability",):
         try:
             answer = getattr(answers, name)
         except (InputError, SolverError, FailedTasksError) as error:
@@ -200,7 +200,7 @@ def _page(
     run: xr.Dataset | None,
     answers: Mapping[str, Made],
 ) -> bytes:
-    from flexclear.pipeline.post.answers.matters import ideal_sentences
+    from flexclear.pipeline.post.answers.effect_ranking import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
     from flexclear.pipeline.post.single_run.series import parameters
 
@@ -231,7 +231,7 @@ def _page(
     ]
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
-    changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
+    changes = ideal_sentences(answers["effects"].dataset()) if "effects" in answers else []
     return page(scene.title, lead, parts, answer(dataset, run, warnings, changes, members))
 
 
