@@ -40,7 +40,7 @@ AHEAD = 2
 MEANS = 1e-7
 #: numbers of members with which effects are compared; they rise until the difference is decided or the budget is used
 MEMBERS = (4, 8, 16, 32)
-#: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.matters`
+#: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.effect_ranking`
 IDEAL = "clearance and flexibility"
 
 
@@ -56,8 +56,8 @@ class ShownAnswer:
 
 
 def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
-    """Return heading, text, picture and table of the answer called accuracy, stability or matters."""
-    from flexclear.pipeline.post.answers import matters
+    """Return heading, text, picture and table of the answer called accuracy, stability or effects."""
+    from flexclear.pipeline.post.answers import effect_ranking
     from flexclear.pipeline.post.cost.answer import sentences
 
     data = answer.dataset()
@@ -73,8 +73,8 @@ def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
     caption = "Change of each quantity without the effect; thin lines: part that may be due to chance"
-    text, table = matters.sentence(data, requested), scenes.tables(answer, "matters.md")
-    return ShownAnswer("Which effects matter", text, "matters.png", caption, table)
+    text, table = effect_ranking.sentence(data, requested), scenes.tables(answer, "effect_ranking.md")
+    return ShownAnswer("Which effects matter", text, "effect_ranking.png", caption, table)
 
 
 def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
@@ -167,7 +167,7 @@ class Answers:
         return self.workplace.made(task)[0]
 
     @cached_property
-    def matters(self) -> Made | None:
+    def effects(self) -> Made | None:
         """Return which effects matter (`stages.effect_study`); None for a scene without effects or watches."""
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
@@ -197,7 +197,7 @@ class _Comparison:
 
     def task(self) -> Task:
         """Run the points that the budget allows and return the task of the answer."""
-        from flexclear.pipeline.post.answers.matters import Pair, undecided
+        from flexclear.pipeline.post.answers.effect_ranking import Pair, undecided
 
         levels = MEMBERS if self._has_contacts("") else (0,)
         waiting = names = self._affordable(list(self._removed), levels[0])

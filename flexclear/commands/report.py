@@ -177,7 +177,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
 def _answers(answers: Answers, workplace: Workplace) -> tuple[dict[str, Made], dict[str, int]]:
     """Return the answers that succeed, and the exit codes of the others, whose errors it reports; by name."""
     result, failed = dict[str, Made](), dict[str, int]()
-    for name in ("accuracy", "stability", "matters") if answers.questions else ("stability",):
+    for name in ("accuracy", "stability", "effects") if answers.questions else ("stability",):
         try:
             answer = getattr(answers, name)
         except FlexclearError as error:
@@ -206,7 +206,7 @@ def _page(
     run: xr.Dataset | None,
     answers: Mapping[str, Made],
 ) -> bytes:
-    from flexclear.pipeline.post.answers.matters import ideal_sentences
+    from flexclear.pipeline.post.answers.effect_ranking import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
     from flexclear.pipeline.post.single_run.series import parameters
 
@@ -237,7 +237,7 @@ def _page(
     ]
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
-    changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
+    changes = ideal_sentences(answers["effects"].dataset()) if "effects" in answers else []
     return page(scene.title, lead, parts, answer(dataset, run, warnings, changes, members))
 
 

@@ -433,5 +433,5 @@ def test_where_no_accuracy_has_a_plan_the_command_ends_with_the_reason(tmp_path:
         raise InputError("[accuracy] tip.position", "is a relative accuracy, but the quantity is constant")
 
     monkeypatch.setattr(plan, "bring", refused)
-    with pytest.raises(InputError, match="constant in the ideal mechanism"):
+    with pytest.raises(InputError, match="the quantity is constant"):
         plan.levels(load_scene(write("slider-crank", tmp_path)[0]), open_workplace())

@@ -12,7 +12,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.matters import in_words
+from flexclear.pipeline.post.answers.effect_ranking import in_words
 from flexclear.pipeline.post.answers.stability import ENERGY, lost_energy
 from flexclear.pipeline.post.overview.curves import impacts, measured
 from flexclear.pipeline.post.single_run.series import parameters, sentence
@@ -30,7 +30,7 @@ def answer(
     """Return a list of sentences, as HTML.
 
     compared: of `overview.comparison`, the ideal counterpart first and the scene last; or None. run: schema RUN of the
-    scene.  warnings: of the run.  changes: sentences of `post.answers.matters` on the differences from the ideal
+    scene.  warnings: of the run.  changes: sentences of `post.answers.effect_ranking` on the differences from the ideal
     mechanism; they replace those from two runs alone.  members: horizon of the scene's ensemble [s], or None.
     """
     sentences = [] if compared is None else [*changes] or _effects(compared)

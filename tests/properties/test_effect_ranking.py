@@ -5,7 +5,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.matters import (
+from flexclear.pipeline.post.answers.effect_ranking import (
     IDEAL,
     Pair,
     assemble,
