@@ -126,7 +126,7 @@ def test_a_pose_that_contradicts_a_drive_is_refused_with_both_values() -> None:
         "joint 'j0'",
         "1.5 rad in the given poses",
         "0.9 rad by the law",
-        "0.6 rad apart",
+        "differ by 0.6 rad",
     ):
         assert words in str(error.value)
 

@@ -89,8 +89,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     reference = runs[next(p.key for p in points if p.group == "reference")]
     if "refused" in reference.attrs:
         raise SolverError(
-            f"no reference: the reference run ({_described(points, 'reference')}) is refused: "
-            f"{reference.attrs['refused']}"
+            f"no comparison: the reference ({_described(points, 'reference')}) is refused: {reference.attrs['refused']}"
         )
     until = comparable_until(points, runs)
     scales = {q: quantities.scale(reference, q) for q in chosen}
