@@ -145,12 +145,10 @@ def scene(p: Parameters, rtol: float | None = None) -> Scene:
 
 def layout(nearness: float) -> Layout:
     """Return the joints on two circles; nearness 0: angles of the scene, 1: aligned squares, which are singular."""
-    angles = np.deg2rad([own + nearness * (SINGULAR - own) for own in (ANGLE_A, ANGLE_B)])
-    (ax, ay), (bx, by) = (
-        radius * np.array([np.cos(angle), np.sin(angle)])
-        for radius, angle in zip((RADIUS_A, RADIUS_B), angles, strict=True)
-    )
-    return Layout(float(ax), float(ay), float(bx), float(by), HEIGHT)
+    a, b = np.deg2rad([own + nearness * (SINGULAR - own) for own in (ANGLE_A, ANGLE_B)])
+    joints = RADIUS_A * np.cos(a), RADIUS_A * np.sin(a), RADIUS_B * np.cos(b), RADIUS_B * np.sin(b)
+    ax, ay, bx, by = map(float, joints)
+    return Layout(ax, ay, bx, by, HEIGHT)
 
 
 def _contact(joint: Mapping[str, Any], p: Parameters) -> dict[str, Any]:

@@ -178,7 +178,7 @@ def _sensed(engine: Engine, rows: np.ndarray, body: str) -> Samples:
     """Return position and velocity of a rigid body's centre of mass from the rows that the integration recorded."""
     model = engine.model
     link = model.mechanism.link_of[body]
-    frame, place = frames(engine, rows)[:, link], model.links[link].places[body]
+    frame, place = frames(engine, rows)[:, link], model.links[link].placements[body]
     arm = frame["axes"] @ (place.p + place.R @ np.array(model.scene.body[body].com))  # type: ignore[union-attr]
     position = frame["origin"] + arm + model.mechanism.origin
     return Samples(rows[:, 0], position, frame["velocity"] + np.cross(frame["omega"], arm))

@@ -135,7 +135,7 @@ def _add_rigid(model: Model, place: grouping.Placement, mass: float, J: np.ndarr
 
 
 def _rigid_body(model: Model, scene: Scene, i: int) -> None:
-    mass, com, J = grouping.rigid_inertia(scene, model.groups[i].places)
+    mass, com, J = grouping.rigid_inertia(scene, model.groups[i].placements)
     model.bodies.append(_add_rigid(model, model.starts[i].of(grouping.Placement(com)), mass, J))
     model.centres.append(com)
 
@@ -213,7 +213,7 @@ def _marker(model: Model, frame: str, turn: np.ndarray | None = None) -> Any:
     f = model.frames[frame]
     i, turn = model.group_of[f.body], np.eye(3) if turn is None else turn
     if not model.groups[i].flexible:
-        place = model.groups[i].places[f.body].of(f.place)
+        place = model.groups[i].placements[f.body].of(f.placement)
         here = _transformation(place.p - model.centres[i], place.R @ turn)
         return model.system.AddMarker(model.parts.MarkerBodyRigid(bodyNumber=model.bodies[i], localHT=here))
     k = list(model.bundles[f.body]["frame"].values).index(frame.partition(".")[2])
@@ -222,7 +222,7 @@ def _marker(model: Model, frame: str, turn: np.ndarray | None = None) -> Any:
             bodyNumber=model.bodies[i],
             meshNodeNumbers=list(range(6 * k, 6 * k + 6)),
             weightingFactors=[1.0 / 6.0] * 6,
-            localHT=_transformation(np.zeros(3), f.place.R @ turn),
+            localHT=_transformation(np.zeros(3), f.placement.R @ turn),
         )
     )
 
@@ -267,7 +267,10 @@ def _driven(model: Model, a: str, b: str, law: Pieces) -> None:
     add, parts = model.system.AddObject, model.parts
     f, g = model.frames[a], model.frames[b]
     i, j = model.group_of[f.body], model.group_of[g.body]
-    inner, outer = model.groups[i].places[f.body].of(f.place), model.groups[j].places[g.body].of(g.place)
+    inner, outer = (
+        model.groups[i].placements[f.body].of(f.placement),
+        model.groups[j].placements[g.body].of(g.placement),
+    )
     body, point, end = model.bodies[j], outer.p - model.centres[j], None
     if model.groups[j].flexible:
         mass = SLIDE_SHARE * float(model.bundles[g.body]["mass"])
@@ -382,7 +385,7 @@ def solve(here: Mechanism, body: str, method: str, step: float, sampling: float)
     model = build(here.scene, here.bundles)
     i = model.group_of[body]
     centre = np.array(here.scene.body[body].com)  # type: ignore[union-attr]
-    place = model.groups[i].places[body]
+    place = model.groups[i].placements[body]
     sensors = [
         model.system.AddSensor(
             model.parts.SensorBody(

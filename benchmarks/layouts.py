@@ -15,6 +15,7 @@ and the other three numbers of a layout, ay, bx, by, are free. Table 8 prints th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations, product
 from typing import Any
 
@@ -116,28 +117,29 @@ def jacobians(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> np.nda
     return np.concatenate([n[:, :, 2:], np.cross(r, n)], axis=2)
 
 
-def answer(layout: Layout, stroke: float = STROKE) -> Answer:
+@cache
+def answer(layout: Layout) -> Answer:
     """Return the response of a layout; raise ValueError where the legs do not reach over the stroke."""
-    heights, angles = poses(layout, np.linspace(0.0, stroke, PLACES))
+    heights, angles = poses(layout, np.linspace(0.0, STROKE, PLACES))
     J = jacobians(layout, heights, angles)
     moves = np.abs(np.linalg.inv(J)[:, :, 0]).max(axis=0)
     condition = np.linalg.cond(J @ np.diag([1.0, 1.0 / SCALE, 1.0 / SCALE, 1.0 / SCALE])).max()
     # in a pose turned about y alone the angle asin R[0, 2] changes at the rate of the rotation about y
     motion = float(moves[0]), float(moves[2]), float(np.ptp(heights)), float(np.abs(angles).max())
-    return Answer(*motion, float(condition), _room(layout, heights, angles))
+    return Answer(*motion, float(condition), _clear_distance(layout, heights, angles))
 
 
-def _room(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> float:
+def _clear_distance(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> float:
     """Return the least distance between the axes of two legs, or of a leg and the central chain [m]."""
     up = np.array([0.0, 0.0, 1.0])
     tops = turned(layout, angles) + up * heights[:, None, None]
     below, above = np.broadcast_to(-up, (len(heights), 3)), up * heights[:, None]
     feet = np.broadcast_to(layout.B, tops.shape)
     bars = [(feet[:, k], tops[:, k]) for k in range(4)] + [(below, above)]
-    return min(_apart(*one, *other) for one, other in combinations(bars, 2))
+    return min(_distance(*one, *other) for one, other in combinations(bars, 2))
 
 
-def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
+def _distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
     """Return the least distance of segments a-b and c-d, pairs of rows (n, 3): inside both, or from an end of one."""
     u, v, w = b - a, d - c, a - c
     uu, uv, vv, uw, vw = (np.sum(x * y, axis=1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
@@ -170,14 +172,6 @@ FIRST = Layout(0.086603, 0.05, 0.1, 0.173205, 0.35)
 AGREES = 1e-3
 
 
-@dataclass(frozen=True)
-class Member:
-    """A layout of the family and its response."""
-
-    layout: Layout
-    answer: Answer
-
-
 def fitted(ay: float, bx: float, by: float) -> Layout:
     """Return the layout with Table 8's sensitivities at the start and these three free numbers [m]."""
     ax, upright = DZ / DANGLE, 1.0 / (4.0 * DZ)
@@ -195,7 +189,7 @@ def admissible(layout: Layout) -> bool:
     )
 
 
-def family(step: float = STEP) -> list[Member]:
+def family(step: float = STEP) -> list[Layout]:
     """Return the admissible layouts on the grid with Table 8's sensitivities over the stroke and room for the legs."""
     axes = [np.arange(round(low / step), round(high / step) + 1) * step for low, high in GRID.values()]
     found = []
@@ -209,13 +203,18 @@ def family(step: float = STEP) -> list[Member]:
             continue
         off = max(abs(reached.dz / DZ - 1.0), abs(reached.dangle / DANGLE - 1.0))
         if off < AGREES and reached.condition <= WORST_CONDITION and reached.room >= CYLINDERS:
-            found.append(Member(layout, reached))
+            found.append(layout)
     return found
 
 
-def chosen(members: list[Member]) -> Member:
+def by_condition(members: list[Layout]) -> list[Layout]:
+    """Return the members by rising condition number over the stroke."""
+    return sorted(members, key=lambda layout: answer(layout).condition)
+
+
+def chosen(members: list[Layout]) -> Layout:
     """Return the member with the least condition number over the stroke, which is farthest from a singular layout."""
-    return min(members, key=lambda member: member.answer.condition)
+    return by_condition(members)[0]
 
 
 def on_the_plate(layout: Layout) -> bool:
@@ -244,7 +243,7 @@ def edits(layout: Layout, *, flexible: bool = False, along: float = 0.0, aside: 
         found |= _leg(layout, k, flexible=flexible and k == 0, along=along, aside=aside if k == 0 else 0.0)
     found["body.ground.frames.Z.position"] = [0.0, 0.0, layout.height - CENTRAL_END]
     found["body.central_rod.pose.position"] = [0.0, 0.0, layout.height - CENTRAL_ROD]
-    return {place: _plain(value) for place, value in found.items()}
+    return {place: _floats(value) for place, value in found.items()}
 
 
 def _leg(layout: Layout, k: int, *, flexible: bool, along: float, aside: float) -> dict[str, Any]:
@@ -277,10 +276,10 @@ def deviation_row(effect: Deviation) -> dict[str, float]:
     return {"angle": effect.angle, "displacement": effect.displacement, "velocity": effect.velocity}
 
 
-def _plain(value: Any) -> Any:
+def _floats(value: Any) -> Any:
     """Return numbers as plain floats, which TOML and JSON can hold."""
     if isinstance(value, dict):
-        return {key: _plain(v) for key, v in value.items()}
+        return {key: _floats(v) for key, v in value.items()}
     return [float(v) for v in value] if isinstance(value, list | tuple) else float(value)
 
 

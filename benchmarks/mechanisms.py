@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from unittest.mock import patch
 
 import numpy as np
 import xarray as xr
@@ -42,11 +43,8 @@ class Mechanism:
 
     def general_engine(self) -> Engine:
         """Return the engine with the kernels for every topology, which scenes too long for specialised code use."""
-        proper, specialised_code.INTERPRETED = specialised_code.INTERPRETED, True
-        try:
+        with patch.object(specialised_code, "INTERPRETED", True):
             return self.engine()
-        finally:
-            specialised_code.INTERPRETED = proper
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
         """Return a mechanism with an edited scene and the bundles of this one."""

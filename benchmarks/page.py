@@ -122,6 +122,12 @@ def spread(time: Mapping[str, float], unit: str, digits: int) -> str:
     return f"{time[unit]:.{digits}f} ± {percent(time['spread'])}"
 
 
+def mean(record: Record, name: str, factor: float = 1.0, digits: int = 0) -> str:
+    """Return a mean over the members of an ensemble and its standard deviation; of a single run the value alone."""
+    value = f"{factor * record[name]:.{digits}f}"
+    return value if record.get("members") == 1 else f"{value} ± {factor * record[f'{name}_std']:.{digits}f}"
+
+
 def percent(fraction: float) -> str:
     """Return a fraction as a percentage with one decimal."""
     return f"{100 * fraction:.1f} %"

@@ -157,10 +157,10 @@ def drawn(seed: int, number: int, folder: Path) -> Drawn:
     loads = {key: load for key, load in plain.get("load", {}).items() if key != "gravity"}
     table["load"] = loads | ({"gravity": {"type": "gravity", "acceleration": down}} if random.random() < 0.5 else {})
     scene = edited(base, table)
-    asked = _asked(random, mechanism)
-    scene = edited(scene, {"accuracy": {"quantities": asked}})
+    requested = _requested(random, mechanism)
+    scene = edited(scene, {"accuracy": {"quantities": requested}})
     scene._name, scene._path = f"{name}-{number}", None
-    record = {"mechanism": name, "clearance": clearance, "speed": speed, "rod": material, "wanted": asked}
+    record = {"mechanism": name, "clearance": clearance, "speed": speed, "rod": material, "wanted": requested}
     return Drawn(scene, record)
 
 
@@ -168,7 +168,7 @@ def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
-def _asked(random: np.random.Generator, mechanism: Mechanism) -> dict[str, dict[str, float]]:
+def _requested(random: np.random.Generator, mechanism: Mechanism) -> dict[str, dict[str, float]]:
     """Return random quantities with their requested accuracy, absolute or relative as in a scene."""
     kinds = str(random.choice(list(ASKED), p=list(ASKED.values()))).split(" and ")
     found = {}
@@ -183,12 +183,7 @@ def _asked(random: np.random.Generator, mechanism: Mechanism) -> dict[str, dict[
 
 def _faster(law: dict[str, Any], speed: float) -> dict[str, Any]:
     """Return a step law with scaled times; a constant law stays unchanged."""
-    scaled: dict[str, Any] = {k: [t / speed for t in _listed(law[k])] for k in ("start", "end") if k in law}
-    return law | scaled
-
-
-def _listed(value: Any) -> list[float]:
-    return list(value) if isinstance(value, (list, tuple)) else [value]
+    return law | {k: (np.atleast_1d(law[k]) / speed).tolist() for k in ("start", "end") if k in law}
 
 
 def _ends(name: str) -> tuple[str, str]:

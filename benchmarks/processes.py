@@ -19,7 +19,6 @@ from typing import Any
 
 import psutil
 
-from benchmarks import processes
 from benchmarks.family import WRONG, Case, Record
 
 Work = Callable[[Any, Callable[[], None]], Any]
@@ -43,8 +42,7 @@ def outcomes(cases: Sequence[Case], jobs: int, work: Work, limit: int) -> Iterat
     def record(case: Case) -> Record:
         number = idle.get()
         try:
-            workers[number].give(case.of)
-            found: Record = workers[number].take()
+            found: Record = workers[number].ask(case.of)
         except LostError as lost:
             found = {"verdict": WRONG, "reason": str(lost), "seconds": lost.seconds}
             workers[number] = Worker(work, limit)
@@ -80,23 +78,19 @@ class Worker:
         self.process.start()
         other.close()
 
-    def give(self, parameters: Any) -> None:
-        """Send a piece of work to the process; if the process has ended, `take` raises LostError."""
-        with suppress(BrokenPipeError):
+    def ask(self, parameters: Any) -> Any:
+        """Return the result of a piece of work; raise LostError when the process hangs or has died."""
+        with suppress(BrokenPipeError, EOFError, ConnectionResetError):
             self.line.send(parameters)
-
-    def take(self) -> Any:
-        """Wait for the result of the work and return it; raise LostError when the process hangs or has died."""
-        with suppress(EOFError, ConnectionResetError):
             if self.line.poll(PATIENCE * self.limit):
                 return self.line.recv()
             self.dismiss()
             raise LostError(f"did not answer within {PATIENCE * self.limit} s")
         self.process.join()
         code = self.process.exitcode or 0
-        if processes.ended_by(code) == "SIGXCPU":
+        if ended_by(code) == "SIGXCPU":
             raise LostError(f"did not end within {self.limit} s of processor time", float(self.limit))
-        raise LostError(f"its process died ({processes.ended_by(code) or f'exit code {code}'})")
+        raise LostError(f"its process died ({ended_by(code) or f'exit code {code}'})")
 
     def dismiss(self) -> None:
         """Terminate the process, also in the middle of its work."""
@@ -111,8 +105,8 @@ def _serve(line: connection.Connection, work: Work, limit: int) -> None:
     with suppress(EOFError, BrokenPipeError):  # the parent process has ended
         while True:
             parameters = line.recv()
-            processes.limit_seconds(None)
-            line.send(work(parameters, lambda: processes.limit_seconds(limit)))
+            limit_seconds(None)
+            line.send(work(parameters, lambda: limit_seconds(limit)))
 
 
 def as_installed(folder: Path) -> dict[str, str]:

@@ -262,11 +262,11 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
 
     Variables and meanings: `pipeline.post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
     `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is removed alone, the most important
-    ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows the answer
+    ones first, with as many members as decide the change (`post.answers.effect_ranking`); a notebook shows the answer
     first.  Raises FlexclearError.
     """
     if budget is not None:
-        return answers.dataset("matters", _loaded(scene), budget)
+        return answers.dataset("effects", _loaded(scene), budget)
     return effects_command.bring(_loaded(scene), open_workplace()).dataset()
 
 

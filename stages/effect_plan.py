@@ -110,7 +110,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     progress(None, "chart")
     requested = dict(zip(dataset["quantity"].values.tolist(), dataset["requested"].values.tolist(), strict=True))
     result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))
-    return result | chart("plan", shown.drawn(dataset), f"What the accuracy calls for: {params['title']}", requested)
+    return result | chart("plan", shown.drawn(dataset), f"Effects that matter: {params['title']}", requested)
 
 
 def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:

@@ -61,7 +61,7 @@ def ranking(
     }
     used = sorted({("", members) for members in pairs.values()} | set(pairs.items()))
     return _task(
-        "matters", scene, chosen, params, {f"{name}:{members}": tasks[name, members] for name, members in used}
+        "effect_ranking", scene, chosen, params, {f"{name}:{members}": tasks[name, members] for name, members in used}
     )
 
 
@@ -100,22 +100,23 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     progress(None, "comparing")
     dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
-    return result | effect_sizes.chart("effects", dataset, f"What each effect does: {params['title']}")
+    return result | effect_sizes.chart("effects", dataset, f"Effect sizes: {params['title']}")
 
 
-def matters(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``matters.nc``, its table and its chart. params: see `ranking`. inputs: ``<effect>:<members>``."""
+def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>:<members>``."""
     from flexclear.pipeline.core.artifacts.effect_size import watched
-    from flexclear.pipeline.post.answers import effect_sizes, matters
+    from flexclear.pipeline.post.answers import effect_ranking as ranked
+    from flexclear.pipeline.post.answers import effect_sizes
 
     chosen = [Quantity.read(data) for data in params["quantities"]]
 
     def point(name: str, members: int) -> Point:
         return watched(inputs[f"{name}:{members}"], params["owners"][name], chosen)
 
-    pairs = {name: matters.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
-    results = matters.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
-    result: dict[str, Any] = {"nc": results} | files("matters", matters.table(results))
+    pairs = {name: ranked.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
+    results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
+    result: dict[str, Any] = {"nc": results} | files("effect_ranking", ranked.table(results))
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
     shown = listed.assign_coords(effect=listed["words"].values)
-    return result | effect_sizes.chart("matters", shown, f"What each effect does: {params['title']}")
+    return result | effect_sizes.chart("effect_ranking", shown, f"Effect sizes: {params['title']}")

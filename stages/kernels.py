@@ -27,7 +27,7 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
     return Task(
         stage="kernels",
         scene=scene.name,
-        part=f"{scene.solver.integrator} {'chosen' if scene.solver.step is None else 'fixed'} {scene.solver.events}",
+        part=f"{scene.solver.integrator}, {'adaptive' if scene.solver.step is None else 'fixed'} steps",
         run="flexclear.stages.kernels:run",
         params={"simulate": simulation.params(scene)},
         inputs=bundles,

@@ -40,7 +40,7 @@ RIGID = "rigid/"
 #: error of the frame positions from a mesh, as a fraction of their distance: the centre of a hole is the mean of its
 #: nodes; with sixteen around a hole of a twentieth of that distance, a chord is off the circle by 2 % of the radius
 FRAME_ERROR = 1e-3
-REMEDY = "choose a longer output.interval, or say more in [limits]"
+REMEDY = "choose a longer output.interval, or raise [limits]"
 
 
 def params(
@@ -92,13 +92,13 @@ def check_run(scene: Scene, results: Path) -> None:
         need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
         what = f"an ensemble of {scene.ensemble.members} members"
         machine.require_memory(
-            TIMES_IN_MEMORY * need, what, "ask for fewer members, or say more in [limits]", scene.limits.memory
+            TIMES_IN_MEMORY * need, what, "request fewer members, or raise [limits]", scene.limits.memory
         )
     for name, body in scene.flexible().items():
         if isinstance(body.modes.count, int) and body.modes.count > scene.limits.modes:
             raise ResourceError(
-                f"body.{name}.modes.count = {body.modes.count} is more than the {scene.limits.modes} that limits.modes "
-                "allows: matrices of that size are factorised at every step"
+                f"body.{name}.modes.count = {body.modes.count} exceeds limits.modes = "
+                f"{scene.limits.modes}: matrices of that size are factorised at every step"
             )
 
 

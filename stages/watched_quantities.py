@@ -36,7 +36,7 @@ def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
     variant = plain(scene)
     graph = Graph(variant, shown=False)
     return Task(
-        stage="watched",
+        stage="quantities",
         scene=scene.name,
         run="flexclear.stages.watched_quantities:run",
         params={

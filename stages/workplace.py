@@ -83,7 +83,7 @@ def seconds(given: str | float, option: str) -> float:
         if not result > 0.0:
             raise ValueError("it must be above zero")
     except ValueError as error:
-        raise InputError(f"{option} {given}", f"is no time: {error}", f"write {option} 2h, or '90 min'") from None
+        raise InputError(f"{option} {given}", f"is not a time: {error}", f"write {option} 2h, or '90 min'") from None
     return result
 
 
@@ -178,7 +178,7 @@ def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
     end = math.inf if limit is None else time.monotonic() + seconds(limit, "--limit")
     sources = sources_of(TREE, root / "cache" / "imports.json")
-    why = f"the time that --limit {limit} gives is over"
+    why = f"the time limit (--limit {limit}) is reached"
     # cached: the same damaged file is found each time that a task asks for it, and reported once
     return Workplace(Store(root, say=cache(monitor.say)), sources, monitor, jobs, (end, why))
 

@@ -33,13 +33,13 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     for case in cases:
         scene = load_scene(find_scene(case.name))
         study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY, models=True)
-        said, pictures = cost.figures_and_tables(case.name, study, "accuracy")
-        records: list[Record] = [{"advice": said.advice}]
-        for title, path in said.pictures.items():
+        studied, pictures = cost.figures_and_tables(case.name, study, "accuracy")
+        records: list[Record] = [{"advice": studied.advice}]
+        for title, path in studied.pictures.items():
             file = pictures[path]
             digest = hashlib.sha256(study.read(file)).hexdigest()
             records.append({"picture": title, "path": path, "file": file, "sha256": digest})
-        yield case, records + [{"table": asdict(from_markdown(text))} for text in said.tables]
+        yield case, records + [{"table": asdict(from_markdown(text))} for text in studied.tables]
 
 
 def show(records: list[Record]) -> str:

@@ -133,10 +133,14 @@ def driven_into_a_stop() -> Scene:
     )
 
 
+def _of_closings(scene: Scene, name: str) -> np.ndarray:
+    found = run(scene)
+    return found[name].values[found.event_kind.values == "closing"]
+
+
 def _peak(scene: Scene) -> float:
     """Return the error of the three peak forces against k d^1.5 = 1000 N; NaN for another number of peaks."""
-    found = run(scene)
-    peaks = found.event_peak_force.values[found.event_kind.values == "closing"]
+    peaks = _of_closings(scene, "event_peak_force")
     return float(np.abs(peaks / 1e3 - 1.0).max()) if len(peaks) == 3 else float("nan")
 
 
@@ -155,12 +159,16 @@ def bounce(**solver: Any) -> Scene:
 
 def graze(depth: float, rtol: float) -> Scene:
     """Return a mass on a spring, 10 rad/s and 0.1 m, that meets a plane at `depth` before its lowest point [m]."""
-    normal = {"law": "hertz", "stiffness": 1e8}
-    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02, "normal": normal}
-    floor = {"position": [0.0, 0.0, -0.12 + depth]}
+    return _ball_on_a_spring(-0.12 + depth, {"law": "hertz", "stiffness": 1e8}, rtol)
+
+
+def _ball_on_a_spring(height: float, normal: Table, rtol: float, unit: float = 1.0) -> Scene:
+    """Return a ball on a spring above a plane at a height [m]; unit: factor of the ball's lengths."""
+    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02 * unit, "normal": normal}
+    floor, place = {"position": [0.0, 0.0, height]}, {"position": [0.0, 0.0, 0.1 * unit]}
     return _scene(
         3.0,
-        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, pose={"position": [0, 0, 0.1]})},
+        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, 1.0, 0.01 * unit**2, pose=place)},
         joint={"rail": {"type": "prismatic", "between": ["ground.o", "ball.o"]}, "floor": plane},
         load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": 100.0}},
         solver={"rtol": rtol},
@@ -170,8 +178,7 @@ def graze(depth: float, rtol: float) -> Scene:
 def _graze_speed(depth: float) -> Callable[[Scene], float]:
     def examined(scene: Scene) -> float:
         """Return the error of the five closing speeds, sqrt(2 w^2 A d - w^2 d^2); above 1 for a negative speed."""
-        found = run(scene)
-        speeds = found.event_approach_speed.values[found.event_kind.values == "closing"]
+        speeds = _of_closings(scene, "event_approach_speed")
         known = 10.0 * np.sqrt(0.2 * depth - depth**2)
         return float(np.abs(speeds / known - 1.0).max()) if len(speeds) == 5 else float("nan")
 
@@ -181,24 +188,13 @@ def _graze_speed(depth: float) -> Callable[[Scene], float]:
 def small_bounce(unit: float) -> Scene:
     """Return a lossy ball on a spring that meets a plane; `unit` scales all lengths, and forces per mass as well."""
     normal = {"law": "lankarani-nikravesh", "restitution": 0.6, "stiffness": 1e6 * unit**-0.5}
-    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02 * unit, "normal": normal}
-    floor = {"position": [0.0, 0.0, -0.09 * unit]}
-    place = {"position": [0.0, 0.0, 0.1 * unit]}
-    return _scene(
-        3.0,
-        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, 1.0, 0.01 * unit**2, pose=place)},
-        joint={"rail": {"type": "prismatic", "between": ["ground.o", "ball.o"]}, "floor": plane},
-        load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": 100.0}},
-        solver={"rtol": 1e-10},
-    )
+    return _ball_on_a_spring(-0.09 * unit, normal, 1e-10, unit)
 
 
 def _as_in_metres(unit: float) -> Callable[[Scene], float]:
     def examined(scene: Scene) -> float:
-        speeds = []
-        for one, size in ((small_bounce(1.0), 1.0), (scene, unit)):
-            found = run(one)
-            speeds.append(found.event_approach_speed.values[found.event_kind.values == "closing"] / size)
+        pairs = (small_bounce(1.0), 1.0), (scene, unit)
+        speeds = [_of_closings(one, "event_approach_speed") / size for one, size in pairs]
         if len(speeds[0]) != len(speeds[1]) or len(speeds[0]) < 5:
             return float("nan")
         return float(np.abs(speeds[1] / speeds[0] - 1.0).max())
@@ -346,9 +342,9 @@ def examined(name: str) -> Record:
 
 def show(records: list[Record]) -> str:
     """Return a table, and the messages of the cases that did not finish."""
-    said = [f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split())}" for r in records if r["reason"]]
+    messages = [f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split())}" for r in records if r["reason"]]
     return table(records, COLUMNS) + (
-        "\n\nMessages of the cases that did not finish:\n\n" + "\n".join(said) + "\n" if said else ""
+        "\n\nMessages of the cases that did not finish:\n\n" + "\n".join(messages) + "\n" if messages else ""
     )
 
 

@@ -116,12 +116,12 @@ def show(records: list[Record]) -> str:
         "CPU [s]": lambda r: spread(r["cpu"], "s", 2),
         "wall [s]": lambda r: spread(r["wall"], "s", 2),
         "processors": lambda r: str(r["processors"]),
-        **{f"{part} [ms]": lambda r, part=part: _told(r["parts"], part) for part in SHOWN},  # type: ignore[misc]
+        **{f"{part} [ms]": lambda r, part=part: _milliseconds(r["parts"], part) for part in SHOWN},  # type: ignore[misc]
     }
     return table(records, columns)
 
 
-def _told(parts: Mapping[str, float], part: str) -> str:
+def _milliseconds(parts: Mapping[str, float], part: str) -> str:
     return f"{1e3 * parts[part]:.0f}" if parts.get(part) else ""
 
 

@@ -67,9 +67,9 @@ def _influences() -> list[Record]:
         part = found.sel(quantity=quantity)
         record: Record = {"quantity": quantity, "unit": str(part["unit"].values)}
         for name, effect, other in (("rod", ROD, PLAY), ("play", PLAY, ROD)):
-            for kind, beside in (("dropped", effect), ("added", effect), ("interaction", other)):
+            for kind, second in (("dropped", effect), ("added", effect), ("interaction", other)):
                 for part_of in ("", "_uncertainty"):
-                    value = float(part[f"{kind}{part_of}"].sel(effect=effect, other=beside))
+                    value = float(part[f"{kind}{part_of}"].sel(effect=effect, other=second))
                     # infinite where the events differ; JSON has no infinity
                     record[f"{name}_{kind}{part_of}"] = value if np.isfinite(value) else None
         records.append(record)
@@ -86,15 +86,15 @@ def _started(name: str, **changes: Any) -> tuple[Any, Any, np.ndarray]:
 def _open(name: str) -> Record:
     """Return the processor time of an evaluation with the contact open, and the fraction of checking its gap."""
     engine, _, start = _started(name)
-    there = int(engine.h[m.N_SURFACES])
+    surfaces_of_scene = int(engine.h[m.N_SURFACES])
 
     def evaluation(surfaces: int) -> float:
         engine.h[m.N_SURFACES] = surfaces
         return once(lambda: closure_rows.evaluate(engine, start, engine.start, EVALUATIONS)) / EVALUATIONS
 
-    tasks = {"with_it": partial(evaluation, there), "without": partial(evaluation, 0)}
+    tasks = {"with_it": partial(evaluation, surfaces_of_scene), "without": partial(evaluation, 0)}
     with_it, without = (min(times.seconds) for times in interleaved(tasks, ROUNDS).values())
-    engine.h[m.N_SURFACES] = there
+    engine.h[m.N_SURFACES] = surfaces_of_scene
     return {"scene": name, "evaluation_us": 1e6 * with_it, "share": (with_it - without) / with_it}
 
 

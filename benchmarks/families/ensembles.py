@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
+from unittest.mock import patch
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, mechanism
@@ -67,35 +67,19 @@ def _growing(cases: Sequence[Case]) -> Measured:
 
 
 def _with_members(here: Mechanism, members: int) -> Callable[[], Any]:
-    asked = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
-    scene = here.scene.model_copy(update={"ensemble": asked})
+    settings = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
+    scene = here.scene.model_copy(update={"ensemble": settings})
     return lambda: analyses.ensemble(scene, here.bundles, silent)
 
 
 def _timed(work: Callable[[], Any], workers: int = 0, *, together: bool = True) -> tuple[float, float]:
     """Return wall and processor time of some work [s]."""
-    with _workers(workers) if workers else nullcontext(), nullcontext() if together else _alone():
+    number = (lambda: workers) if workers else cores.cores
+    few = ensemble.FEW if together else MEMBERS + 1
+    with patch.object(cores, "cores", number), patch.object(ensemble, "FEW", few):
         begun, spent = time.perf_counter(), time.process_time()
         work()
         return time.perf_counter() - begun, time.process_time() - spent
-
-
-@contextmanager
-def _workers(number: int) -> Iterator[None]:
-    proper, cores.cores = cores.cores, lambda: number
-    try:
-        yield
-    finally:
-        cores.cores = proper
-
-
-@contextmanager
-def _alone() -> Iterator[None]:
-    proper, ensemble.FEW = ensemble.FEW, MEMBERS + 1
-    try:
-        yield
-    finally:
-        ensemble.FEW = proper
 
 
 def _in_turn(tasks: Mapping[str, Callable[[], tuple[float, float]]]) -> dict[str, tuple[Times, Times]]:

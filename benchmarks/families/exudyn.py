@@ -79,10 +79,6 @@ class Run:
     outcome: Outcome
     error: Error | None
 
-    def reaches(self, level: float) -> bool:
-        """Return True when the velocity error is within a fraction of the largest speed."""
-        return self.error is not None and self.error.relative <= level
-
 
 OWN_LAW = "its friction is linear up to one speed and constant above; errors against its own finest run"
 COMPARISONS = {
@@ -127,7 +123,8 @@ class Peer:
         """Make a run at a fixed step [s], sampled at an interval [s]; arguments as of `exudyn_model.solve`."""
         used = self.worker is not None
         try:
-            found = self._asked((self.here, self.body, method, step, sampling))
+            self.worker = self.worker or Worker(work, LIMIT)
+            found: Outcome = self.worker.ask((self.here, self.body, method, step, sampling))
         except LostError as lost:
             self.close()
             if used and not lost.seconds:  # leftovers of earlier runs may have killed the process
@@ -136,11 +133,6 @@ class Peer:
         if found.samples is None:
             self.close()
         return found
-
-    def _asked(self, parameters: tuple[Any, ...]) -> Outcome:
-        self.worker = self.worker or Worker(work, LIMIT)
-        self.worker.give(parameters)
-        return self.worker.take()
 
     def close(self) -> None:
         """End the process."""
@@ -157,10 +149,10 @@ def work(parameters: tuple[Any, ...], begin: Callable[[], None]) -> Outcome:
 
 def edited(case: Case) -> Mechanism:
     """Return the mechanism that both codes run."""
-    original, asked = mechanism(case.of.scene), case.of
-    scene = asked.edit(original.scene)
-    if asked.horizon is not None:
-        scene = scene.model_copy(update={"time": scene.time.model_copy(update={"end": asked.horizon})})
+    original, comparison = mechanism(case.of.scene), case.of
+    scene = comparison.edit(original.scene)
+    if comparison.horizon is not None:
+        scene = scene.model_copy(update={"time": scene.time.model_copy(update={"end": comparison.horizon})})
     return original.with_scene(case.name, scene)
 
 
@@ -173,11 +165,11 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _records(case: Case, here: Mechanism, peer: Peer) -> Iterator[Record]:
-    asked: Comparison = case.of
-    reference = errors.converged(here, BODY, here.scene.time.end, asked.sampling)
-    theirs, law = _own(case, peer, reference) if asked.own_law else (reference, {})
+    comparison: Comparison = case.of
+    reference = errors.converged(here, BODY, here.scene.time.end, comparison.sampling)
+    theirs, law = _own(case, peer, reference) if comparison.own_law else (reference, {})
     yield {"horizon": reference.horizon, "version": version("exudyn"), **law}
-    tried = [_tried(peer, method, step, theirs) for method, step in _settings(asked)]
+    tried = [_tried(peer, method, step, theirs) for method, step in _settings(comparison)]
     done = [run for run in tried if run.error is not None]
     ours = errors.ladder(here, BODY, reference, partial(_beyond, [run.error for run in done if run.error]))
     for r in ours:
@@ -191,14 +183,14 @@ def _records(case: Case, here: Mechanism, peer: Peer) -> Iterator[Record]:
         if run.error is None:
             yield record | {"failed": run.outcome.failure}
         elif run in best or levels:
-            yield record | _compared(run, levels, peer, asked.sampling, ours)
+            yield record | _compared(run, levels, peer, comparison.sampling, ours)
         else:
             yield record | {"s": run.outcome.seconds, **_numbers(run.error)}
 
 
-def _settings(asked: Comparison) -> list[tuple[str, float]]:
+def _settings(comparison: Comparison) -> list[tuple[str, float]]:
     """Return the methods and steps [s] to try; with a friction law of its own, Exudyn's finest run is the reference."""
-    steps = asked.steps[:-1] if asked.own_law else asked.steps
+    steps = comparison.steps[:-1] if comparison.own_law else comparison.steps
     return [(method, step) for k, method in enumerate(METHODS) for step in (steps[:TRIED] if k else steps)]
 
 
@@ -244,7 +236,9 @@ def front(runs: Sequence[tuple[float, ...]]) -> list[int]:
 
 def _candidates(done: list[Run], level: float) -> list[Run]:
     """Return the two fastest runs that reach a level, since single times scatter; else the longest run, as a bound."""
-    reaching = sorted((run for run in done if run.reaches(level)), key=lambda run: run.outcome.seconds)
+    reaching = sorted(
+        (run for run in done if run.error and _reaches(level, run.error)), key=lambda run: run.outcome.seconds
+    )
     return reaching[:2] or sorted(done, key=lambda run: -run.outcome.seconds)[:1]
 
 
@@ -378,9 +372,9 @@ def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
     """Return, by scene of a cost study, runs for `flexclear cost --peer`: seconds [s] and errors [SI] by step."""
     versions = {r["case"]: r["version"] for r in records if "version" in r}
     return {
-        asked.study: list(_tracks(runs, f"Exudyn {versions[case]}", asked.note))
+        comparison.study: list(_tracks(runs, f"Exudyn {versions[case]}", comparison.note))
         for case, runs in _runs(records).items()
-        if (asked := COMPARISONS[case]).study
+        if (comparison := COMPARISONS[case]).study
     }
 
 
@@ -408,7 +402,7 @@ FAMILY = Family(
     what="whole runs against Exudyn at equal error",
     takes="12 min",
     page="benchmarks.md",
-    cases=lambda: [Case(name, asked) for name, asked in COMPARISONS.items()],
+    cases=lambda: [Case(name, comparison) for name, comparison in COMPARISONS.items()],
     measure=measure,
     show=show,
     files=files,

@@ -49,7 +49,7 @@ HELPED, PER_KILL = ("run", "sweep", "cost", "report"), 0.5
 #: a child process is idle while it uses less than this processor time [s] within this time [s]
 IDLE, LOOK = 0.005, 0.1
 #: exit codes of a command that lost a child process: it continues without, or reports that its memory may be full
-SAID = (0, 4)
+LOST_CHILD = (0, 4)
 SWEEP = """
 title = "Pendulums"
 scene = "checks/pendulum"
@@ -219,9 +219,9 @@ def _files(place: Place) -> Counter[str]:
         away = path.rename(place.folder / "away")
         path.write_text("stays", encoding="utf-8", newline="\n")
         process = place.start(["run", SCENE], stderr=subprocess.PIPE)
-        said = process.communicate()[1].decode(errors="replace")
+        output = process.communicate()[1].decode(errors="replace")
         left = [one for one in path.parent.glob(f"{path.name}*") if one.is_file()]
-        sound = process.returncode in (0, 2, 4) and "Traceback" not in said
+        sound = process.returncode in (0, 2, 4) and "Traceback" not in output
         count["detected" if sound and any(one.read_text(encoding="utf-8") == "stays" for one in left) else "used"] += 1
         if path.is_file():
             path.unlink()
@@ -320,12 +320,12 @@ def _helpers(place: Place, verb: str, rng: random.Random, count: int, *, idle: b
             continue
         with suppress(psutil.NoSuchProcess):
             rng.choice(waiting).kill()
-        said = process.communicate()[1].decode(errors="replace")
+        output = process.communicate()[1].decode(errors="replace")
         intact = not maintenance.inventory(store, whole=True).damaged
-        sound = process.returncode in SAID and "Traceback" not in said and intact
+        sound = process.returncode in LOST_CHILD and "Traceback" not in output and intact
         again = place.start(words, results).wait() == 0 and _artifacts(store) == whole
         if not (sound and again):
-            print(f"{verb}: {process.returncode}, then {again}: {said[-500:]}", file=sys.stderr)
+            print(f"{verb}: {process.returncode}, then {again}: {output[-500:]}", file=sys.stderr)
         counts["used" if not (sound and again) else "detected" if process.returncode else "harmless"] += 1
     return counts
 

@@ -50,12 +50,12 @@ class Entry:
         return self.scene.rpartition("/")[2]
 
 
-def _amplitude(values: xr.DataArray) -> float:
-    return 0.5 * float(values.max() - values.min())
+def _swing(angles: xr.DataArray) -> float:
+    return np.degrees(float(angles.max() - angles.min()))
 
 
 def _four_bar(run: xr.Dataset, scene: Scene) -> str:
-    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="D")))
+    swing = _swing(run["joint_position"].sel(coordinate="D"))
     torque = derive(run)["peak_drive_force"].sel(drive="motor")
     return f"The rocker swings by {swing:.1f}°; the motor needs up to {float(torque):.3g} N m."
 
@@ -73,8 +73,8 @@ def _scott_russell(run: xr.Dataset, scene: Scene) -> str:
     point = run["frame_position"].sel(frame="rod.point")
     way = float(abs(point.sel(axis="y")[-1] - point.sel(axis="y")[0]))
     off = float(abs(point.sel(axis="x")).max())
-    apart = "less than 1e-12" if off < 1e-12 else f"{off:.0e}"
-    return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {apart} m."
+    deviation = "less than 1e-12" if off < 1e-12 else f"{off:.0e}"
+    return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {deviation} m."
 
 
 def _shear_pin(run: xr.Dataset, scene: Scene) -> str:
@@ -90,12 +90,8 @@ def _stewart(run: xr.Dataset, scene: Scene) -> str:
     forces = derive(run)["peak_drive_force"]
     lengths = run["joint_position"].isel(coordinate=run["coordinate_joint"].str.startswith("leg").values)
     stroke = float((lengths.max("time") - lengths.min("time")).max())
-    hardest = float(forces.isel(drive=(run["drive_motion"] == "translation").values).sel(drive=_legs(forces)).max())
+    hardest = float(forces.isel(drive=forces["drive"].str.startswith("leg").values).max())
     return f"The legs need a stroke of {1e3 * stroke:.0f} mm and push with up to {hardest:.0f} N."
-
-
-def _legs(forces: xr.DataArray) -> list[str]:
-    return [name for name in forces["drive"].values.tolist() if name.startswith("leg")]
 
 
 def _robot_arm(run: xr.Dataset, scene: Scene) -> str:
@@ -187,13 +183,13 @@ def _bifilar(run: xr.Dataset, scene: Scene) -> str:
 
 
 def _six_bar(run: xr.Dataset, scene: Scene) -> str:
-    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="O3")))
+    swing = _swing(run["joint_position"].sel(coordinate="O3"))
     torque = derive(run)["peak_drive_force"].sel(drive="motor")
     return f"It swings by {swing:.1f}°, and the motor supplies up to {float(torque):.2g} N m."
 
 
 def _rssr(run: xr.Dataset, scene: Scene) -> str:
-    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="out")))
+    swing = _swing(run["joint_position"].sel(coordinate="out"))
     peak = float(derive(run)["peak_force"].sel(contact="B"))
     return f"It swings by {swing:.1f}°; the ball presses on its socket with up to {peak:.0f} N."
 
@@ -239,7 +235,7 @@ def _cam(run: xr.Dataset, scene: Scene) -> str:
 
 def _backlash(run: xr.Dataset, scene: Scene) -> str:
     late = run["joint_position"].isel(time=(run["time"] >= 1.0).values)
-    pinion, wheel = (np.degrees(2.0 * _amplitude(late.sel(coordinate=name))) for name in ("pinion", "wheel"))
+    pinion, wheel = (_swing(late.sel(coordinate=name)) for name in ("pinion", "wheel"))
     return f"The wheel swings by {wheel:.2f}°, {pinion / 3.0 - wheel:.2f}° less than the teeth's ratio gives."
 
 

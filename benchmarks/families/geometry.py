@@ -6,7 +6,7 @@ Runs with rigid rods vary what the paper leaves open; ensembles have flexible ro
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import product
 from typing import Any
 
@@ -15,8 +15,8 @@ import xarray as xr
 
 from benchmarks import layouts
 from benchmarks.family import REFUSED, Case, Family, Record, each
-from benchmarks.layouts import DANGLE, DZ, Layout, Member, answer, deviation_row
-from benchmarks.page import Columns, table
+from benchmarks.layouts import DANGLE, DZ, Layout, answer, deviation_row
+from benchmarks.page import Columns, mean, table
 from flexclear.commands import scenes as stages
 from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
 from flexclear.papers.wang_wang_2019.models import JOINT, PLATFORM
@@ -34,9 +34,9 @@ COARSE, SHOWN = 0.02, 5
 def members_rows() -> Iterator[Record]:
     """Yield one record with the family's extent on its grid, and one for the chosen layout."""
     found = layouts.family()
-    record: Record = {"members": len(found), "on_the_plate": sum(layouts.on_the_plate(m.layout) for m in found)}
+    record: Record = {"members": len(found), "on_the_plate": sum(map(layouts.on_the_plate, found))}
     for name in ("ax", "ay", "bx", "by", "height", "leg"):
-        values = [getattr(m.layout, name) for m in found]
+        values = [getattr(layout, name) for layout in found]
         record |= {f"{name}_least": float(min(values)), f"{name}_most": float(max(values))}
     yield record
     yield _member(layouts.chosen(found))
@@ -44,30 +44,28 @@ def members_rows() -> Iterator[Record]:
 
 def velocity_rows() -> Iterator[Record]:
     """Yield runs with clearance of some members and of the first layout; other choices are those of the scenes."""
-    for member in sorted(layouts.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
-        yield _member(member) | rigid(member.layout, Open())
-    first = Member(layouts.FIRST, answer(layouts.FIRST))
-    yield _member(first) | rigid(first.layout, Open()) | {"first": True}
+    for layout in layouts.by_condition(layouts.family(COARSE))[::SHOWN]:
+        yield _member(layout) | rigid(layout)
+    yield _member(layouts.FIRST) | rigid(layouts.FIRST) | {"first": True}
 
 
 def open_rows() -> Iterator[Record]:
     """Yield runs of the chosen layout over the other choices that the paper leaves open."""
-    layout = layouts.chosen(layouts.family()).layout
+    layout = layouts.chosen(layouts.family())
     for restitution, gravity, start in product(RESTITUTION, (False, True), STARTS):
-        choice = Open(restitution, gravity, start)
         record = {"restitution": restitution, "gravity": gravity, "start": start}
-        yield record | rigid(layout, choice)
+        yield record | rigid(layout, restitution, start, gravity=gravity)
 
 
 def flexible_rows() -> Iterator[Record]:
     """Yield ensembles of the chosen layout with a flexible rod and clearance."""
-    layout = layouts.chosen(layouts.family()).layout
+    layout = layouts.chosen(layouts.family())
     for name in FLEXIBLE:
         yield {"set": name, "count": MEMBERS} | flexible(layout, name)
 
 
-def _member(member: Member) -> Record:
-    return asdict(member.layout) | {"leg": member.layout.leg} | asdict(member.answer)
+def _member(layout: Layout) -> Record:
+    return asdict(layout) | {"leg": layout.leg} | asdict(answer(layout))
 
 
 ROWS: dict[str, Callable[[], Iterator[Record]]] = {
@@ -169,20 +167,16 @@ def _flexible(rows: list[Record]) -> str:
     """Return the ensembles next to Table 9."""
     columns: Columns = {
         "mode set": lambda r: r["set"],
-        "angle [mrad]": _spread("angle", 1e3, 3),
+        "angle [mrad]": lambda r: mean(r, "angle", 1e3, 3),
         "angle, paper": lambda r: _printed(r, "angle", 1e3),
-        "z [mm]": _spread("displacement", 1e3, 4),
+        "z [mm]": lambda r: mean(r, "displacement", 1e3, 4),
         "z, paper": lambda r: _printed(r, "displacement", 1.0),
-        "v [mm/s]": _spread("velocity", 1e3, 1),
+        "v [mm/s]": lambda r: mean(r, "velocity", 1e3, 1),
         "v, paper": lambda r: _printed(r, "velocity", 1.0),
-        "peak force [N]": _spread("peak_force", 1.0, 0),
-        "acceleration [m/s²]": _spread("peak_acceleration", 1.0, 0),
+        "peak force [N]": lambda r: mean(r, "peak_force"),
+        "acceleration [m/s²]": lambda r: mean(r, "peak_acceleration"),
     }
     return table(rows, columns)
-
-
-def _spread(name: str, factor: float, digits: int) -> Callable[[Record], str]:
-    return lambda r: f"{factor * r[name]:.{digits}f} ± {factor * r[f'{name}_std']:.{digits}f}"
 
 
 def _printed(row: Record, name: str, factor: float) -> str:
@@ -203,27 +197,13 @@ MEMBERS = 4
 FLEXIBLE = {"free-free": "far_csj_free", "fixed-fixed": "far_csj_fixed", "Craig-Bampton": "far_csj_cb"}
 
 
-@dataclass(frozen=True)
-class Open:
-    """One choice of the data, besides the layout, that the paper leaves open."""
-
-    restitution: float = 0.9
-    gravity: bool = False
-    start: str = "concentric"
-
-    def edits(self) -> dict[str, Any]:
-        """Return the choice as edits of a scene with clearance."""
-        found: dict[str, Any] = {"joint.A1.normal.restitution": self.restitution}
-        return found | ({"load": {"gravity": GRAVITY}} if self.gravity else {})
-
-
-def rigid(layout: Layout, choice: Open) -> Record:
+def rigid(layout: Layout, restitution: float = 0.9, start: str = "concentric", *, gravity: bool = False) -> Record:
     """Return the largest deviations from the ideal mechanism, force and acceleration of a run with clearance."""
-    load = {"load": {"gravity": GRAVITY}} if choice.gravity else {}
+    load: dict[str, Any] = {"load": {"gravity": GRAVITY}} if gravity else {}
+    changes = load | {"joint.A1.normal.restitution": restitution}
     try:
         ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout, load), {}, silent)
-        requested = layouts.scene("sps4/csj", layout, choice.edits(), aside=STARTS[choice.start])
-        run = dynamics.simulate(requested, {}, silent)
+        run = dynamics.simulate(layouts.scene("sps4/csj", layout, changes, aside=STARTS[start]), {}, silent)
     except SolverError as error:
         return {"verdict": REFUSED, "reason": str(error)}
     return deviation_row(max_deviation(run, ideal, PLATFORM)) | _peaks(run, ideal)

@@ -82,11 +82,11 @@ def _record(name: str, loops: int) -> Record:
     uprights = [numbering.coordinates[i][0] for i, link in enumerate(links) if i and link.kind == "revolute"]
     ours = np.sort(closure_rows.evaluate(engine, state.y, state.t)[engine.model.speeds][uprights])
     times = _times(peer, engine, mine.engine(), state, max(EVALUATIONS // loops, 10))
-    apart = np.abs(np.sort(peer.hinges()) - ours).max() / np.abs(ours).max()
+    difference = np.abs(np.sort(peer.hinges()) - ours).max() / np.abs(ours).max()
     return {
         "by": name,
         "loops": loops,
-        "apart": float(apart),
+        "apart": float(difference),
         "versions": {package: version(package) for package in ("pin", "mujoco")},
         **times,
     }

@@ -66,9 +66,9 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
     place = open_workplace()
     try:
         task = effect_plan.task(scene)
-        outcome = place.bring(list(task.inputs.values()), 1)
-        check(outcome)
-        inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
+        done = place.bring(list(task.inputs.values()), 1)
+        check(done)
+        inputs = {name: place.store.load(done.records[below]) for name, below in task.inputs.items()}
         params = {**task.params, **task.context}
         decided, planning = _planned(params, inputs)
         if planning > SECOND:  # the first call may have loaded compiled code
@@ -96,14 +96,14 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
     pair = ((full, inputs), (planned, fewer))
     found, members = until_decided(compared, MEMBERS if loose else (few,), affordable)
     worst = max(found, key=lambda one: (one.missed, (one.error + one.chance) / one.allowed))
-    said = verdict(worst)
-    if said == MET and any(verdict(one) == MET_TO_HORIZON for one in found):
-        said = MET_TO_HORIZON
+    outcome = verdict(worst)
+    if outcome == MET and any(verdict(one) == MET_TO_HORIZON for one in found):
+        outcome = MET_TO_HORIZON
     return {
         **drawing,
         "share": worst.error / worst.allowed,
         "chance": worst.chance / worst.allowed,
-        "judged": said,
+        "judged": outcome,
         "members": members,
         "horizon": min(one.horizon for one in found),
         "kept": [d.effect.name for d in decided.decisions if d.kept],
@@ -114,15 +114,15 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         "planned_s": planned_cpu,
         "plan_s": planning,
         "saving": full_cpu / planned_cpu,
-        "verdict": WRONG if said == MISSED and worst.error > WORST * worst.allowed else FINISHED,
-        **({} if said != MISSED else {"reason": f"misses what is wanted {worst.error / worst.allowed:.2g} times"}),
+        "verdict": WRONG if outcome == MISSED and worst.error > WORST * worst.allowed else FINISHED,
+        **({} if outcome != MISSED else {"reason": f"error is {worst.error / worst.allowed:.2g} times the accuracy"}),
     }
 
 
 def _requested(made: Drawn, full: Point, q: Quantity) -> float:
     """Return the requested accuracy of a quantity [SI]; a relative one refers to its size in the full scene."""
-    asked = made.record["wanted"][q.name]
-    return float(asked["absolute"] if "absolute" in asked else asked["relative"] * effect_size.size(full, q))
+    request = made.record["wanted"][q.name]
+    return float(request["absolute"] if "absolute" in request else request["relative"] * effect_size.size(full, q))
 
 
 def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float]:
@@ -159,15 +159,15 @@ def show(records: list[Record]) -> dict[str, str]:
     done = [r for r in records if "judged" in r]
     if not done:
         return {"summary": "Not measured.", "misses": ""}
-    said = {kind: sum(r["judged"] == kind for r in done) for kind in (MET, MET_TO_HORIZON, MISSED, UNDECIDED)}
-    within, decided = said[MET] + said[MET_TO_HORIZON], len(done) - said[UNDECIDED]
+    counts = {kind: sum(r["judged"] == kind for r in done) for kind in (MET, MET_TO_HORIZON, MISSED, UNDECIDED)}
+    within, decided = counts[MET] + counts[MET_TO_HORIZON], len(done) - counts[UNDECIDED]
     saved = [r["saving"] for r in done]
     same = sum(r["solver"] == AS_IT_IS for r in done)
     dearer = sum(r["saving"] < 1.0 and r["solver"] != AS_IT_IS for r in done)
     cheap = [r for r in done if r["plan_s"] <= max(SECOND, FRACTION * r["full_s"])]
     text = (
-        f"{len(done)} scenes: {said[MET]} met, {said[MET_TO_HORIZON]} met to the horizon, {said[MISSED]} missed, "
-        f"{said[UNDECIDED]} not decided. Of the {decided} decided ones {within} ({within / max(decided, 1):.0%}) are "
+        f"{len(done)} scenes: {counts[MET]} met, {counts[MET_TO_HORIZON]} met to the horizon, {counts[MISSED]} missed, "
+        f"{counts[UNDECIDED]} not decided. Of the {decided} decided ones {within} ({within / max(decided, 1):.0%}) are "
         f"within what is requested{_worst(done)}. Median saving {np.median(saved):.3g} times "
         f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half). Plans that keep "
         f"the scene: {same}; of the others {dearer} take longer than their scene. Planning within a fifth of the "
@@ -250,7 +250,7 @@ def _together(name: str, mine: list[Record]) -> Record:
 
 
 FAMILY = Family(
-    what="plans: are planned runs within what is wanted, and what do they save",
+    what="plans: are planned runs within the requested accuracy, and what do they save",
     takes="20 min",
     page="plan.md",
     cases=cases,

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.family import Family
 from benchmarks.family import Record as Row
-from benchmarks.page import Columns, png, table
+from benchmarks.page import Columns, mean, png, table
 from benchmarks.reference_conditions import claims, design, runs
 from benchmarks.reference_conditions.claims import Rows, at, far_error
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
@@ -20,7 +20,7 @@ from flexclear.pipeline.post.plotting.table import pipe_table
 
 #: fraction of the compliance from which on a set is complete; error below which the mechanism's frequencies are right
 COMPLETE, RESOLVED = 0.99, 0.01
-SET: Columns = {"joint at": lambda r: f"{r['place_mm']} mm", "set": lambda r: _label(r)}
+SET: Columns = {"joint at": lambda r: f"{r['place_mm']} mm", "set": lambda r: design.label(r["condition"], r["count"])}
 COST: Columns = {"evaluations": lambda r: str(r["evaluations"]), "seconds": lambda r: f"{r['seconds']:.2f}"}
 
 
@@ -77,14 +77,11 @@ def _unsettled(rows: list[Row], place: int) -> float:
 
 def _enough(rows: list[Row]) -> int | None:
     """Return the least count from which on Craig-Bampton sets have the right peak force at every position, or None."""
-    measured = {place: {r["count"] for r in rows if _is_craig_bampton(r, place)} for place in PLACES}
-    known = [n for n in (COUNT, *MOST_COMPLETE) if all(max(counts) >= n for counts in measured.values())]
+    sets = [r for r in rows if r["condition"] == "craig-bampton"]
+    most = min(max(r["count"] for r in sets if r["place_mm"] == place) for place in PLACES)
+    known = [n for n in (COUNT, *MOST_COMPLETE) if n <= most]
     good = [all(_peak_error(rows, p, "craig-bampton", n) < claims.AGREE for p in PLACES) for n in known]
     return next((n for k, n in enumerate(known) if all(good[k:])), None)
-
-
-def _is_craig_bampton(row: Row, place: int) -> bool:
-    return (row["condition"], row["place_mm"]) == ("craig-bampton", place)
 
 
 def _peaks(rows: list[Row], place: int) -> str:
@@ -173,12 +170,12 @@ def _clearance(rows: dict[str, list[Row]]) -> str:
     """Return means and spreads over the members with clearance, and why no ensemble has the complete basis."""
     columns: Columns = {
         "members": lambda r: str(r["members"]),
-        "peak force [N]": lambda r: _spread(r, "peak_force", 1.0, 0),
-        "impacts": lambda r: _spread(r, "impacts", 1.0, 1),
-        "angle [mrad]": lambda r: _spread(r, "angle", 1e3, 3),
-        "z [mm]": lambda r: _spread(r, "displacement", 1e3, 4),
-        "v [mm/s]": lambda r: _spread(r, "velocity", 1e3, 2),
-        "acceleration [m/s²]": lambda r: _spread(r, "acceleration", 1.0, 0),
+        "peak force [N]": lambda r: mean(r, "peak_force"),
+        "impacts": lambda r: mean(r, "impacts", digits=1),
+        "angle [mrad]": lambda r: mean(r, "angle", 1e3, 3),
+        "z [mm]": lambda r: mean(r, "displacement", 1e3, 4),
+        "v [mm/s]": lambda r: mean(r, "velocity", 1e3, 2),
+        "acceleration [m/s²]": lambda r: mean(r, "acceleration"),
     }
     more = f"{' and '.join(map(str, MOST_COMPLETE))} coordinates next to {COUNT} show what more would change."
     return f"{_why_not_all(rows)}{more}\n\n{table(sorted(rows['clearance'], key=_order), {**SET, **columns, **COST})}"
@@ -224,18 +221,9 @@ def _is_mesh_study(row: Row) -> bool:
     return (row["place_mm"], row["condition"], row["count"]) == (next(iter(PLACES)), "craig-bampton", COUNT)
 
 
-def _label(row: Row) -> str:
-    return row["condition"] if row["condition"] in (FULL, RIGID) else f"{row['condition']} {row['count']}"
-
-
 def _order(row: Row) -> tuple[int, int, int]:
     names = (RIGID, *CONDITIONS, FULL)
     return row["place_mm"], names.index(row["condition"]), row["count"]
-
-
-def _spread(row: Row, name: str, factor: float, digits: int) -> str:
-    mean = f"{factor * row[name]:.{digits}f}"
-    return mean if row["members"] == 1 else f"{mean} ± {factor * row[f'{name}_std']:.{digits}f}"
 
 
 def _or_none(names: list[str]) -> str:
@@ -359,9 +347,9 @@ def _draw_clearance(rows: list[Row]) -> Any:
 
 
 def _bars(ax: Any, x: list[float], rows: list[Row], condition: str) -> None:
-    mean, spread = ([r[name] for r in rows] for name in ("peak_force", "peak_force_std"))
+    peaks, spread = ([r[name] for r in rows] for name in ("peak_force", "peak_force_std"))
     style = {"color": COLORS[condition], "marker": MARKERS[condition], "linestyle": "none", "capsize": 3}
-    ax.errorbar(x, mean, yerr=spread, label=condition, **style)
+    ax.errorbar(x, peaks, yerr=spread, label=condition, **style)
 
 
 def _plain(ax: Any) -> None:

@@ -56,7 +56,7 @@ class Parts:
         now = time.process_time()
         self.seconds[list(PARTS)[self._now]] += now - self._since
         self._since = now
-        self._now = max([self._now, *(k for k, said in enumerate(PARTS.values()) if said in text)])
+        self._now = max([self._now, *(k for k, words in enumerate(PARTS.values()) if words in text)])
 
 
 def _body(case: Case) -> list[Record]:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import psutil
@@ -104,7 +105,7 @@ def _runner(kind: Kind) -> Callable[[float], None]:
 @contextmanager
 def _timed_kernels() -> Iterator[list[float]]:
     """Sum the processor time [s] of the compiled functions that are called inside this context."""
-    spent, plain = [0.0], {name: getattr(Engine, name) for name in ("evaluate", "advance", "observe")}
+    spent = [0.0]
 
     def timed(function: Callable[..., None]) -> Callable[..., None]:
         def call(*given: Any) -> None:
@@ -114,13 +115,9 @@ def _timed_kernels() -> Iterator[list[float]]:
 
         return call
 
-    for name, function in plain.items():
-        setattr(Engine, name, timed(function))
-    try:
+    kernels: dict[str, Any] = {name: timed(getattr(Engine, name)) for name in ("evaluate", "advance", "observe")}
+    with patch.multiple(Engine, **kernels):
         yield spent
-    finally:
-        for name, function in plain.items():
-            setattr(Engine, name, function)
 
 
 def _workers() -> Record:
@@ -162,10 +159,10 @@ def show(records: list[Record]) -> dict[str, str]:
         "kernels": lambda r: f"{r['kernels_ms']:.1f}",
         "the rest": lambda r: f"{r['rest_ms']:.1f} ± {percent(r['spread'])}",
     }
-    said = []
+    sentences = []
     for record in records:
         if "ratio" in record:
-            said.append(
+            sentences.append(
                 f"Two workers compute {record['points']} points with clearance {record['ratio']:.2f} times as fast as "
                 f"one, at a load average of {record['load']:.1f} for the whole machine."
             )
@@ -173,8 +170,8 @@ def show(records: list[Record]) -> dict[str, str]:
             few, many = (
                 f"{value:.0f} MB after {n}" for value, n in zip(record["megabytes"], record["looks"], strict=True)
             )
-            said.append(f"A worker takes {few} points of the ideal mechanism, and {many}.")
-    return {"points": table(points, columns), "workers": "\n".join(said)}
+            sentences.append(f"A worker takes {few} points of the ideal mechanism, and {many}.")
+    return {"points": table(points, columns), "workers": "\n".join(sentences)}
 
 
 FAMILY = Family(

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.families.geometry import JOINTS
 from benchmarks.family import Record as Row
-from benchmarks.page import Columns, table
+from benchmarks.page import Columns, mean, table
 from benchmarks.reference_conditions.design import FULL, PLACES, RIGID
 from flexclear.pipeline.post.plotting.table import pipe_table
 
@@ -125,18 +125,18 @@ def _listed(places: list[int]) -> str:
     return " and ".join(f"{place} mm" for place in places)
 
 
-def _alike(rows: Rows) -> tuple[bool, str]:
+def _consistent(rows: Rows) -> tuple[bool, str]:
     full = rows.named("far", FULL)
-    apart = {name: abs(rows.free()[name] - rows.fixed()[name]) / full[name] for name in EFFECTS}
-    worst = max(apart, key=lambda n: apart[n])
+    difference = {name: abs(rows.free()[name] - rows.fixed()[name]) / full[name] for name in EFFECTS}
+    worst = max(difference, key=lambda n: difference[n])
     found = [_percent(row["velocity"] / full["velocity"]) for row in (rows.free(), rows.fixed())]
-    return apart[worst] < AGREE, (
-        f"they differ by {_percent(apart[worst])} of the full rod's effect ({worst}); of its effect on the velocity "
-        f"they find {found[0]} (free-free) and {found[1]} (fixed-fixed)"
+    return difference[worst] < AGREE, (
+        f"they differ by {_percent(difference[worst])} of the full rod's effect ({worst}); of its effect on the "
+        f"velocity they find {found[0]} (free-free) and {found[1]} (fixed-fixed)"
     )
 
 
-def _suited(which: str) -> Callable[[Rows], tuple[bool, str]]:
+def _right(which: str) -> Callable[[Rows], tuple[bool, str]]:
     def test(rows: Rows) -> tuple[bool, str]:
         found = off(getattr(rows, which)(), rows.named("far", FULL))
         return max(found.values()) < AGREE, "off by " + ", ".join(f"{_percent(s)} ({n})" for n, s in found.items())
@@ -154,22 +154,22 @@ def _dominates(rows: Rows) -> tuple[bool, str]:
 
 def _insensitive(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
-    apart = {name: abs(free[name] - fixed[name]) / fixed[name] for name in ("angle", "displacement", "velocity")}
-    return max(apart.values()) < AGREE, ", ".join(f"{name} {_percent(a)}" for name, a in apart.items())
+    difference = {name: abs(free[name] - fixed[name]) / fixed[name] for name in ("angle", "displacement", "velocity")}
+    return max(difference.values()) < AGREE, ", ".join(f"{name} {_percent(a)}" for name, a in difference.items())
 
 
-def _apart(rows: Rows) -> tuple[bool, str]:
+def _sensitive(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
     good = all(_differ(free, fixed, name) for name in ("peak_force", "acceleration"))
     return good, (
-        f"peak force {_mean(free, 'peak_force')} N and {_mean(fixed, 'peak_force')} N, "
-        f"acceleration {_mean(free, 'acceleration')} m/s² and {_mean(fixed, 'acceleration')} m/s²"
+        f"peak force {mean(free, 'peak_force')} N and {mean(fixed, 'peak_force')} N, "
+        f"acceleration {mean(free, 'acceleration')} m/s² and {mean(fixed, 'acceleration')} m/s²"
     )
 
 
 def _differ(a: Row, b: Row, name: str) -> bool:
-    apart, spread = abs(a[name] - b[name]), max(a[f"{name}_std"], b[f"{name}_std"])
-    return bool(apart > AGREE * abs(b[name]) and apart > DIFFER * spread)
+    difference, spread = abs(a[name] - b[name]), max(a[f"{name}_std"], b[f"{name}_std"])
+    return bool(difference > AGREE * abs(b[name]) and difference > DIFFER * spread)
 
 
 def _fixed_is_right(rows: Rows) -> tuple[bool, str]:
@@ -177,7 +177,7 @@ def _fixed_is_right(rows: Rows) -> tuple[bool, str]:
     off_by = {w: getattr(rows, w)("clearance")["peak_force"] - best["peak_force"] for w in ("free", "fixed")}
     return abs(off_by["fixed"]) < abs(off_by["free"]), (
         f"peak force off by {off_by['free']:+.0f} N (free-free) and {off_by['fixed']:+.0f} N (fixed-fixed) of "
-        f"{_mean(best, 'peak_force')} N, which itself changed by {unsettled(rows):.0f} N with the last coordinates"
+        f"{mean(best, 'peak_force')} N, which itself changed by {unsettled(rows):.0f} N with the last coordinates"
     )
 
 
@@ -190,7 +190,7 @@ def unsettled(rows: Rows) -> float:
 def _softens(rows: Rows) -> tuple[bool, str]:
     best, rigid = rows.best(), rows.named("clearance", RIGID)
     fall = 1.0 - best["peak_force"] / rigid["peak_force"]
-    return fall > AGREE, f"peak force {rigid['peak_force']:.0f} N rigid, {_mean(best, 'peak_force')} N flexible"
+    return fall > AGREE, f"peak force {rigid['peak_force']:.0f} N rigid, {mean(best, 'peak_force')} N flexible"
 
 
 def _enlarges(rows: Rows) -> tuple[bool, str]:
@@ -215,22 +215,18 @@ def _percent(fraction: float) -> str:
     return f"{100.0 * fraction:.3g} %" if fraction >= SHOWN else f"under {100.0 * SHOWN:g} %"
 
 
-def _mean(row: Row, name: str) -> str:
-    return f"{row[name]:.0f} ± {row[f'{name}_std']:.0f}"
-
-
 CLAIMS = (
     Claim(
         "With ideal joints, free-free and fixed-fixed modes give consistent answers (Table 7).",
         f"The effects of the rod's flexibility differ by less than {100.0 * AGREE:g} % of that of the full rod.",
-        _alike,
+        _consistent,
     ),
     Claim(
         "With ideal joints, free-free modes are suitable.",
         f"Largest effects on angle, height, velocity and force at A1 are within {100.0 * AGREE:g} % of the full rod's.",
-        _suited("free"),
+        _right("free"),
     ),
-    Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _suited("fixed")),
+    Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _right("fixed")),
     Claim(
         "Next to clearance, the rod's flexibility hardly moves the platform (Tables 7 and 8).",
         f"Angle and displacement change by less than {100.0 * SMALL:g} % of what clearance does to them.",
@@ -244,7 +240,7 @@ CLAIMS = (
     Claim(
         "With clearance, contact force and acceleration do depend on it.",
         f"Means differ by more than {100.0 * AGREE:g} %, and than {DIFFER:g} standard deviations of the members.",
-        _apart,
+        _sensitive,
     ),
     Claim(
         "The reference condition to impose is fixed-fixed.",
@@ -356,6 +352,4 @@ def _peaks(rows: list[Row]) -> str:
 
 
 def _peak(name: str, line: Row) -> str:
-    row = line[name]
-    mean = f"{row['peak_force']:.0f}"
-    return mean if row["members"] == 1 else f"{mean} ± {row['peak_force_std']:.0f}"
+    return mean(line[name], "peak_force")

@@ -10,7 +10,7 @@ from typing import Any
 
 import xarray as xr
 
-from benchmarks.layouts import FIRST, Layout, chosen, edits, family
+from benchmarks.layouts import FIRST, Layout, by_condition, chosen, edits, family
 from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
@@ -63,10 +63,10 @@ class Case:
     members: int = field(default=0)
     layout: Layout | None = None
 
-    @property
-    def label(self) -> str:
-        """Name in progress reports and tables."""
-        return self.condition if self.condition in (FULL, RIGID) else f"{self.condition} {self.count}"
+
+def label(condition: str, count: int) -> str:
+    """Return the name of a mode set in progress reports and tables."""
+    return condition if condition in (FULL, RIGID) else f"{condition} {count}"
 
 
 def modes(case: Case) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def task(case: Case) -> Task:
         inputs={f"bundle/{body}": made for body, made in graph.bundle.items()},
         modules=(module, *simulation.modules(given)),
         folder="",
-        part=f"{case.place} mm, {case.label}" + (", clearance" if case.clearance else ""),
+        part=f"{case.place} mm, {label(case.condition, case.count)}" + (", clearance" if case.clearance else ""),
     )
 
 
@@ -131,7 +131,7 @@ def is_whole(case: Case) -> bool:
     try:
         solved(case)
     except InputError as error:
-        if "cut a cluster" in str(error):
+        if "split a cluster" in str(error):
             return False
         raise
     return True
@@ -172,9 +172,7 @@ def clearance(members: int) -> list[Case]:
 @cache
 def layouts() -> tuple[Layout, ...]:
     """Return the chosen layout, members of its family by rising condition number, and last the first layout."""
-    members = sorted(family(LAYOUT_GRID), key=lambda member: member.answer.condition)
-    found = [chosen(family()), *members[::EVERY]]
-    return (*(member.layout for member in found), FIRST)
+    return (chosen(family()), *by_condition(family(LAYOUT_GRID))[::EVERY], FIRST)
 
 
 def of_layout(layout: Layout, members: int) -> list[Case]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from typing import Any
 
@@ -11,7 +11,6 @@ import xarray as xr
 
 import flexclear as fc
 from benchmarks import family, layouts
-from benchmarks.family import Measured
 from benchmarks.family import Record as Row
 from benchmarks.layouts import deviation_row
 from benchmarks.reference_conditions import design
@@ -27,14 +26,13 @@ VIBRATIONS = 6
 
 def cases(members: int) -> list[family.Case]:
     """Return one case for each group of rows on the page."""
-    return [family.Case(name, members if name in ENSEMBLES else None) for name in GROUPS]
+    return [family.Case(name, (members,) if name in ENSEMBLES else ()) for name in GROUPS]
 
 
-def measure(cases: Sequence[family.Case], jobs: int) -> Measured:
-    """Yield the rows of each group."""
-    for case in cases:
-        rows = GROUPS[case.name]
-        yield case, list(rows() if case.of is None else rows(case.of))
+@family.each
+def measure(case: family.Case) -> list[Row]:
+    """Return the rows of a group."""
+    return list(GROUPS[case.name](*case.of))
 
 
 def bring(cases: list[design.Case], place: Workplace) -> dict[design.Case, xr.Dataset]:

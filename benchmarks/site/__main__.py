@@ -48,12 +48,8 @@ def main(arguments: list[str] | None = None) -> int:
 def stale() -> dict[str, str]:
     """Return the new texts of the outdated pages, by page."""
     made = {page: make() for page, make in PAGES.items()}
-    return {page: text for page, text in made.items() if _written(page) != text}
-
-
-def _written(page: str) -> str | None:
-    path = DOCS / page
-    return path.read_text(encoding="utf-8") if path.is_file() else None
+    present = {page: (DOCS / page).read_text(encoding="utf-8") for page in made if (DOCS / page).is_file()}
+    return {page: text for page, text in made.items() if present.get(page) != text}
 
 
 if __name__ == "__main__":

@@ -59,9 +59,9 @@ EDITS = """## Edits of another file
 | key | value | meaning |
 |---|---|---|
 | `extends` | text | scene file that this one edits, relative to it |
-| `[replace.<family>.<name>]` | a part | put in the place of the old one, of which nothing stays |
-| `[set.<family>.<name>]` | some keys | only these change |
-| `remove` | list of text | places that are taken away, such as `"joint.A1"` |
+| `[replace.<family>.<name>]` | a part | replaces the old part completely |
+| `[set.<family>.<name>]` | some keys | keys to change; all others are unchanged |
+| `remove` | list of text | paths to remove, such as `"joint.A1"` |
 
 """
 

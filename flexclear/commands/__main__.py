@@ -105,17 +105,17 @@ class Parser(argparse.ArgumentParser):
         unknown = message.removeprefix("unrecognized arguments: ").split()
         if unknown[0].startswith("-") and message.startswith("unrecognized"):
             name = unknown[0].partition("=")[0]
-            raise InputError(name, "there is no such option", suggestion(name, sorted(self.options)))
+            raise InputError(name, "unknown option", suggestion(name, sorted(self.options)))
         super().error(message)
 
 
 def require_command(name: str) -> None:
-    """Raise InputError for a word that is no command."""
+    """Raise InputError for a word that is not a command."""
     if name in COMMANDS or name.startswith("-"):
         return
     if name.endswith(".toml"):
-        raise InputError(name, "is no command", f"a command comes first, as in: flexclear check {name}")
-    raise InputError(name, "there is no such command", suggestion(name, COMMANDS))
+        raise InputError(name, "is not a command", f"a command comes first, as in: flexclear check {name}")
+    raise InputError(name, "unknown command", suggestion(name, COMMANDS))
 
 
 def parser(arguments: list[str]) -> argparse.ArgumentParser:

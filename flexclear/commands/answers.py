@@ -40,7 +40,7 @@ AHEAD = 2
 MEANS = 1e-7
 #: numbers of members with which effects are compared; they rise until the difference is decided or the budget is used
 MEMBERS = (4, 8, 16, 32)
-#: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.matters`
+#: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.effect_ranking`
 IDEAL = "clearance and flexibility"
 
 
@@ -56,25 +56,25 @@ class ShownAnswer:
 
 
 def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
-    """Return heading, text, picture and table of the answer called accuracy, stability or matters."""
-    from flexclear.pipeline.post.answers import matters
+    """Return heading, text, picture and table of the answer called accuracy, stability or effects."""
+    from flexclear.pipeline.post.answers import effect_ranking
     from flexclear.pipeline.post.cost.answer import sentences
 
     data = answer.dataset()
     if name == "accuracy":
         caption = "Error against processor time; the star is this scene"
-        return ShownAnswer("What accuracy costs", sentences(data), "accuracy.png", caption)
+        return ShownAnswer("Accuracy against cost", sentences(data), "accuracy.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
         caption = "Errors of energy and loops over time, and their limits"
         table = prose(("check", *columns), rows)
-        return ShownAnswer("Is it stable", data.attrs["answer"], "stability.png", caption, table)
+        return ShownAnswer("Is the integration stable", data.attrs["answer"], "stability.png", caption, table)
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
-    caption = "Change of each quantity without the effect; thin lines: what of it may be chance"
-    text, table = matters.sentence(data, requested), scenes.tables(answer, "matters.md")
-    return ShownAnswer("Which effects matter", text, "matters.png", caption, table)
+    caption = "Change of each quantity without the effect; thin lines: part that may be due to chance"
+    text, table = effect_ranking.sentence(data, requested), scenes.tables(answer, "effect_ranking.md")
+    return ShownAnswer("Which effects matter", text, "effect_ranking.png", caption, table)
 
 
 def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
@@ -92,7 +92,7 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool
     else:
         answer = getattr(Answers(scene, workplace, given, questions=1), name)
     if answer is None:
-        raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
+        raise InputError(str(scene.path or scene.name), "has no effect that can be removed, or [view] watch is empty")
     words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
     return answered(answer.dataset(), words.text, picture, words.table)
@@ -167,7 +167,7 @@ class Answers:
         return self.workplace.made(task)[0]
 
     @cached_property
-    def matters(self) -> Made | None:
+    def effects(self) -> Made | None:
         """Return which effects matter (`stages.effect_study`); None for a scene without effects or watches."""
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
@@ -197,7 +197,7 @@ class _Comparison:
 
     def task(self) -> Task:
         """Run the points that the budget allows and return the task of the answer."""
-        from flexclear.pipeline.post.answers.matters import Pair, undecided
+        from flexclear.pipeline.post.answers.effect_ranking import Pair, undecided
 
         levels = MEMBERS if self._has_contacts("") else (0,)
         waiting = names = self._affordable(list(self._removed), levels[0])

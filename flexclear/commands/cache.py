@@ -83,11 +83,11 @@ def _check(options: argparse.Namespace) -> None:
     text = (
         f"{len(inventory.artifacts)} artifacts, {len(faults)} faults, {len(inventory.orphans)} files without a record"
     )
-    unused = f", {len(others)} of another build, which nothing uses" if others else ""
+    unused = f", {len(others)} unused ones of another build" if others else ""
     print(f"{text}; {len(kernels)} compiled kernels{unused}")
     if faults:
         raise ResourceError(
-            "damaged files are never used: what needs them makes them again; `cache prune` removes them"
+            "damaged files are never used: they are computed again when needed; `cache prune` removes them"
         )
 
 
@@ -95,7 +95,7 @@ def _explain(options: argparse.Namespace) -> None:
     store = open_workplace().store
     record = maintenance.find(store, options.what)
     if record is None:
-        raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
+        raise InputError(options.what, "is neither a shown file nor the beginning of a single key", "see results/runs")
     print(f"{record.stage} {record.key}")
     for name, digest in record.files.items():
         print(shown(f"  holds {name}: sha256 {digest}"))

@@ -82,7 +82,7 @@ def command(options: argparse.Namespace) -> int:
             text = lines.located(mistake) if isinstance(mistake, InputError) else mistake
             print(f"flexclear: {text}", file=sys.stderr)
         if len(errors) > 1:
-            print(f"flexclear: {len(errors)} mistakes", file=sys.stderr)
+            print(f"flexclear: {len(errors)} errors", file=sys.stderr)
     return min((mistake.exit_code for mistake in errors.values()), default=0)
 
 
@@ -276,7 +276,7 @@ def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[In
         yield InputError(
             f"{path} [shape.length_unit]",
             f"with lengths in {unit} the mesh is {size:.4g} m long",
-            f'write length_unit = "{other}" if its numbers are in {other}',
+            f'write length_unit = "{other}" if the mesh is in {other}',
         )
 
 
@@ -322,7 +322,7 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
     unused = unused_frames(mechanism)
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
-        findings.notes.append(f"frames that nothing uses: {', '.join(unused[:LISTED_FRAMES])}{more}")
+        findings.notes.append(f"unused frames: {', '.join(unused[:LISTED_FRAMES])}{more}")
 
 
 def _starts_ideal(whole: Scene) -> bool:
@@ -367,4 +367,4 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings
     if _starts_ideal(whole):
         _note_choice(whole, model.mechanism, findings)
     closed = " with loose joints closed" if loose(whole) else ""
-    findings.notes.append(f"free motions besides the drives{closed}: {free}")
+    findings.notes.append(f"free motions in addition to the drives{closed}: {free}")

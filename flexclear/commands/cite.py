@@ -41,11 +41,11 @@ def text(graph: Graph, sources: Sources) -> str:
     scene = graph.scene
     used, always = list(methods(graph, sources)), _at_once(graph, sources)
     lines = [f"Methods of {scene.name}"]
-    lines += [f"  {module}: {source}" for module, source in used if module in always] or ["  (none is named)"]
-    lines.append("Methods that are used where a run or a command needs them")
-    lines += [f"  {module}: {source}" for module, source in used if module not in always] or ["  (none is named)"]
+    lines += [f"  {module}: {source}" for module, source in used if module in always] or ["  (none)"]
+    lines.append("Methods used only when a run or a command needs them")
+    lines += [f"  {module}: {source}" for module, source in used if module not in always] or ["  (none)"]
     lines.append(f"Data of {scene.name}")
-    lines += [f"  {where}: {source}" for where, source in scene.sources().items()] or ["  (none is named)"]
+    lines += [f"  {where}: {source}" for where, source in scene.sources().items()] or ["  (none)"]
     return "\n".join(lines) + "\n"
 
 

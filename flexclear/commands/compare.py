@@ -64,7 +64,7 @@ def bring(
     if len(sides) < 2:
         raise InputError(
             sides[0].name if sides else "compare",
-            "one scene alone is compared with nothing",
+            "a single scene has no other to compare with",
             "name several, or compare it with its ideal mechanism: --ideal",
         )
     names = [side.name for side in sides]

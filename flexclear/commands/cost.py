@@ -77,7 +77,7 @@ def command(options: argparse.Namespace) -> None:
 
     def first(made: Made) -> None:
         if not options.json:
-            text = f"{relative(made.folder)}: first answer; going on\n"
+            text = f"{relative(made.folder)}: first answer; continuing\n"
             print(made.text(PRINTED[0]), text, sep="\n", flush=True)
 
     for graph in scenes.graphs(options.scenes, options.set):
@@ -371,7 +371,7 @@ class Peer(Part):
     @model_validator(mode="after")
     def _same_length(self) -> Self:
         if any(len(errors) != len(self.seconds) for errors in self.error.values()):
-            raise ValueError(f"'{self.name}' has {len(self.seconds)} times, but another number of errors")
+            raise ValueError(f"'{self.name}' has {len(self.seconds)} times and a different number of errors")
         return self
 
 

@@ -117,7 +117,7 @@ def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
     known = [name for name, traits in INTEGRATORS.items() if traits.tolerances or traits.steps]
     for name in integrators:
         if name not in known:
-            raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
+            raise InputError(f"--integrators {name}", "is not one of the compared integrators", suggestion(name, known))
     result = list[Design]()
     for name in integrators or known:
         result += [_tolerant(scene, name, rtol) for rtol in INTEGRATORS[name].tolerances]

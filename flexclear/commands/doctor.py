@@ -109,12 +109,12 @@ def command(options: argparse.Namespace) -> None:
     if options.out is not None:
         if options.bundle is None:
             raise InputError(
-                f"--out {options.out}", "is where --bundle writes, which is not given", "add --bundle SCENE"
+                f"--out {options.out}", "is the file of --bundle, which is not given", "add --bundle SCENE"
             )
         scenes.check_out(options.out, (options.bundle,), endings=(".zip",))
     if options.bundle is not None:
         path, left_out = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
-        print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")
+        print(f"{path}: the scene's files, versions and messages; repeat with: flexclear doctor --repeat {path.name}")
         for file in left_out:
             print(f"left out: {file}, since a mesh names it outside of the scene's folders; move it next to the mesh")
         return
@@ -122,18 +122,18 @@ def command(options: argparse.Namespace) -> None:
         same, report = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
         print(report)
         if not same:
-            raise UnwellError("it does not end here as it did there")
+            raise UnwellError("the run ends differently here")
         return
     if options.compile is not None:
         names = compiled_for(options.compile, open_workplace())
-        print(f"compiled: all that runs of {', '.join(names)} call; {_kernels()[0]}")
+        print(f"compiled: all functions for runs of {', '.join(names)}; {_kernels()[0]}")
         return
     wrong = []
     for name, text, fine in findings():
         print(f"{LABELS[fine]}  {name:<10} {text}", flush=True)
         wrong += [name] if fine is False else []
     if wrong:
-        raise UnwellError(f"not well: {', '.join(wrong)}")
+        raise UnwellError(f"problems: {', '.join(wrong)}")
 
 
 def findings() -> Iterator[tuple[str, str, bool | None]]:
@@ -158,7 +158,7 @@ def _results(root: Path) -> tuple[str, bool]:
     free = machine.disk(root)
     wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
     if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
-        wrong.append("nothing can be written there: FLEXCLEAR_RESULTS names another folder")
+        wrong.append("the folder is not writable: set FLEXCLEAR_RESULTS to another")
     return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
 
 
@@ -169,10 +169,10 @@ def _kernels() -> tuple[str, bool]:
     except FlexclearError as error:
         return str(error), False
     if messages:
-        return f"{messages[0]}: FLEXCLEAR_KERNELS names another folder", False
+        return f"{messages[0]}: set FLEXCLEAR_KERNELS to another folder", False
     text = f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled"
     if machine.disk(folder) < LITTLE_FOR_KERNELS:
-        return f"{text}; only {machine.size(machine.disk(folder))} free: FLEXCLEAR_KERNELS names another folder", False
+        return f"{text}; only {machine.size(machine.disk(folder))} free: set FLEXCLEAR_KERNELS to another folder", False
     return text, True
 
 
@@ -208,7 +208,7 @@ def _self_test() -> tuple[str, bool]:
         last_lines = errors[-1:] if any(line.startswith("Traceback") for line in errors) else errors[-4:]
         return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
-    return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine
+    return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m instead of {expected:.12g} m", fine
 
 
 def compiled_for(names: list[str], workplace: Workplace) -> list[str]:

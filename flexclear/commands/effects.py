@@ -64,11 +64,11 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
     if not present:
         raise InputError(
             str(scene.path or scene.name),
-            "has no effect that could be taken away: no clearance, flexible body, friction, gravity or stop",
+            "has no effect that can be removed: no clearance, flexible body, friction, gravity or stop",
             "compare it with another scene: flexclear compare A B",
         )
     if not chosen:
-        raise InputError(str(scene.path or scene.name), "nothing in it is watched", "name quantities in [view] watch")
+        raise InputError(str(scene.path or scene.name), "no quantity is watched", "name quantities in [view] watch")
     by_name = {effect.name: effect for effect in present}
     scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(present)}
     tasks = {gone: watched_quantities.task(variant, chosen, members) for gone, variant in scenes.items()}
@@ -77,6 +77,6 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
         Part("chart", "Chart", pictures(made, {"effects.png": ("Each effect alone",)})),
         Part("table", "Table", tables(made, "effects.md")),
     ]
-    lead = "Every effect of the scene taken away and put in, alone and in pairs."
+    lead = "Every effect of the scene removed and added, alone and in pairs."
     publish(made.folder / "index.html", page(f"Effects: {scene.title}", lead, parts))
     return made

@@ -24,7 +24,7 @@ KNOWN = ", ".join(NEEDS)
 def check_format(target: Path, endings: Sequence[str] = tuple(NEEDS), option: str = "--out") -> None:
     """Raise InputError when a name's ending is no known format or its library is missing; called before the work."""
     if target.suffix not in endings:
-        raise InputError(f"{option} {target}", f"'{target.suffix}' is no known format", f"known: {', '.join(endings)}")
+        raise InputError(f"{option} {target}", f"unknown format '{target.suffix}'", f"known: {', '.join(endings)}")
     library = NEEDS.get(target.suffix, "")
     if library and find_spec(library) is None:
         raise InputError(f"{option} {target}", f"needs the library {library}", f"pip install {library}, or write .csv")

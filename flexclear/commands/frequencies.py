@@ -156,13 +156,14 @@ def _freedoms(linear: xr.Dataset) -> list[str]:
     """Return lines on mobility: free motions, those without stiffness, and closure rows that follow from others."""
     limp, repeated = linear.attrs["motions_without_stiffness"], linear.attrs["redundant_closure_rows"]
     lines = [
-        f"free motions besides the drives: {linear.attrs['mobility']}" + (f", {limp} without stiffness" if limp else "")
+        f"free motions in addition to the drives: {linear.attrs['mobility']}"
+        + (f", {limp} without stiffness" if limp else "")
     ]
     if joints := linear.attrs["undetermined_reactions"]:
-        says = "condition of the closed loops follows" if repeated == 1 else "conditions of the closed loops follow"
+        says = "loop closure condition is" if repeated == 1 else "loop closure conditions are"
         lines.append(
-            f"{repeated} {says} from the others, as three do in a planar loop: motion and frequencies are the same "
-            f"without, but rigid bodies do not determine the reactions of {joints}"
+            f"{repeated} {says} redundant, as are three in a planar loop: motion and frequencies are unaffected, "
+            f"but rigid bodies do not determine the reactions of {joints}"
         )
     return lines
 

@@ -40,10 +40,10 @@ def command(options: argparse.Namespace) -> None:
     scene = files[0]
     print(
         "next:",
-        f"  flexclear show {scene}        the start pose with all names; nothing is run",
-        f"  flexclear check {scene}       every mistake at once; nothing is run",
+        f"  flexclear show {scene}        the start pose with all names, without a run",
+        f"  flexclear check {scene}       all errors at once, without a run",
         f"  flexclear render {scene}      film and pictures",
-        f"  flexclear report {scene}      one page with figures, and next to its ideal mechanism",
+        f"  flexclear report {scene}      one page with figures, compared with the ideal mechanism",
         sep="\n",
     )
 
@@ -58,7 +58,7 @@ def write(kind: str, folder: Path) -> list[Path]:
         if target.exists():
             raise InputError(
                 str(target),
-                "is there already, and is not written over",
+                "already exists and is not overwritten",
                 f"name another folder: flexclear new {kind} FOLDER",
             )
     try:

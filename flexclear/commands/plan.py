@@ -1,4 +1,4 @@
-"""``flexclear plan``: effects, modes and tolerance that a scene's requested accuracy calls for, with the evidence."""
+"""``flexclear plan``: effects, modes and tolerance that a scene's requested accuracy requires, with the evidence."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def with_accuracy(scene: Scene, level: str) -> Scene:
     """Return the scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
     chosen = {quantity.name: level for quantity in scene.watched()}
     if not chosen:
-        raise InputError(str(scene.path or scene.name), "watches nothing", "name quantities in [view] watch")
+        raise InputError(str(scene.path or scene.name), "watches no quantity", "name quantities in [view] watch")
     asked = edited(scene, {"accuracy": chosen})
     asked._name, asked._path = f"{scene.name} to {level.replace(' ', '')}", None
     return asked
@@ -142,7 +142,7 @@ class Planned:
         assert self.scene.path is not None
         head = (
             "written by flexclear plan",
-            "what the requested accuracy of the full scene does not call for is left out",
+            "omitted: effects that the requested accuracy of the full scene does not require",
         )
         base = load_scene(self.scene.path)
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
@@ -167,12 +167,12 @@ def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Plann
     if scene.accuracy is None or not scene.accuracy.quantities:
         raise InputError(
             f"{where} [accuracy]",
-            "the scene asks for no accuracy",
-            f"name one with what it may be off, such as {_example(scene)} in [accuracy]",
+            "the scene requests no accuracy",
+            f"request one in [accuracy], such as {_example(scene)}",
         )
     if not variants.effects(scene):
         raise InputError(
-            where, "has no effect that could be left out: no clearance, flexible body, friction, gravity or stop"
+            where, "has no effect that could be omitted: no clearance, flexible body, friction, gravity or stop"
         )
     (made,) = workplace.made(effect_plan.task(scene, watched=level is not None))
     planned = Planned(scene, of(scene, made.dataset()), made)

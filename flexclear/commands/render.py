@@ -68,7 +68,7 @@ def _requested(what: str | None, kind: str | None) -> tuple[str, str] | None:
     kind = kind or next(k for k in ("mp4", "html", "png") if k in FORMATS[what])
     if kind not in FORMATS[what]:
         raise InputError(
-            f"--what {what} --format {kind}", f"{what} cannot be shown so", f"as {', '.join(FORMATS[what])}"
+            f"--what {what} --format {kind}", f"{what} has no such format", f"as {', '.join(FORMATS[what])}"
         )
     return what, kind
 
@@ -81,7 +81,7 @@ def _mode_sets(graphs: list[Graph]) -> Task:
         scene=graphs[-1].scene.name,
         part="modes of all",
         run="flexclear.stages.rendering:run",
-        params={"what": "modes", "format": "html", "title": "Mode sets next to each other"},
+        params={"what": "modes", "format": "html", "title": "Mode sets side by side"},
         inputs=bundles,
         folder=f"compare/{scenes.joined([graph.scene.name for graph in graphs])}",
     )

@@ -48,31 +48,31 @@ FIGURES = {
     name: (caption, alt)
     for name, caption, alt in rows("""
 motion.png | Motion | Displacement, velocity and rotation of the bodies over time
-reactions.png | Reactions and drives | Magnitude of the force in each joint, and what drives supply, over time
+reactions.png | Reactions and drives | Magnitude of the force in each joint, and forces of drives, over time
 contacts.png | Joints with clearance | Path of the ball or pin in its socket, the gap, and the normal force over time
-wear.png | Wear of contacts | Load times sliding way over time, and how deep the surfaces wear over the angle
+wear.png | Wear of contacts | Load times sliding distance over time, and wear depth of the surfaces over the angle
 joint_friction.png | Friction of ideal joints | Normal force in the bearings and energy lost, over time
-watched.png | Watched quantities | What the scene watches, over time
+watched.png | Watched quantities | Quantities that the scene watches, over time
 energy.png | Energy | Energies over time, and the error of their balance
 """)
 }
 #: attributes of a run that say how it was computed, and their labels
 COST = {
     "method": "integrator",
-    "method_reason": "why this one",
+    "method_reason": "reason for this integrator",
     "evaluations": "evaluations of the equations of motion",
     "steps": "steps",
-    "rejected_steps": "steps made again, shorter, since their error was too large",
+    "rejected_steps": "rejected steps (error too large)",
     "jacobians": "Jacobians of the equations",
-    "projections": "times the closed loops were put together again",
+    "projections": "projections onto the loop closures",
     "switched": "another integrator continued",
-    "stiff_share": "fraction of the steps that stability made shorter than accuracy would have",
-    "redundant_closure_rows": "conditions of closed loops that follow from the others",
-    "accuracy_verdict": "accuracy asked for",
+    "stiff_share": "fraction of the steps limited by stability instead of accuracy",
+    "redundant_closure_rows": "redundant loop closure conditions",
+    "accuracy_verdict": "requested accuracy",
 }
 PROVENANCE = {
     "scene": "scene",
-    "source": "made by",
+    "source": "program",
     "versions": "versions of the libraries",
     "Conventions": "conventions of the datasets",
 }
@@ -177,7 +177,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
 def _answers(answers: Answers, workplace: Workplace) -> tuple[dict[str, Made], dict[str, int]]:
     """Return the answers that succeed, and the exit codes of the others, whose errors it reports; by name."""
     result, failed = dict[str, Made](), dict[str, int]()
-    for name in ("accuracy", "stability", "matters") if answers.questions else ("stability",):
+    for name in ("accuracy", "stability", "effects") if answers.questions else ("stability",):
         try:
             answer = getattr(answers, name)
         except FlexclearError as error:
@@ -206,7 +206,7 @@ def _page(
     run: xr.Dataset | None,
     answers: Mapping[str, Made],
 ) -> bytes:
-    from flexclear.pipeline.post.answers.matters import ideal_sentences
+    from flexclear.pipeline.post.answers.effect_ranking import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
     from flexclear.pipeline.post.single_run.series import parameters
 
@@ -216,7 +216,7 @@ def _page(
     assumptions = by_weight(assumed(derived_series.sources(scene)), run)
     members = _members(graph, made)
     parts: list[Any] = [
-        Part("film", "The mechanism moving", _moving(graph, made)),
+        Part("film", "The mechanism in motion", _moving(graph, made)),
         Part("run", "The run", pictures(made.get(graph.overview), FIGURES)),
         *_answered(scene, answers),
         *(compare.parts(compared) if compared is not None else []),
@@ -237,7 +237,7 @@ def _page(
     ]
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
-    changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
+    changes = ideal_sentences(answers["effects"].dataset()) if "effects" in answers else []
     return page(scene.title, lead, parts, answer(dataset, run, warnings, changes, members))
 
 
@@ -292,6 +292,6 @@ def _moving(graph: Graph, made: Mapping[Task, Made]) -> str:
         if what.endswith("html"):
             text += "".join(figures_of(one.text(name)) for name in sorted(one.record.files))
         elif what == "motion mp4":
-            film = ("The mechanism moving", f"Film of {graph.scene.title}")
+            film = ("The mechanism in motion", f"Film of {graph.scene.title}")
             text = pictures(one, dict.fromkeys(one.record.files, film)) + text
     return text

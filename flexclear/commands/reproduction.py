@@ -50,7 +50,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
     try:
         top = Path(os.path.commonpath([path.parent for path in files]))
     except ValueError:
-        raise InputError(name, "has files on several drives", "copy them to one") from None
+        raise InputError(name, "has files on several drives", "copy them to one drive") from None
     for path in files:
         if not path.relative_to(top).as_posix().isprintable():
             raise InputError(str(path), "has a name that other systems cannot read", "rename it")
@@ -89,7 +89,7 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
         done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
         output = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST_LOG:]
-    differences = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
+    differences = [f"the run ended with exit code {done.returncode} here, with {facts['exit_code']} there"]
     if digest and facts.get("run"):
         differences += [
             f"the run is {'the same to the last bit' if digest == facts['run'] else 'not the same to the last bit'}"
@@ -215,7 +215,7 @@ def _unpack(path: Path, folder: Path) -> tuple[dict[str, Any], str]:
             names = [PurePosixPath(entry.filename) for entry in entries]
             strange = [n for n in names if n.is_absolute() or ".." in n.parts or "\\" in str(n) or ":" in str(n)]
             if strange or sum(entry.file_size for entry in entries) > LARGEST_UNPACKED:
-                raise InputError(str(path), "holds names that lead out of it, or more than 1 GB", "do not open it")
+                raise InputError(str(path), "contains names that lead out of it, or more than 1 GB", "do not open it")
             facts, log = json.loads(archive.read(FACTS)), archive.read(LOG).decode(errors="replace")
             for entry, name in zip(entries, names, strict=True):
                 if name.parts[0] == FILES and not entry.is_dir():
@@ -228,4 +228,4 @@ def _unpack(path: Path, folder: Path) -> tuple[dict[str, Any], str]:
             raise ValueError
         return {**facts, "exit_code": int(facts["exit_code"]), "python": str(facts["python"])}, log
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
-        raise InputError(str(path), "is no file that `flexclear doctor --bundle SCENE` made") from None
+        raise InputError(str(path), "is not a file from `flexclear doctor --bundle SCENE`") from None

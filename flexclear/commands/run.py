@@ -47,7 +47,7 @@ def command(options: argparse.Namespace) -> None:
     """Bring scenes up to date; print the deficits of their bundles where those are the last stage."""
     check_out(options.out, options.scenes)
     if options.verify and not options.planned:
-        raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
+        raise InputError("--verify", "reports the true error of a plan, but no plan is requested", "add --planned")
     requested = graphs(options.scenes, options.set)
     workplace = open_workplace(options)
     plans = [plan.bring(graph.scene, workplace) for graph in requested] if options.planned else []

@@ -149,7 +149,7 @@ def _dataset(path: Path) -> xr.Dataset:
     with reading(path, str(path), "cannot be read as a NetCDF dataset", remedy):
         dataset = xr.load_dataset(path, engine="netcdf4")
     if not str(dataset.attrs.get("source")).startswith(f"{DISTRIBUTION} "):
-        why = "is a dataset, but no scene's: it has no attribute `source` that names flexclear"
+        why = "is not a dataset of a scene: it has no attribute `source` that names flexclear"
         raise InputError(str(path), why, remedy)
     return dataset
 
@@ -212,7 +212,7 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
             if requested is None or requested.allow_missed:
                 workplace.monitor.say(text)
             else:
-                missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")
+                missed.append(f"{text}\n  hint: request less, or write allow_missed = true in [accuracy]")
     if missed:
         raise MissedAccuracyError("\n".join(missed))
 
@@ -228,7 +228,7 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
     for text in settings:
         key, sign, value = text.partition("=")
         if not sign or not key.strip():
-            raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
+            raise InputError(f"--set {text}", "is not KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
         try:
             changes[key.strip()] = tomllib.loads(f"value = {value}")["value"]
         except ValueError:  # not TOML, or a number with more digits than Python reads
@@ -377,9 +377,9 @@ def check_target(target: Path, option: str = "--out") -> None:
         if target.is_dir():
             raise InputError(where, "is a folder", "name a file in it")
         if target.exists() and not target.is_file():  # replacing a device by a file would destroy it
-            raise InputError(where, "is no ordinary file", "name a file, and look at it when it is there")
+            raise InputError(where, "is not an ordinary file", "name an ordinary file")
     except OSError as error:
-        raise InputError(where, f"can be no file: {error.strerror}", "name another one") from None
+        raise InputError(where, f"cannot be a file: {error.strerror}", "name another one") from None
 
 
 def _refuse_namesakes(scenes: list[Scene]) -> None:
@@ -390,8 +390,8 @@ def _refuse_namesakes(scenes: list[Scene]) -> None:
         if path is not None and folders.setdefault(name, path) != path:
             raise InputError(
                 str(path),
-                f"is called '{scene.name}', as {folders[name]} is, and their results would replace each other",
-                "rename one, or call the command from a folder above both, which names them by their paths",
+                f"is called '{scene.name}', as is {folders[name]}: their results would replace each other",
+                "rename one, or call the command from a folder above both, where their paths name them",
             )
 
 
@@ -409,7 +409,7 @@ def claim(scene: Scene, store: Store) -> str | None:
         publish(note, checked({"file": str(path)}))
     if not isinstance(before, str) or not is_file(Path(before)):
         return None
-    return f"results/runs/{scene.name} showed {before}, and from now on shows {path}, which has the same name"
+    return f"results/runs/{scene.name} showed {before} and now shows {path}, which has the same name"
 
 
 def _file(scene: Scene) -> Path | None:

@@ -51,5 +51,5 @@ def text(scene: str, verdict: xr.Dataset) -> str:
     lines = [f"{scene}: {verdict.attrs['verdict']}"]
     lines += [f"  {reason}" for reason in str(verdict.attrs["reasons"]).split("; ")]
     if "contraction" in verdict:
-        lines.append(f"  successive returns come closer by {float(verdict.contraction):.3g} a period")
+        lines.append(f"  the distance of successive returns shrinks by {float(verdict.contraction):.3g} per period")
     return "\n".join(lines)

@@ -104,7 +104,7 @@ def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
     gaps = [Missing(gap.joint, gap.start, gap.end, gap.angle) for gap in pose.gaps]
     view = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
     if lone:
-        note = f"drawn at the origin, since neither a pose nor a joint places them: {', '.join(lone)}"
+        note = f"drawn at the origin, since they have neither pose nor joint: {', '.join(lone)}"
         view = replace(view, notes=(*view.notes, note))
     return view, pose.refused
 

@@ -226,7 +226,7 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
     if not quiet:
         print("\n".join(summary(plan, result, file)))
     if not (result["status"] == 0).any():
-        raise SolverError(f"{plan.sweep.name}: every point was refused; the reasons are above")
+        raise SolverError(f"{plan.sweep.name}: every point was refused; see the reasons above")
 
 
 def summary(plan: sweep_plan.Plan, result: xr.Dataset, file: Path) -> Iterator[str]:

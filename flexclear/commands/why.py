@@ -37,7 +37,7 @@ def notes(label: str, record: Record | None) -> list[str]:
     here = instruction_set() if stored else {}
     names = [name for name in {**stored, **here} if stored.get(name) != here.get(name)]
     changes = ", ".join(f"{name} {stored.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
-    return [f"{label} was computed by other instructions, its numbers differ by rounding: {changes}"] if names else []
+    return [f"{label}: other processor instructions, numbers differ by rounding: {changes}"] if names else []
 
 
 def text(reasons: Mapping[str, Mapping[str, Sequence[str]]], others: Mapping[str, Sequence[str]]) -> str:

@@ -155,7 +155,7 @@ def _read_data(context: Any, builder: Any, kind: Any, value: Any, name: str) -> 
         return builder.load(_single(context, builder, d, name))
     if name in m.LISTS:
         return builder.gep(d.n, [builder.load(_at(context, builder, d.n, m.LISTS[name]))])
-    index = m.NAMED[name].place if name in m.NAMED else {**m.SIZES, **m.INDICES, **m.STRETCHES}[name]
+    index = m.NAMED[name].at if name in m.NAMED else {**m.SIZES, **m.INDICES, **m.STRETCHES}[name]
     entry = builder.load(_at(context, builder, d.h, index))
     if name in m.SIZES or name in m.INDICES:
         return entry

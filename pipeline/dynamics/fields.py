@@ -92,7 +92,7 @@ def _rows(name: str) -> property:
     fields = {field: _field(*where) for field, where in m.row_fields(name).items()}
     row = type(name, (Stretch,), {"__slots__": (), **fields})
     kind = type(name, (Rows,), {"__slots__": (), "size": m.NAMED[name].size, "row": row})
-    array, index = m.ARRAYS[name], m.NAMED[name].place
+    array, index = m.ARRAYS[name], m.NAMED[name].at
     return property(lambda d: kind(getattr(d, array), d.h[index]))
 
 

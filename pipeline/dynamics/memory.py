@@ -10,7 +10,7 @@ A kernel's code depends only on the kinds of parts present. All else is in four 
 
 Kernels read and write these arrays by the names that are declared here (`fields`).  Python reads the same rows by the
 names of their fields (`named`), and rows of the record by their contents (`integrate.recording`).  ``h[m.NV]`` is a
-size, ``h[m.FORCE]`` the index in w where an array begins, ``h[m.LINKS.place]`` that of a table in its array, and
+size, ``h[m.FORCE]`` the index in w where an array begins, ``h[m.LINKS.at]`` that of a table in its array, and
 ``m.LINKS.parent`` the offset of a field in a row of the table.
 
 Arrays are flat, since calls and compilation cost in proportion to their arguments.  No two overlap, and the compiler
@@ -45,7 +45,7 @@ from flexclear.pipeline.core.scene.event_kinds import STICKING as STICKING
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.kernels import kernel
 
-_place = count()
+_index = count()
 #: tables in h, f and w, in the order of the arrays
 TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
 #: indices in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
@@ -61,26 +61,26 @@ LENGTHS: dict[int, tuple[int, str]] = {}
 _ROWS: dict[type, np.dtype[Any]] = {}
 
 
-def _places(number: int) -> list[int]:
+def _indices(number: int) -> list[int]:
     """Return the next indices of the header of h."""
-    return [next(_place) for _ in range(number)]
+    return [next(_index) for _ in range(number)]
 
 
 def _sizes(declared: str) -> list[int]:
     """Return the next indices of the header of h, for sizes."""
     names = declared.split()
-    places = _places(len(names))
-    SIZES.update(zip(names, places, strict=True))
-    return places
+    indices = _indices(len(names))
+    SIZES.update(zip(names, indices, strict=True))
+    return indices
 
 
 def _stretches(declared: str) -> list[int]:
     """Return the next indices of h's header, for stretches of w: "name:length", or the name where `_floats` sets it."""
     indices = []
     for name, _, length in (one.partition(":") for one in declared.split()):
-        STRETCHES[name] = place = next(_place)
-        LENGTHS[place] = (1, length)
-        indices.append(place)
+        STRETCHES[name] = index = next(_index)
+        LENGTHS[index] = (1, length)
+        indices.append(index)
     return indices
 
 
@@ -97,7 +97,7 @@ def _floats(stretch: int, declared: str) -> range:
     return range(len(names))
 
 
-def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str = "Layout", **place: int) -> Any:
+def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str = "Layout", **at: int) -> Any:
     """Declare a row: the offset of each field, and its `size`, preceded by its header index if it is of a table.
 
     declared: "name", "name:length" or "name:rowsxcolumns" of each field.  number: type of the entries.
@@ -106,20 +106,20 @@ def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str =
     fields = {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
     begins = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
     make: Any = namedtuple
-    row = make(kind, [*place, *fields, "size"])
+    row = make(kind, [*at, *fields, "size"])
     _ROWS[row] = np.dtype([(name, number, shape) for name, shape in fields.items()])
-    return row(*place.values(), *begins)
+    return row(*at.values(), *begins)
 
 
 def _table(array: str, declared: str, count: str = "") -> Any:
-    """Declare a table: its `place` (index) in the header, `size` of its rows, and offset of each field.
+    """Declare a table: its index `at` in the header, the `size` of its rows, and the offset of each field.
 
     count: number of rows of a table in w, written as in `LENGTHS`.
     """
-    table = layout(declared, np.int64 if array == "h" else np.float64, "Table", place=next(_place))
+    table = layout(declared, np.int64 if array == "h" else np.float64, "Table", at=next(_index))
     TABLES[array].append(table)
     if count:
-        LENGTHS[table.place] = (table.size, count)
+        LENGTHS[table.at] = (table.size, count)
     return table
 
 
@@ -166,7 +166,7 @@ class Room:
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: the function that the steps evaluate, EVALUATE's or one that stores only what they read (`specialise`)
-EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES = ADDRESSES = _places(7)
+EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES = ADDRESSES = _indices(7)
 
 # Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
@@ -348,7 +348,7 @@ for _effect in EFFECTS:
         OF_EFFECTS |= {name: _table(_array, rows) for name, rows in _tables.items()}
     OF_EFFECTS |= {name: work(rows, number) for name, (number, rows) in _effect.work.items()}
     _stretches(" ".join(_effect.stretches))
-HEADER = next(_place)
+HEADER = next(_index)
 
 # the ledger before the contacts' variables (three deflections of each contact with bristles follow those): work of
 # drives, loss of modal damping, both of the first independent mechanism; BOOKS has the indices for the others
@@ -421,7 +421,7 @@ NAMED: dict[str, Any] = {
 } | OF_EFFECTS
 #: header indices of the offsets of stretches of w, and of tables
 INDICES = {f"at_{name}": index for name, index in STRETCHES.items()}
-INDICES |= {f"at_{name}": table.place for name, table in NAMED.items()}
+INDICES |= {f"at_{name}": table.at for name, table in NAMED.items()}
 ARRAYS = {name: array for name, table in NAMED.items() for array in TABLES if table in TABLES[array]}
 #: shapes of fields that are tuples, and their numbers of entries
 TUPLES: dict[tuple[int, ...], int] = {(3,): 3, (3, 3): 9}

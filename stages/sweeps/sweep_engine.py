@@ -210,7 +210,7 @@ def _cluster(address: str) -> Iterator[Engine]:
         text = f"{where}: workers died again and again over a task ({error}); is their memory full?"
         raise ResourceError(text) from None
     except (CancelledError, FutureCancelledError, CommClosedError):
-        raise ResourceError(f"{where}: the scheduler has gone; finished results are stored") from None
+        raise ResourceError(f"{where}: the scheduler stopped; finished results are stored") from None
     except ImportError as error:  # from a worker that joined after the check
         raise InputError(where, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:
@@ -280,5 +280,5 @@ def _threads(client: Any, where: str) -> int:
         time.sleep(TICK)  # the scheduler removes workers that have died, and the others are asked again
     others = [worker for worker, digest in digests.items() if digest != source_digest()]
     if others:
-        raise InputError(where, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
+        raise InputError(where, f"worker {others[0]} runs different sources of flexclear", "install the same version")
     return int(threads)

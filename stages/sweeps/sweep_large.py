@@ -44,13 +44,13 @@ def is_large(plan: Plan) -> bool:
     allowed = plan.scene.limits.memory or machine.ALLOWED_FRACTION * machine.memory()
     need = TIMES_IN_MEMORY * plan_size(plan)
     if need > allowed and find_spec("zarr") is None:
-        machine.require_memory(need, "the sweep's dataset", f"keep less, or {INSTALL}: it is then on disk", allowed)
+        machine.require_memory(need, "the sweep's dataset", f"record less, or, to store on disk, {INSTALL}", allowed)
     return need > allowed
 
 
 def require_small(plan: Plan) -> None:
     """Raise ResourceError when a dataset that is to be returned does not fit into memory."""
-    remedy = "keep less, or make it by `flexclear sweep FILE`, which leaves it on disk"
+    remedy = "record fewer quantities, or use `flexclear sweep FILE`, which leaves the dataset on disk"
     machine.require_memory(TIMES_IN_MEMORY * plan_size(plan), "the sweep's dataset", remedy, plan.scene.limits.memory)
 
 

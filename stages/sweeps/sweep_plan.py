@@ -215,8 +215,8 @@ def _check_recorded(sweep: Sweep, base: Scene, sweep_design: Design, recorded: S
         if one.reduction == "series" and timed:
             raise InputError(
                 f"{where} [keep]",
-                f"'{one.name}' is a series, whose times are those of all points, but {timed[0]} is varied",
-                "keep a number of it, such as the final or the largest value",
+                f"'{one.name}' is a series, which needs equal output times at all points, but {timed[0]} is varied",
+                "record one number, such as the final or the largest value",
             )
         if one.reduction == "sections" and varied & set(COUNTS):
             raise InputError(f"{where} [vary.{COUNTS[0]}]", "points would have different numbers of sections", "set it")
@@ -224,17 +224,17 @@ def _check_recorded(sweep: Sweep, base: Scene, sweep_design: Design, recorded: S
     if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
         raise InputError(
             f"{where} [keep]",
-            "sections follow one motion over many periods: neither runs of one period, "
-            "nor members, nor an estimated error go with it",
-            "keep sections alone, or make two sweeps of it",
+            "sections follow one motion over many periods: runs of one period, members "
+            "and estimated errors are not possible with them",
+            "record sections only, or split it into two sweeps",
         )
     if sweep.members:
         require_scatter(base, f"{where} [members]")
     if sweep.members and any(one.quantity.kind == "orientation" for one in recorded):
-        raise InputError(f"{where} [keep]", "orientations have no mean over members", "keep a position instead")
+        raise InputError(f"{where} [keep]", "orientations have no mean over members", "record a position instead")
     if sweep.error and base.solver.step is not None:
         raise InputError(
-            f"{where} [error]", "the scene has steps of fixed length, which no tolerance changes", "vary solver.step"
+            f"{where} [error]", "the scene has fixed steps, on which a tolerance has no effect", "vary solver.step"
         )
 
 
@@ -246,7 +246,7 @@ def _check_units(base: Scene, sweep_design: Design, recorded: Sequence[Recorded]
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
                     f"'{one.name}' is a force at some points and a torque at others",
-                    "make two sweeps of it",
+                    "split it into two sweeps",
                 )
 
 

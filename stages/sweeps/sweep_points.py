@@ -77,7 +77,7 @@ def work(
     may.
     """
     if sources and sources != source_digest():
-        raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
+        raise InputError("--scheduler", "a worker runs different sources of flexclear", "install the same version")
     cores.set_idle(others_idle)
     threadpool_limits(1)  # NumPy may have been loaded with more threads
     scene, runner = _opened(key, packed)

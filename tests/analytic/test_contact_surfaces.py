@@ -98,7 +98,7 @@ def test_a_pin_meets_the_round_ends_of_its_slot() -> None:
 @pytest.mark.parametrize("name", [PLANE, YOKE])
 def test_planes_and_slots_have_no_ideal_joint_in_their_place(name: str) -> None:
     """They are reported, and not replaced by something else."""
-    with pytest.raises(InputError, match="that could be taken away"):
+    with pytest.raises(InputError, match="that can be removed"):
         ideal(load_scene(TREE / "scenes" / f"{name}.toml"))
 
 

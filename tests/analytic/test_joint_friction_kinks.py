@@ -206,4 +206,4 @@ def test_a_slider_crank_with_friction_in_every_joint_moves_as_derived_in_other_c
         assert load == pytest.approx(known.loads[k], rel=1e-4, abs=1e-4)
     assert dataset.dissipated.values[-1] == pytest.approx(known.lost, rel=1e-6)
     assert known.lost > 0.1
-    assert "friction of O, A, B, P follows reactions" in dataset.attrs["warnings"]
+    assert "friction of O, A, B, P depends on reactions" in dataset.attrs["warnings"]

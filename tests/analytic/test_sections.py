@@ -163,7 +163,7 @@ def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Sce
     [
         ({"sections.period": "5 s"}, "does not repeat after a period of 5 s"),
         ({"sections.period": "20 s"}, "longer than the run"),
-        ({"sections.phase": "20 s"}, "no time within the period"),
+        ({"sections.phase": "20 s"}, "not within the period"),
         ({"sections.bodies": ["bog"]}, "there is no body 'bog'"),
     ],
 )
@@ -174,7 +174,7 @@ def test_what_cannot_be_looked_at_is_refused(pendulum: Scene, change: dict[str, 
 
 def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sections", "scenes/checks/pendulum.toml", "--set", "sections.periods=20"]) == 2
-    assert "no drive and no load has a law of time" in capsys.readouterr().err
+    assert "neither a drive nor a load has a law of time" in capsys.readouterr().err
 
 
 def test_the_repeated_stroke_with_clearance_and_rigid_rods_settles_on_one_period() -> None:

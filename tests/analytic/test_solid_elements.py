@@ -99,7 +99,7 @@ def test_cells_that_are_inside_out_or_oddly_numbered_are_refused() -> None:
 def test_a_body_in_two_pieces_is_refused() -> None:
     nodes, cells = lattice.cut(*lattice.block((1.0, 1.0, 1.0), (1, 1, 1)), "hex20")
     both = np.vstack([nodes, nodes + np.array([2.0, 0.0, 0.0])])
-    with pytest.raises(InputError, match=r"in 2 pieces that share no node \(of 1, 1 cells\)\n.*merge"):
+    with pytest.raises(InputError, match=r"in 2 pieces without common nodes \(of 1, 1 cells\)\n.*merge"):
         check(Geometry("hex20", both, np.vstack([cells, cells + len(nodes)]), {}, {}), "recipe")
 
 

@@ -126,7 +126,7 @@ def test_matrices_that_are_no_free_body_are_refused(tmp_path: Path, solid: xr.Da
     )
     write(tmp_path, sp.block_diag([model.stiffness] * 2), sp.block_diag([model.mass] * 2), both)
     twice = build(recipe(THREE, frames), tmp_path)
-    with pytest.raises(InputError, match="of 2 bodies that share no node"):
+    with pytest.raises(InputError, match="2 bodies without common nodes"):
         model_of(twice)
     write(tmp_path, sp.triu(model.stiffness), model.mass, table)
     with pytest.raises(InputError, match="stiffness matrix is not symmetric"):
@@ -150,7 +150,7 @@ def test_files_that_do_not_fit_together_are_refused(tmp_path: Path, solid: xr.Da
     write(tmp_path, model.stiffness, model.mass, table)
     for change, message in (
         ({"bottom": {"node": 1}}, "node 1 has no rx, ry, rz"),
-        ({"bottom": {"node": 10**6}}, "there is no node 1000000"),
+        ({"bottom": {"node": 10**6}}, "unknown node 1000000"),
         ({"bottom": {"nodes": [1, 2]}}, "2 nodes cannot carry"),
         ({"bottom": {"node": 1, "nodes": [1]}}, "either `node` or `nodes`"),
     ):
@@ -173,7 +173,7 @@ def test_files_that_do_not_fit_together_are_refused(tmp_path: Path, solid: xr.Da
     with pytest.raises(InputError, match=r"'stiffness.mtx' has the shape .* lines"):
         build(recipe(THREE, frames), tmp_path)
     (tmp_path / "unknowns.csv").write_text("node,x,y\n1,0,0\n")
-    with pytest.raises(InputError, match="is no table of unknowns"):
+    with pytest.raises(InputError, match="is not a table of unknowns"):
         build(recipe(THREE, frames), tmp_path)
     (tmp_path / "torn.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match="holds no matrices"):

@@ -101,7 +101,7 @@ def test_nafems_deep_beam() -> None:
         ({"on": {"cylinder": {"point": [0, 0, 0], "axis": [1, 0, 0], "radius": 0.02}}}, "selects no node"),
         ({"on": {"region": "start"}}, "'bottom' and 'top' tie the same nodes rigidly"),
         ({"on": {"region": "start", "sphere": {"centre": [0, 0, 0], "radius": 1.0}}}, "not region and sphere"),
-        ({"on": {}}, "one of region, plane, cylinder, sphere says where, not none"),
+        ({"on": {}}, "give exactly one of region, plane, cylinder, sphere, not none"),
         ({"tie": "glue"}, r"\[frames.top.tie\]"),
     ],
 )
@@ -118,7 +118,7 @@ def test_frames_that_cannot_be_meant_are_refused(change: dict[str, object], mess
         ({"material": None}, "either `material`"),
         ({"materials": {"body": ALUMINIUM}}, "either `material`"),
         ({"material": None, "materials": {"steel": ALUMINIUM}}, r"\[materials.steel\].*\n.*known: body"),
-        ({"interfaces": ["tpo"]}, r"'tpo' is no frame of the recipe; .*'top'"),
+        ({"interfaces": ["tpo"]}, r"'tpo' is not a frame of the recipe; .*'top'"),
         ({"elements": 12}, r"\[elements\]: unknown key"),
     ],
 )
@@ -130,7 +130,7 @@ def test_recipes_that_cannot_be_meant_are_refused(change: dict[str, object], mes
 
 def test_more_modes_than_the_mesh_has_are_refused() -> None:
     mesh = build(rod("hex8", (2, 1, 1)))
-    with pytest.raises(InputError, match=r"5000 modes are asked for, the mesh has \d+ elastic coordinates"):
+    with pytest.raises(InputError, match=r"5000 modes are requested, but the mesh has \d+ elastic coordinates"):
         solve(mesh, "craig-bampton", 5000)
 
 
@@ -233,4 +233,4 @@ def test_the_command_prints_what_bundles_lack(
     assert main(["run", "sps4/frequencies/fixed_circle", "--to", "bundle"]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith("sps4/frequencies/fixed_circle, rod\n")
-    assert "not even the first, 1564.49 Hz" in shown
+    assert "none; the first is at 1564.49 Hz" in shown

@@ -280,7 +280,7 @@ def test_a_run_from_a_singular_pose_can_be_asked_for_accuracy() -> None:
     table = lying() | {"accuracy": {"beam1.position": "0.1 mm"}, "output": {"interval": 0.05}}
     del table["solver"]
     dataset = simulate(table)
-    assert dataset.attrs["method_reason"].startswith("dop853: it is tried first")
+    assert dataset.attrs["method_reason"].startswith("dop853: default")
     assert dataset.attrs["accuracy_verdict"] == "met"
     known = simulate(lying())
     assert float(np.abs(dataset.position - known.position).sel(body="beam1").max()) < 1e-4

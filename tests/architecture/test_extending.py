@@ -304,7 +304,7 @@ def test_refusals_name_a_new_integrator_and_its_remedy(heun: dict[str, Any]) -> 
     (misspelt, nearest), (used_up, why) = heun["refused"]
     assert (misspelt, used_up) == (2, 3)
     assert "did you mean 'heun'" in nearest
-    assert "at last by heun" in why
+    assert "the last one by heun" in why
     assert "radau where contacts or friction are stiff" in why
 
 

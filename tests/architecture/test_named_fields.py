@@ -19,7 +19,7 @@ def arrays() -> tuple[np.ndarray, ...]:
     """h, f, w, n with every stretch and ROWS rows of every table at an offset of its own; entries are all different."""
     h, sizes = np.zeros(m.HEADER, np.int64), {"h": m.HEADER, "f": 0, "w": 0}
     for name, table in TABLES.items():
-        h[table.place] = sizes[ARRAYS[name]]
+        h[table.at] = sizes[ARRAYS[name]]
         sizes[ARRAYS[name]] += ROWS * table.size
     for place in m.STRETCHES.values():
         h[place] = sizes["w"]
@@ -53,7 +53,7 @@ def test_python_has_each_field_of_each_row(name: str) -> None:
     given = arrays()
     h = given[0]
     table, array = TABLES[name], dict(zip("hfwn", given, strict=True))[ARRAYS[name]]
-    begin = h[table.place]
+    begin = h[table.at]
     rows = m.named(table, array[begin : begin + ROWS * table.size])
     for field, (_, shape) in row_fields(name).items():
         held = getattr(getattr(Data(*given), name)[1], field)
@@ -87,7 +87,7 @@ def test_compiled_kernels_do_as_interpreted_ones() -> None:
     for a, b, before in zip(plain, coded, arrays(), strict=True):
         np.testing.assert_array_equal(a, b)
         assert (a is plain[2] or a is plain[3]) != np.array_equal(a, before)
-    links = m.named(m.LINKS, plain[0][plain[0][m.LINKS.place] :][: ROWS * m.LINKS.size])
+    links = m.named(m.LINKS, plain[0][plain[0][m.LINKS.at] :][: ROWS * m.LINKS.size])
     assert plain[3][m.EVALUATION] == links["joint"][2]
 
 

@@ -271,7 +271,7 @@ def test_names_of_many_bytes_are_refused_before_files_are_called_by_them(root: P
 
 
 def test_bodies_with_files_differ_by_more_than_capitals(root: Path) -> None:
-    with pytest.raises(InputError, match="called as 'rod' but for capitals"):
+    with pytest.raises(InputError, match="differs from 'rod' in capitals"):
         renamed(root, {"rod": "rod", "other": "ROD"})
 
 

@@ -35,7 +35,7 @@ def start(name: str) -> dict[str, Placement]:
     found = {}
     for frame, here in frames.items():
         group = group_of[here.body]
-        found[frame] = poses[group].of(groups[group].places[here.body]).of(here.place)
+        found[frame] = poses[group].of(groups[group].placements[here.body]).of(here.placement)
     return found
 
 

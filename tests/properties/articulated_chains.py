@@ -55,7 +55,7 @@ class Evaluated(NamedTuple):
     view = stretch
 
     def table(self, table: Any) -> np.ndarray:
-        return m.named(table, self.stretch(table.place))
+        return m.named(table, self.stretch(table.at))
 
 
 def rods(

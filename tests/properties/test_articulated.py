@@ -204,7 +204,7 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
     def energy(speeds: np.ndarray) -> Any:
         w[u] = speeds
         plain(h.tolist(), model.arrays.f.astype(np.longdouble), w, found.space.n)
-        return sum(w[int(h[m.ENERGY.place]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
+        return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 
     units = np.eye(len(found.stretch(m.U)))[: model.nv]
     alone = [energy(unit) for unit in units]
@@ -338,7 +338,7 @@ def test_the_bound_of_what_is_borne_is_no_larger_than_a_straight_chain_needs() -
 def borne(found: Evaluated, parents: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Mass of each moving link and all beyond, and polar moment about its origin in an evaluated pose."""
     space, numbers = found.space, found.model.arrays.table(m.LINK_NUMBERS)
-    frames = m.named(m.LINK_FRAMES, space.w[space.h[m.LINK_FRAMES.place] :][: len(parents) * m.LINK_FRAMES.size])
+    frames = m.named(m.LINK_FRAMES, space.w[space.h[m.LINK_FRAMES.at] :][: len(parents) * m.LINK_FRAMES.size])
     centres = frames["origin"] + np.einsum("ijk,ik->ij", frames["axes"], numbers["com"])
     spins = 0.5 * numbers["inertia"][:, :3].sum(axis=1)
     mass, polar = np.zeros(len(parents)), np.zeros(len(parents))

@@ -28,7 +28,7 @@ def turned(mechanism: Mechanism) -> dict[str, float]:
     """Angle of every body about the world's z [rad]."""
     found = {}
     for link in mechanism.links[1:]:
-        for name, place in link.places.items():
+        for name, place in link.placements.items():
             R = link.start.R @ place.R
             found[name] = float(np.arctan2(R[1, 0], R[0, 0]))
     return found
@@ -84,7 +84,7 @@ def test_hints_that_say_nothing_of_a_loop_leave_its_way_to_the_first_guess_and_n
         R, frames = matrix(turn), table["body"]["world"]["frames"] | {"c": frame((0.3, -0.1, 0.0))}
         table["body"]["world"]["frames"] = {n: frame(R @ one["position"], turn) for n, one in frames.items()}
         links = start_of(table).links
-        where = {name: R.T @ link.start.p for link in links[1:] for name in link.places}
+        where = {name: R.T @ link.start.p for link in links[1:] for name in link.placements}
         found.add(tuple(np.round(where["right"] - where["left"], 6) + 0.0))
     assert len(found) == 1
 
@@ -106,7 +106,7 @@ def test_joints_that_fit_nowhere_are_refused_without_poses_that_nobody_gave() ->
         table["body"][name]["frames"]["far"] = frame((1e-3, 0.0, 0.0))
     with pytest.raises(InputError, match="cannot be assembled by its joints") as caught:
         start_of(table)
-    assert "poses given" not in str(caught.value)
+    assert "given poses" not in str(caught.value)
     assert str(caught.value).partition("angles): ")[2].partition("\n")[0].count(",") == 0
 
 
@@ -116,7 +116,9 @@ def test_bodies_that_have_a_pose_stay_where_they_are() -> None:
     mechanism = start_of(table)
     link = mechanism.links[mechanism.link_of["crank"]]
     given = np.array([np.cos(0.9), np.sin(0.9), 0.0])
-    assert (link.start.R @ link.places["crank"].R)[:, 0] == pytest.approx(given, abs=1e-15)  # rounding of a rotation
+    assert (link.start.R @ link.placements["crank"].R)[:, 0] == pytest.approx(
+        given, abs=1e-15
+    )  # rounding of a rotation
     assert turned(mechanism)["rocker"] == pytest.approx(angles(0.9)[2], abs=1e-10)
 
 
@@ -141,7 +143,7 @@ def test_a_slider_crank_finds_both_ends_of_its_guide() -> None:
         start = {"joint": {"main": {"position": f"{a} rad"}, "guide": {"near": 0.4 * sign}}}
         mechanism = start_of(scene(bodies, joints, start=start))
         link = mechanism.links[mechanism.link_of["slider"]]
-        place = link.start.of(link.places["slider"]).p + mechanism.origin
+        place = link.start.of(link.placements["slider"]).p + mechanism.origin
         # loops are closed to 1e-11 of the mechanism's size
         assert place == pytest.approx([r * np.cos(a) + sign * np.sqrt(l**2 - (r * np.sin(a)) ** 2), 0, 0], abs=1e-10)
 
@@ -178,11 +180,11 @@ REFUSED: dict[str, tuple[Table, tuple[str, ...]]] = {
     ),
     "against a pose": (
         without_drive(driven(0.9, 0.9)) | {"start": {"joint": {"j0": {"position": 1.5}}}},
-        ("[start.joint.j0.position]", "0.9 rad in the poses given", "1.5 rad by its own start", "leave out the poses"),
+        ("[start.joint.j0.position]", "0.9 rad in the given poses", "1.5 rad by its own start", "remove the poses"),
     ),
     "out of reach": (
         without_drive(loose(0.9, joint={"j3": {"position": 0.2}})),
-        ("[start.joint.j3.position]", "not at the positions given", "for example, at j3"),
+        ("[start.joint.j3.position]", "at the given positions", "for example at j3"),
     ),
     "no flexible body": (
         loose(0.9, modal={"crank": {"coordinate": [1.0]}}),
@@ -191,7 +193,7 @@ REFUSED: dict[str, tuple[Table, tuple[str, ...]]] = {
     "elsewhere": (loose(0.9, at="rest"), ("start.at", "equilibrium")),
     "deformed twice": (
         loose(0.9, at="equilibrium", modal={"rod": {"coordinate": [1.0]}}),
-        ("start", "modal.rod.coordinate: give one of them"),
+        ("start", "modal.rod.coordinate both determine the deformation"),
     ),
 }  # fmt: skip
 
@@ -217,7 +219,9 @@ def test_lengths_that_cannot_meet_where_the_drive_is_are_refused() -> None:
     """With the crank turned away its pin is 0.7 m from the pivot, and coupler and rocker reach 0.55 m."""
     table = loose(np.pi)
     table["body"]["rocker"]["frames"]["far"] = frame((0.15, 0.0, 0.0))
-    with pytest.raises(InputError, match=r"\[drive.motor.law\]: the joints fit together, but not where the drives"):
+    with pytest.raises(
+        InputError, match=r"\[drive.motor.law\]: the joints can be assembled, but not at the positions of the drives"
+    ):
         start_of(table)
 
 
@@ -225,5 +229,7 @@ def test_a_second_drive_out_of_reach_is_distinguished_from_joints_that_do_not_fi
     """From the poses given: the rocker's drive begins where the crank's does not let it."""
     table = driven(0.9, 0.9)
     table["drive"]["far"] = {"joint": "j3", "law": angles(0.9)[2] + 0.01}
-    with pytest.raises(InputError, match=r"\[drive\.\w+\.law\]: the joints fit together, but not where the drives"):
+    with pytest.raises(
+        InputError, match=r"\[drive\.\w+\.law\]: the joints can be assembled, but not at the positions of the drives"
+    ):
         start_of(table)

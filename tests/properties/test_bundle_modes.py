@@ -67,7 +67,7 @@ def test_no_reference_condition_is_left_out() -> None:
 def test_a_count_that_cuts_a_pair_names_the_whole_counts(
     paper_rod: xr.Dataset, condition: str, count: int, whole: str
 ) -> None:
-    with pytest.raises(InputError, match=rf"{count} modes cut a cluster of 2 equal.*\n.*counts? (are|is) {whole}$"):
+    with pytest.raises(InputError, match=rf"{count} modes split a cluster of 2 equal.*\n.*counts? (are|is) {whole}$"):
         solve(paper_rod, condition, count)
 
 
@@ -77,7 +77,7 @@ def test_complete_bases_have_every_elastic_coordinate(paper_rod: xr.Dataset, con
     shapes = modes["shape"].values.reshape(-1, most)
     assert modes.sizes["mode"] == most
     assert np.linalg.matrix_rank(shapes / np.linalg.norm(shapes, axis=0)) == most
-    with pytest.raises(InputError, match=f"{most + 1} modes are asked for, the mesh has {most}"):
+    with pytest.raises(InputError, match=f"{most + 1} modes are requested, but the mesh has {most}"):
         solve(paper_rod, condition, most + 1)
 
 

@@ -46,7 +46,7 @@ def test_the_equal_area_square_changes_only_the_mass() -> None:
     [
         ({"section": {"type": "circle", "radius": "10 kg"}}, r"\[section\.radius\].*is a mass, but a length"),
         ({"inertia_section": {"type": "hexagon"}}, r"\[inertia_section\.type\].*hexagon"),
-        ({"interfaces": ["bottom", "topp"]}, "interface 'topp' is no frame of the recipe; did you mean 'top'"),
+        ({"interfaces": ["bottom", "topp"]}, "interface 'topp' is not a frame of the recipe; did you mean 'top'"),
         ({"interfaces": ["top", "top"]}, "name a frame twice"),
         ({"frames": {}}, r"\[frames\]"),
         ({"length": "240 mm"}, r"\[length\]: unknown key"),

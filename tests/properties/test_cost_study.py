@@ -129,7 +129,7 @@ def test_the_cheapest_way_to_each_accuracy(found: xr.Dataset):
     assert answer.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
     assert answer.cheapest(found, 1e-12) is None
     rows = answer.price_list(found, "t").rows
-    assert rows[2][1] == "cannot be had"
+    assert rows[2][1] == "cannot be reached"
     # 1e-7 s of 0.6 s, and the 1e-8 s by which the reference and its confirmation differ
     assert "1.8e-07 at best" in rows[2][4]
 
@@ -139,7 +139,7 @@ def test_each_quantity_has_a_price_of_its_own(found: xr.Dataset):
     # 1e-7 m of 2 m and 1e-7 s of 0.6 s, each with the reference's uncertainty of a tenth of it
     assert [rows[name][-1] for name in ("slider.position", "pin.impact_times")] == ["5.5e-08", "1.8e-07"]
     assert rows["slider.position"][2] == "dop853, rtol 1e-09 (0.2 s)"  # 5e-6 at 1e-6 is not enough
-    assert rows["pin.impact_times"][3] == "cannot be had"
+    assert rows["pin.impact_times"][3] == "cannot be reached"
 
 
 def test_an_error_below_the_references_uncertainty_is_not_claimed():
@@ -150,7 +150,7 @@ def test_an_error_below_the_references_uncertainty_is_not_claimed():
 def test_a_study_of_which_every_run_is_refused_says_so():
     found, *_ = study(**dict.fromkeys(("other", "d0", "d1", "d2", "fine", "coarse"), REFUSED))
     table = answer.price_list(found, "t")
-    assert all(row[1] == "cannot be had" for row in table.rows)
+    assert all(row[1] == "cannot be reached" for row in table.rows)
     assert any("Not confirmed: other was refused" in note for note in table.notes)
     assert any("every run is refused" in note for note in table.notes)
 
@@ -164,7 +164,7 @@ def test_a_study_without_its_reference_is_refused_with_the_reason():
     "made, words",
     [
         ({"uncertainty": 1e-7}, "rounding errors"),
-        ({"uncertainty": 1e-12}, "best setting that was tried reaches"),
+        ({"uncertainty": 1e-12}, "best setting tested reaches"),
         ({"other": run(0.0, impacts=2)}, "do not agree on the number of impacts"),
     ],
 )
@@ -266,7 +266,7 @@ def test_the_page_says_what_each_digit_costs(found: xr.Dataset):
     text = written(found, ("| a table |",), {"Error": "x/y.png"})
     assert "flexclear cost a/scene \\\n        --page docs/accuracy.md" in text
     assert "0.001 takes rk4, step 0.001 s (0.2 s)" in text
-    assert "1e-09 cannot be had" in text
+    assert "1e-09 is not possible" in text
     assert "![Error of a/scene](x/y.png)" in text
 
 
@@ -277,7 +277,7 @@ def test_the_page_says_which_quantities_can_be_had_when_not_all_can():
     points.append(Point("d3", "tolerance", {"adaptive_integrator": "dop853", "rtol": 1e-12}))
     found = assemble(points, runs | {"d3": finest}, [POSITION, TIMES])
     text = written(found)
-    assert "1e-09 can be had for slider.position, not for pin.impact_times." in text
+    assert "1e-09 is possible for slider.position, not for pin.impact_times." in text
 
 
 def test_the_page_says_how_far_it_holds_and_what_to_refine():
@@ -285,10 +285,10 @@ def test_the_page_says_how_far_it_holds_and_what_to_refine():
     fractions = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
     split_up = causes.with_causes(found, fractions)
     text = written(split_up, ("**Beyond the horizon: x**",))
-    assert "holds up to t = 0.5 s of 1 s; beyond that nothing but the means of an ensemble, below" in text
+    assert "holds up to t = 0.5 s of 1 s; beyond that use only the means of an ensemble (below)" in text
     assert "more elements (mesh limits slider.position)" in text
     alone = written(split_up)
-    assert "an ensemble, which the scene can ask for" in alone
+    assert "an ensemble, which the scene can request" in alone
 
 
 def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size(found: xr.Dataset):
@@ -305,7 +305,7 @@ def test_runs_left_undone_are_named_with_their_reason():
     study = xr.Dataset(attrs={"undone": "rk4, step 1e-06 s", "given_up": "radau, rtol 1e-09"})
     budget, method = answer.undone(study)
     assert budget == "Not run within the budget: rk4, step 1e-06 s."
-    assert "used up its evaluations" in method
+    assert "reached the limit of evaluations" in method
     assert method.endswith("radau, rtol 1e-09.")
 
 

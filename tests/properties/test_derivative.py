@@ -46,7 +46,7 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarr
     begin[model.speeds] += 0.1 * random.normal(size=model.nv)
     w[y : y + model.ny] = begin
     keep_independent(model, h, y, dy, w.copy(), n.copy(), kernel)
-    laws = slice(h[m.LAW.place], h[m.LAW.place] + m.LAW.size * model.arrays.size(m.N_LAWS))
+    laws = slice(h[m.LAW.at], h[m.LAW.at] + m.LAW.size * model.arrays.size(m.N_LAWS))
     impacts = slice(h[m.LATCHED], h[m.LATCHED] + len(model.contacts))
     w[laws], w[impacts], n[n[m.MODE] :] = 0.1 * random.normal(size=laws.stop - laws.start), 0.1, closed
     df, dw = f * random.normal(size=len(f)), np.zeros(len(w))
@@ -61,7 +61,7 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarr
     moved["w"][y : y + model.ny] += 1j * STEP * direction
     tapes.run(made, h, moved, y, dy, operations=tapes.COMPLEX)
     assert np.allclose(exact["w"][dy : dy + model.ny], moved["w"][dy : dy + model.ny].real, rtol=1e-9, atol=1e-9)
-    touch = slice(h[m.TOUCH.place], h[m.TOUCH.place] + m.TOUCH.size * len(model.contacts))
+    touch = slice(h[m.TOUCH.at], h[m.TOUCH.at] + m.TOUCH.size * len(model.contacts))
     dw[y : y + model.ny] = direction
     numbers, given = dual.seeded(w, dw[None, :]), dual.seeded(f, df[None, :])
     dual.plain(kernel)(h.tolist(), given, numbers, n.tolist(), y, dy)

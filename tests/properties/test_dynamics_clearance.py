@@ -94,7 +94,7 @@ class Touch:
         sites = packed.table(m.CONTACTS)[0][["outer", "inner"]]
         self.links = {name: int(packed.table(m.SITES)["link"][s]) for name, s in zip(self.centre, sites, strict=True)}
         for name, site in zip(self.centre, sites, strict=True):
-            o = h[m.SITE_FRAMES.place] + m.FRAME.size * site
+            o = h[m.SITE_FRAMES.at] + m.FRAME.size * site
             w[o : o + 3] = self.centre[name]
             w[o + m.FRAME.axes : o + m.FRAME.axes + 9] = turned.ravel()
             w[o + m.FRAME.omega : o + m.FRAME.omega + 3] = self.omega[name]
@@ -103,10 +103,10 @@ class Touch:
         self.bend(packed, w[h[m.Y] :], laws, turned, random)
         w[h[m.LATCHED]] = random.uniform(0.01, 1.0)
         kernel(laws)(h, packed.f, w, n)
-        wrench = h[m.WRENCH.place] + 6 * np.array(list(self.links.values()))
+        wrench = h[m.WRENCH.at] + 6 * np.array(list(self.links.values()))
         # the table holds inertial minus applied wrenches (moment about the origin; force)
         self.wrench = {name: -w[o : o + 6] for name, o in zip(self.links, wrench, strict=True)}
-        self.touch = w[h[m.TOUCH.place] :][: m.TOUCH.size]
+        self.touch = w[h[m.TOUCH.at] :][: m.TOUCH.size]
         losses = h[m.LEDGER_RATE] + m.CONTACT_SLOTS
         self.losses = w[losses : losses + 2]
         self.bending = 0.0  # power that bends the bristles at this normal force

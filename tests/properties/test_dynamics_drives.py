@@ -91,8 +91,8 @@ def compiled(law: Any, t: float, piece: int) -> np.ndarray:
         np.zeros(m.INTEGERS + 1, dtype=np.int64),
     )
     f = np.concatenate([tables[m.PIECES].ravel(), np.array(tables[m.HARMONICS]).ravel()])
-    h[m.N_LAWS], h[m.LAW.place], h[m.PIECES.place], h[m.HARMONICS.place] = 1, 0, 0, tables[m.PIECES].size
-    h[m.PIECE_HARMONICS.place], n[m.ACTIVE], n[m.INTEGERS] = m.HEADER, m.INTEGERS, piece
+    h[m.N_LAWS], h[m.LAW.at], h[m.PIECES.at], h[m.HARMONICS.at] = 1, 0, 0, tables[m.PIECES].size
+    h[m.PIECE_HARMONICS.at], n[m.ACTIVE], n[m.INTEGERS] = m.HEADER, m.INTEGERS, piece
     w = np.zeros(3)
     LAWS_OF_TIME(np.concatenate([h, fractions]), f, w, n, t)
     return w
@@ -198,7 +198,7 @@ def test_a_repeated_law_starts_over_and_goes_on_after_its_last_period() -> None:
 
 def test_a_repeated_law_must_cover_its_period() -> None:
     short = {"type": "repeated", "period": 0.8, "times": 2, "start": 0.1, "law": {"type": "spline", **CYCLE}}
-    with pytest.raises(ValueError, match=r"known between 0.1 and 0.6 s only, not over its period from 0.1 to 0.9 s"):
+    with pytest.raises(ValueError, match=r"defined between 0.1 and 0.6 s only, not over its period from 0.1 to 0.9 s"):
         pieces(TypeAdapter(Law).validate_python(short))
 
 

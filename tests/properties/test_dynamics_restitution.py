@@ -167,7 +167,7 @@ def test_warning_where_a_law_does_not_deliver_what_it_is_asked_for(name: str) ->
         (NormalLaw(law="lankarani-nikravesh", restitution=0.9, damping=1.0), "takes no damping"),
         (NormalLaw(law="kelvin-voigt", restitution=0.5, exponent=1.5), "exponent is 1"),
         (NormalLaw(law="kelvin-voigt"), "needs a damping"),
-        (NormalLaw(law="kelvin-voigt", damping=1.0, restitution=0.5), "say the same"),
+        (NormalLaw(law="kelvin-voigt", damping=1.0, restitution=0.5), "are alternatives"),
         (NormalLaw(law="kelvin-voigt", restitution=0.0), "no finite damping"),
     ],
 )

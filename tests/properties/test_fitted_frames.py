@@ -53,5 +53,5 @@ def test_a_loop_with_frames_that_nearly_fit_closes(seed: int) -> None:
 
 @pytest.mark.parametrize("tolerance", [0.0, 1e-9])
 def test_frames_that_are_exact_or_known_better_are_refused(tolerance: float) -> None:
-    with pytest.raises(InputError, match="nearly, but not exactly, the same"):
+    with pytest.raises(InputError, match="nearly equal conditions"):
         assembled(build(four_bar(Random(1), 1e-6, tolerance), {}))

@@ -39,8 +39,8 @@ def passed(start: tuple, end: tuple, level: float = LEVEL, contact: int = -1, cl
     h, f, w = np.zeros(m.HEADER + m.GUARDS.size, np.int64), np.array([level, LEVEL]), np.zeros(60)
     n = np.zeros(m.INTEGERS + 1, np.int64)
     n[m.MODE], n[m.INTEGERS] = m.INTEGERS, closed
-    h[m.N_GUARDS], h[m.GUARDS.place], h[m.GUARDED.place], h[m.CONTROL] = 1, m.HEADER, 0, 10
-    h[m.HEADER :] = m.TOUCH.place, 0, 3, contact, -1
+    h[m.N_GUARDS], h[m.GUARDS.at], h[m.GUARDED.at], h[m.CONTROL] = 1, m.HEADER, 0, 10
+    h[m.HEADER :] = m.TOUCH.at, 0, 3, contact, -1
     w[:6], w[10 + m.RTOL] = (*start, *end), RTOL
     fraction, g, *rest = _compiled()(h, f, w, n)
     assert g in (-1, 0)
@@ -98,8 +98,8 @@ def test_what_is_watched_is_noted_as_a_vector_that_ends_with_zeros(components: i
         return first, d.guarded[0].start
 
     h, w = np.zeros(m.HEADER + m.GUARDS.size, np.int64), np.zeros(60)
-    h[m.N_GUARDS], h[m.GUARDS.place], h[m.GUARDED.place], h[m.TOUCH.place] = 1, m.HEADER, 0, 17
-    h[m.HEADER :] = m.TOUCH.place, 3, components, -1, -1
+    h[m.N_GUARDS], h[m.GUARDS.at], h[m.GUARDED.at], h[m.TOUCH.at] = 1, m.HEADER, 0, 17
+    h[m.HEADER :] = m.TOUCH.at, 3, components, -1, -1
     before, after = np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0])
     (start, end), later = noted(h, np.zeros(2), w, np.zeros(m.INTEGERS, np.int64), before, after)
     kept = np.arange(3) < components
@@ -114,7 +114,7 @@ def table(scene: Scene) -> tuple[np.ndarray, np.ndarray, Any]:
 
 def test_bearings_and_loads_have_the_guards_that_their_laws_name() -> None:
     rows, numbers, arrays = table(Scene.model_validate(brakes(1e-8)))
-    speeds, of_loads = numbers["level"] > 0.0, rows["table"] == m.LOAD_BENDS.place
+    speeds, of_loads = numbers["level"] > 0.0, rows["table"] == m.LOAD_BENDS.at
     # the load that brakes, at its two speeds; of the ideal joints one has bristles, all others two speeds
     assert sorted(numbers["level"][of_loads]) == [COULOMB["v_static"], COULOMB["v_dynamic"]]
     bearings = arrays.size(m.SIZES["n_bearings"])

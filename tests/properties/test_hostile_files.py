@@ -75,7 +75,7 @@ SCENES = {
     "a number of 400 digits": (f"time.end = {'9' * 400}", r"\[time.end\]"),
     "a part called source": ('[body.source]\ntype = "ground"', "source"),
     "a frame called source": ('[body.a]\ntype = "ground"\nframes.source = {}', "source"),
-    "control characters": ('[body."\\u001b[31m"]\ntype = "ground"', "is no name"),
+    "control characters": ('[body."\\u001b[31m"]\ntype = "ground"', "is not a name"),
     "a long key": (f"{'k' * 60_000} = 1", "unknown key"),
     "a line of many numbers": ("x = " + "1 m " * 30_000, "is not TOML"),
 }
@@ -95,7 +95,7 @@ def test_paths_that_are_no_files_are_refused(tmp_path: Path) -> None:
     os.mkfifo(pipe)
     loop.symlink_to(loop)
     dots.write_text('title = "a"')
-    paths = {"/dev/zero": "no ordinary file", pipe: "no ordinary file", loop: None, dots: "is no name for a scene"}
+    paths = {"/dev/zero": "not an ordinary file", pipe: "not an ordinary file", loop: None, dots: "cannot name a scene"}
     for path, words in {**paths, "a\0b.toml": None, "x" * 5000 + ".toml": None}.items():
         with refused(words):
             load_scene(path)
@@ -131,7 +131,7 @@ def test_many_changes_give_a_name_that_a_folder_can_have(tmp_path: Path) -> None
 def test_results_take_the_place_of_no_device() -> None:
     """A new file of that name would be put there, and the device be gone."""
     for target in ("/dev/null", "/" + "x" * 5000):
-        with refused("no ordinary file|can be no file"):
+        with refused("not an ordinary file|cannot be a file"):
             scenes.check_target(Path(target))
 
 
@@ -155,13 +155,13 @@ def test_samples_of_more_values_than_there_is_memory_for_are_refused() -> None:
 GRID = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 300 300 300\n"
 POINTS = "ply\nformat binary_little_endian 1.0\nelement vertex 10000000000\nproperty double x\nend_header\n"
 MESHES: dict[str, tuple[bytes | None, str]] = {
-    "mesh.vtk": (GRID.encode(), "promises a grid of 2.7e\\+07 points"),
-    "mesh.inp": (b"*INCLUDE, INPUT=/dev/zero\n", "no ordinary file"),
-    "mesh.xdmf": (b"<a>" + b"a" * 1_000_000, "cannot read|no surface"),
+    "mesh.vtk": (GRID.encode(), "declares a grid of 2.7e\\+07 points"),
+    "mesh.inp": (b"*INCLUDE, INPUT=/dev/zero\n", "not an ordinary file"),
+    "mesh.xdmf": (b"<a>" + b"a" * 1_000_000, "cannot read|not a surface"),
     "mesh.stl": (b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 100, "cannot read|no solid cells|no triangles"),
-    "mesh.vtu": (b"<VTKFile type='UnstructuredGrid'>" + b"<a>" * 200_000, "cannot read|no surface"),
-    "mesh.ply": (POINTS.encode(), "more memory than there is, or is damaged"),
-    "pipe.vtu": (None, "no ordinary file"),
+    "mesh.vtu": (b"<VTKFile type='UnstructuredGrid'>" + b"<a>" * 200_000, "cannot read|not a surface"),
+    "mesh.ply": (POINTS.encode(), "is damaged, or needs more memory than available"),
+    "pipe.vtu": (None, "not an ordinary file"),
 }
 
 
@@ -228,7 +228,7 @@ def test_a_packed_matrix_is_not_read_beyond_what_its_header_says(tmp_path: Path)
     paths = [tmp_path / name for name in ("k.mtx.gz", "m.mtx", "u.csv")]
     with refused("2 entries where its header says 1"):
         files.read_matrix_market(paths[0], paths[1], paths[2], "recipe")
-    with refused("another number of lines"):
+    with refused("does not match the lines"):
         files.read_matrix_market(paths[1], paths[1], paths[2], "recipe")
 
 
@@ -314,6 +314,6 @@ def test_unfinished_work_of_somebody_else_is_not_gone_on_with(tmp_path: Path) ->
 def test_a_result_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
     store = Store(tmp_path / "results")
     found = store.put("stage", "key", {"nc": b"no netcdf"}, {})
-    with pytest.raises(FlexclearError, match="holds no dataset") as caught:
+    with pytest.raises(FlexclearError, match="is not a dataset") as caught:
         store.load(found)
     assert not isinstance(caught.value, InputError)

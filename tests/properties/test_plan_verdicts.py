@@ -30,7 +30,7 @@ def test_an_undecided_verdict_says_how_far_single_runs_scatter():
     beyond = "beyond 25% of the time single runs of the full scene scatter by 2 m"
     assert said == f"not decided: {beyond}; 400 members would decide"
     assert _verdict(compared.assign(horizon=("quantity", [1.0])), 0) == "not decided: 400 members would decide"
-    assert _verdict(compared.assign(error=("quantity", [8.0])), 0) == "missed, 8 times"
+    assert _verdict(compared.assign(error=("quantity", [8.0])), 0) == "missed, 8 times the allowed error"
     assert _verdict(compared.assign(chance=("quantity", [0.1])), 0).startswith(f"met to the horizon: {beyond}, and the")
 
 

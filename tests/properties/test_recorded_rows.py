@@ -70,7 +70,7 @@ def test_bodies_and_frames_are_recorded_where_their_links_carry_them():
         assert np.abs(turns - body.R).max() < 1e-13
     for k, (name, frame) in enumerate(model.mechanism.frames.items()):
         link = model.mechanism.link_of[frame.body]
-        place = model.links[link].places[frame.body].of(frame.place)
+        place = model.links[link].placements[frame.body].of(frame.placement)
         there = seen.links[:, link]
         known = there["origin"] + np.einsum("tij,j->ti", there["axes"], place.p)
         assert np.abs(seen.frame_position[:, k] - known).max() < 1e-14, name

@@ -69,7 +69,7 @@ def test_units_that_users_of_mechanisms_write(text: str, dimension: str, value: 
     "text, named", [("1 W", "a power"), ("3 J", "an energy"), ("2 rad/s^2", "an angular acceleration")]
 )
 def test_a_unit_in_the_wrong_place_is_known(text: str, named: str) -> None:
-    with pytest.raises(ValueError, match=f"is {named}, but a torque belongs here"):
+    with pytest.raises(ValueError, match=f"is {named}, but a torque is expected"):
         quantity(text, "torque")
 
 
@@ -162,7 +162,7 @@ def test_opposite_to_z_the_frame_turns_about_x() -> None:
 @pytest.mark.parametrize("other", ["quaternion", "rotation_vector", "axes"])
 def test_an_axis_is_given_alone(other: str) -> None:
     value = {"quaternion": [1, 0, 0, 0], "rotation_vector": [0, 0, 1], "axes": {"z": [0, 0, 1], "x": [1, 0, 0]}}[other]
-    with pytest.raises(ValidationError, match="an orientation is given once"):
+    with pytest.raises(ValidationError, match="give an orientation once"):
         Pose.model_validate({"axis": [0, 0, 1], other: value})
 
 
@@ -172,7 +172,7 @@ def test_frames_of_recipes_take_an_axis_too() -> None:
     upright = TypeAdapter(TurnedFrame).validate_python({"axis": [1, 0, 0]})
     assert upright.orientation()[:, 2] == pytest.approx([1, 0, 0], abs=1e-15)
     for model, more in ((NodeFrame, {"x": 0.0}), (TurnedFrame, {})):
-        with pytest.raises(ValidationError, match="an orientation is given once"):
+        with pytest.raises(ValidationError, match="give an orientation once"):
             model.model_validate({"axis": [0, 0, 1], "axes": {"z": [0, 0, 1], "x": [1, 0, 0]}, **more})
 
 
@@ -193,7 +193,7 @@ def test_the_remedy_for_missing_compliance_is_one_that_the_body_does_not_have() 
     assert 'reference = "craig-bampton"' in lacking("fixed-fixed", "A B")
     other_frames, too_few = lacking("craig-bampton", "A"), lacking("craig-bampton", "A B")
     assert 'interfaces = ["A", "B"]' in other_frames
-    assert 'not made for ["B"]' in other_frames
+    assert 'no static shapes for ["B"]' in other_frames
     assert "more normal modes than now (count = 12)" in too_few
     assert 'reference = "craig-bampton"' not in other_frames + too_few
 
@@ -221,7 +221,7 @@ def test_an_inertia_that_was_turned_elsewhere_is_read(moments: tuple[float, ...]
             assert np.abs(found - given).max() <= 1e-14 * max(moments)
     with pytest.raises(ValidationError, match="symmetric"):
         read((given + 1e-9 * max(moments) * np.eye(3, k=1)).tolist())
-    with pytest.raises(ValidationError, match="belong to no body"):
+    with pytest.raises(ValidationError, match="are impossible"):
         read([-1e-9 * max(moments), *moments[1:]])
 
 
@@ -229,7 +229,7 @@ def test_a_vectors_size_counts_and_not_its_components() -> None:
     """What turning leaves of a zero is no mistake; a vector that is too small as a whole is one."""
     assert TypeAdapter(Position).validate_python(["0.3 m", 1.8e-17 * 1.8e-17 * 1.8e-17, 0.0]) == (0.3, 5.832e-51, 0.0)
     for vector in ([1e-60, 0.0, 1e-70], [0.0, 1e60, 1.0]):
-        with pytest.raises(ValidationError, match="beyond what can be computed with"):
+        with pytest.raises(ValidationError, match="outside of the supported range"):
             TypeAdapter(Position).validate_python(vector)
 
 

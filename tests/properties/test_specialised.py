@@ -88,7 +88,7 @@ def description_kernel(model: Model) -> Any:
 
 def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
     """Of two work spaces, as share of the largest number of a stretch."""
-    stretches, worst = [*m.STRETCHES.values(), *(table.place for table in m.TABLES["w"])], 0.0
+    stretches, worst = [*m.STRETCHES.values(), *(table.at for table in m.TABLES["w"])], 0.0
     for begin, end in pairwise(sorted({int(h[index]) for index in stretches} | {len(one)})):
         a, b = one[begin:end], other[begin:end]
         worst = max(worst, float(np.abs(a - b).max(initial=0.0)) / max(1.0, float(np.abs(a).max(initial=0.0))))
@@ -99,7 +99,7 @@ def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
     """Places in w of all that steps read of an evaluation besides its rates."""
     sizes = {m.TOUCH: len(model.contacts), m.LOAD_BENDS: model.arrays.size(m.N_LOAD_BENDS)}
     sizes |= {m.NAMED[name]: model.arrays.size(m.SIZES["n_bearings"]) for name in ("bends", "bearing")}
-    stretches = {table.place: table.size * rows for table, rows in sizes.items()}
+    stretches = {table.at: table.size * rows for table, rows in sizes.items()}
     rows, kept = model.arrays.size(m.N_CLOSURE_ROWS), int(h[m.N_KEPT_ROWS])
     stretches |= {m.RESIDUAL: rows, m.RESIDUAL_RATE: rows, m.PIVOT: 1}
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[:kept]

@@ -43,7 +43,7 @@ def test_a_good_run_passes_every_check():
         ({"loops": 1e-5}, "drift of closed loops"),
         ({"condition": 1e7}, "distance from singular poses"),
         ({"rejected": 80}, "rejected steps"),
-        ({"stiff": 0.5}, "steps that stability shortens"),
+        ({"stiff": 0.5}, "steps limited by stability"),
         ({"horizon": 0.3}, "predictability"),
     ],
 )

@@ -51,7 +51,7 @@ def simulated(scene, bundles, progress):
     data = {"position": (("time", "body"), np.outer(time_axis, [1.0, 2.0]))}
     attributes = {"scene": scene.name, "parameters": scene.model_dump_json()}
     if scene.accuracy is not None:
-        attributes["accuracy_verdict"] = "missed: ball.position is good to 2e-06, 2 times what is requested"
+        attributes["accuracy_verdict"] = "missed: ball.position has an error of 2e-06, 2 times the requested accuracy"
     if "doubtful" in scene.name:
         attributes["warnings"] = "the rod bends too far\\nthe contact is too deep"
     return xr.Dataset(data, coords={"time": time_axis, "body": names}, attrs=attributes)

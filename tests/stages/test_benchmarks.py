@@ -129,11 +129,9 @@ def test_the_peer_s_crash_is_the_outcome_of_a_setting(monkeypatch: pytest.Monkey
         def __init__(self, work: object, limit: int) -> None:
             begun.append([])
 
-        def give(self, parameters: tuple[object, ...]) -> None:
-            begun[-1].append(float(str(parameters[3])))
-
-        def take(self) -> Outcome:
-            step = begun[-1][-1]
+        def ask(self, parameters: tuple[object, ...]) -> Outcome:
+            step = float(str(parameters[3]))
+            begun[-1].append(step)
             if step == 1.0 or (step == 2.0 and len(begun[-1]) > 1):
                 raise processes.LostError("its process died (SIGSEGV)")
             if step == 3.0:

@@ -53,7 +53,7 @@ def test_a_failure_is_repeated_from_one_file_without_a_path_of_this_machine(
     assert facts["settings"] == ["time.end='2 ms'"]
     shutil.rmtree(scene.parent)
     said = command("doctor", "--repeat", path).out
-    assert "here it ended with 2, there with 2" in said
+    assert "the run ended with exit code 2 here, with 2 there" in said
     assert "no such joint" in said
 
 
@@ -87,7 +87,7 @@ def test_a_run_that_ends_otherwise_is_reported(scene: Path, tmp_path: Path, comm
     facts |= {"exit_code": 0, "libraries": {"numpy": "1.0"}}
     path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
     reported = command("doctor", "--repeat", path, code=4)
-    assert "there with 0" in reported.out
+    assert "with 0 there" in reported.out
     assert "here, 1.0 there" in reported.out
 
 

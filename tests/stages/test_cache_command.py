@@ -36,7 +36,7 @@ def test_damage_is_reported_and_removed(store: Store, command: Command):
     path.write_bytes(path.read_bytes().replace(b'"b"', b'"d"'))
     reported = command("cache", "check", code=4)
     assert f"{'a' * 32}.nc is corrupt" in reported.out
-    assert f"{'b' * 32}.json is no record, or damaged" in reported.out
+    assert f"{'b' * 32}.json is damaged or is not a record" in reported.out
     assert "never used" in reported.err
     os.utime(store.path("simulate", "b" * 32, "nc"), (0.0, 0.0))
     command("cache", "prune")
@@ -167,7 +167,7 @@ def test_bit_rot_in_a_shown_file_is_detected_and_run_shows_it_again(shown: Path,
     good = shown.read_bytes()
     command("cache", "check")
     rot(shown)
-    assert "run.nc differs from what was shown" in command("cache", "check", code=4).out
+    assert "run.nc differs from its artifact" in command("cache", "check", code=4).out
     with pytest.raises(fc.ResourceError, match="flexclear run checks/pendulum"):
         fc.open(SCENE)
     command("run", SCENE, "-q", "--jobs", "1")

@@ -46,11 +46,11 @@ def test_scenes_are_named_by_file_or_by_name(command: Command, root: Path):
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (["chek", "a.toml"], "chek: there is no such command\n  hint: did you mean 'check'?"),
-        (["fly"], "fly: there is no such command\n  hint: known: cache, check,"),
-        (["a.toml"], "a.toml: is no command\n  hint: a command comes first, as in: flexclear check a.toml"),
-        (["run", "checks/pendulum", "--jbos", "2"], "--jbos: there is no such option\n  hint: did you mean '--jobs'?"),
-        (["sweep", "a", "--jbos=3"], "--jbos: there is no such option\n  hint: did you mean '--jobs'?"),
+        (["chek", "a.toml"], "chek: unknown command\n  hint: did you mean 'check'?"),
+        (["fly"], "fly: unknown command\n  hint: known: cache, check,"),
+        (["a.toml"], "a.toml: is not a command\n  hint: a command comes first, as in: flexclear check a.toml"),
+        (["run", "checks/pendulum", "--jbos", "2"], "--jbos: unknown option\n  hint: did you mean '--jobs'?"),
+        (["sweep", "a", "--jbos=3"], "--jbos: unknown option\n  hint: did you mean '--jobs'?"),
     ],
 )
 def test_a_misspelt_command_or_option_gets_the_nearest_one(command: Command, arguments: list[str], said: str):
@@ -87,7 +87,7 @@ def test_cite_names_methods_that_are_used_and_no_others(command: Command):
 def test_cite_separates_the_methods_of_every_run_from_those_that_only_some_need(command: Command, scene: str):
     """All were in one list, with Lyapunov exponents, LU factors and the registers of the processor."""
     said = command("cite", scene).out
-    always, _, rest = said.partition("Methods that are used where a run or a command needs them\n")
+    always, _, rest = said.partition("Methods used only when a run or a command needs them\n")
     some, _, _ = rest.partition("Data of")
     for module in ("integrate.dop853", "contact.normal.lankarani_nikravesh", "drives.step"):
         assert f"{module}:" in always

@@ -81,9 +81,9 @@ def test_a_twin_differs_in_the_effect_alone(crank: Path):
 
 def test_what_is_ideal_has_no_twin(tmp_path: Path):
     scene = load_scene(write("pendulum", tmp_path)[0])
-    with pytest.raises(InputError, match="that could be taken away"):
+    with pytest.raises(InputError, match="that can be removed"):
         ideal(scene)
-    with pytest.raises(InputError, match="one scene alone is compared with nothing"):
+    with pytest.raises(InputError, match="a single scene has no other to compare with"):
         compare.bring([scene], open_workplace())
 
 

@@ -201,7 +201,7 @@ def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path: Path, mon
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "file" / "kernels"))
     reported: list[str] = []
     path = functions._file(folder.writable(kernel_root(), reported.append), "test", SOURCE.format(k=3))
-    assert "cannot be kept" in reported[0]
+    assert "cannot be stored" in reported[0]
     with file_lock(path, wait=True):
         assert not load_file(path, nothing)
     assert load_file(path, lambda _: None)

@@ -139,7 +139,7 @@ TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.posit
         ('{"a": 1}', "a list of tracks"),
         ('{"a": [{"name": "x"}]}', r"\[a\], track 1 \[seconds\].*is missing"),
         ('{"a": [{"name": "x", "seconds": ["1"], "error": {}}]}', "expected a number"),
-        ('{"a": [{"name": "x", "seconds": [1], "error": {"q": [1, 2]}}]}', "another number of errors"),
+        ('{"a": [{"name": "x", "seconds": [1], "error": {"q": [1, 2]}}]}', "a different number of errors"),
     ],
 )
 def test_a_file_of_peers_that_makes_no_sense_is_refused(tmp_path: Path, text: str, reported: str):
@@ -176,7 +176,7 @@ def test_points_keep_the_limits_of_the_scene(csj: Scene):
 def test_a_method_that_used_up_its_evaluations_is_run_at_no_tighter_tolerance(
     swing: Scene, place: Workplace, monkeypatch: pytest.MonkeyPatch
 ):
-    refused = xr.Dataset(attrs={"refused": "the limit of 100000 evaluations is used up ([solver.evaluations])"})
+    refused = xr.Dataset(attrs={"refused": "the limit of 100000 evaluations is reached ([solver.evaluations])"})
     refused.attrs["compile_seconds"] = 1.0
     monkeypatch.setattr(Workplace, "datasets", lambda _, *tasks: [refused] * len(tasks))
     study = cost.Study(swing, place, seconds=1e9, own=1e4, seconds_each=1e-6)
@@ -196,7 +196,7 @@ def test_the_limit_of_a_trial_run_is_not_called_the_scenes(
     other = one.with_name("heavy.toml")
     other.write_text(one.read_text().replace('mass = "1 kg"', 'mass = "2 kg"'))
     said = command("compare", one, other, "--jobs", "1").err
-    assert "evaluations is used up (a trial run's own limit, not the scene's [solver.evaluations])" in said
+    assert "evaluations is reached (a trial run's own limit, not the scene's [solver.evaluations])" in said
 
 
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, command: Command):

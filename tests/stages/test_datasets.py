@@ -155,14 +155,14 @@ def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
     for path in (tmp_path / "mine.nc", str(tmp_path / "mine.nc")):
         tree = fc.open(path)
         xr.testing.assert_identical(tree["mine"].to_dataset(), xr.load_dataset(path))
-    (tmp_path / "text.nc").write_text("no dataset")
+    (tmp_path / "text.nc").write_text("not a dataset")
     (tmp_path / "cut.nc").write_bytes((tmp_path / "mine.nc").read_bytes()[:-1000])
     xr.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(tmp_path / "other.nc", engine="netcdf4")
     said = {
         "none": "there is no file",
         "text": "cannot be read",
         "cut": "cannot be read",
-        "other": "no scene's",
+        "other": "not a dataset of a scene",
     }
     for name, words in said.items():
         with pytest.raises(InputError, match=words):

@@ -21,7 +21,7 @@ def test_the_doctor_says_what_is_wrong(command: Command, monkeypatch: pytest.Mon
     monkeypatch.setattr(doctor, "_self_test", lambda: ("it fell upwards", False))
     reported = command("doctor", code=4)
     assert "WRONG  self-test  it fell upwards" in reported.out
-    assert "not well: self-test" in reported.err
+    assert "problems: self-test" in reported.err
 
 
 @pytest.mark.parametrize("draws, line", [(True, "ok     graphics"), (False, "lacks  graphics")])
@@ -46,7 +46,7 @@ def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
     monkeypatch: pytest.MonkeyPatch, fresh: Path, command: Command
 ) -> None:
     monkeypatch.setattr(doctor, "USUAL", ("pendulum",))
-    assert "compiled: all that runs of pendulum call" in command("doctor", "--compile").out
+    assert "compiled: all functions for runs of pendulum" in command("doctor", "--compile").out
     assert not (fresh).exists()
 
 
@@ -72,9 +72,9 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     "options, words",
     [
-        (("--bundle", "four_bar", "--out", "x.csv"), "'.csv' is no known format"),
+        (("--bundle", "four_bar", "--out", "x.csv"), "unknown format '.csv'"),
         (("--bundle", "four_bar", "--out", "none/x.zip"), "its folder does not exist"),
-        (("--out", "x.zip"), "--bundle writes, which is not given"),
+        (("--out", "x.zip"), "of --bundle, which is not given"),
         (("--compile", "nowhere/none.toml"), "none.toml"),
     ],
 )

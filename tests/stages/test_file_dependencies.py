@@ -234,7 +234,7 @@ def test_a_name_that_is_a_pattern_is_refused(tmp_path: Path) -> None:
     """Of DOLFIN, whose reader may search with it without end."""
     (tmp_path / "(a+)+b.xml").write_text(DOLFIN)
     (tmp_path / ("a" * 40)).touch()
-    with pytest.raises(InputError, match="its reader takes for a pattern"):
+    with pytest.raises(InputError, match="its reader interprets as a pattern"):
         read_mesh(tmp_path / "(a+)+b.xml", "recipe", "cannot be read", "remedy")
 
 

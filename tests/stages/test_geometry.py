@@ -63,9 +63,9 @@ def test_crossing_legs_have_no_room() -> None:
     a, b = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]])
     up = np.array([[0.0, 0.0, 1.0]])
     below, above = np.array([[0.5, 0.3, -1.0]]), np.array([[0.5, 0.3, 1.0]])
-    assert layouts._apart(a, b, below, above) == pytest.approx(0.3, abs=1e-12)
+    assert layouts._distance(a, b, below, above) == pytest.approx(0.3, abs=1e-12)
     aside = np.array([[0.4, 0.0, 0.0]])
-    assert layouts._apart(a, b, b + 0.5 * up + aside, b + up) == pytest.approx(_ends(), abs=1e-12)
+    assert layouts._distance(a, b, b + 0.5 * up + aside, b + up) == pytest.approx(_ends(), abs=1e-12)
 
 
 def _ends() -> float:

@@ -233,9 +233,7 @@ def test_what_a_part_of_the_work_leaves_is_not_taken_for_what_there_is_of_it(
     failed = schedule.attempt(task, {}, Store(tmp_path), Sources(tmp_path), silent)
     assert isinstance(failed, schedule.Failure)
     assert failed.exit_code == 4
-    assert failed.message == (
-        "bounce ensemble: the time is over; run it again, and what is finished of it is not computed again"
-    )
+    assert failed.message == ("bounce ensemble: the time is over; run it again: finished parts are not computed again")
     assert not list(tmp_path.iterdir())
 
 

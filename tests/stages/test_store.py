@@ -103,7 +103,7 @@ def test_a_command_reports_a_damaged_file_once(tmp_path: Path, fresh: Path, comm
         stored.chmod(0o644)
         stored.write_bytes(stored.read_bytes()[:-1] + b"?")
     reported = command("run", one, other, "--jobs", "2", "-q").err
-    assert reported.count("is corrupt") == reported.count("it is made again") == 2
+    assert reported.count("is corrupt") == reported.count("it will be computed again") == 2
 
 
 @pytest.mark.parametrize("file", ["nc", "vtu", "json"])
@@ -130,7 +130,7 @@ def test_a_failed_read_back_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     path = tmp_path / "a.bin"
     publish(path, b"old")
     monkeypatch.setattr(Path, "read_bytes", lambda self: b"not what was written")
-    with pytest.raises(OSError, match="does not read back"):
+    with pytest.raises(OSError, match="cannot be read back"):
         publish(path, b"new")
     monkeypatch.undo()
     assert path.read_bytes() == b"old"
@@ -252,7 +252,7 @@ def test_what_is_shown_shares_no_bytes_with_the_cache(store: Store, said: list[s
     assert shown.read_bytes() == kept.read_bytes()
     assert shown.with_name("run.edited.nc").read_bytes() == kept.read_bytes() + b"edited"
     (reported,) = said
-    assert "run.nc was edited; the edit is stored as run.edited.nc" in reported
+    assert "run.nc was edited; the edited file is now run.edited.nc" in reported
 
 
 def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Store, said: list[str]):

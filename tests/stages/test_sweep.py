@@ -209,8 +209,8 @@ def test_members_give_mean_and_deviation(root: Path):
         ({"vary": {"body.bob.com.7": [1.0]}}, "vary.body.bob.com.7", "there is no 'body.bob.com.7'"),
         ({"vary": {"body.bob.mass": ["1 kg", "1 m"]}}, "vary.body.bob.mass", "length"),
         ({"vary": {"body.bob.mass": [1.0, -1.0]}}, "vary.body.bob.mass", "-1"),
-        ({"vary": {"body.bob.mass": {"from": 1, "to": 2}}}, "sweep", "needs its count"),
-        ({"vary": {"body.bob.mass": {"from": "1 kg", "to": 2, "count": 3}}}, "vary.body.bob.mass", "one unit"),
+        ({"vary": {"body.bob.mass": {"from": 1, "to": 2}}}, "sweep", "needs a count"),
+        ({"vary": {"body.bob.mass": {"from": "1 kg", "to": 2, "count": 3}}}, "vary.body.bob.mass", "differ in unit"),
         ({"vary": {"body.bob.mass": {"from": -1, "to": 2, "count": 3, "spacing": "log"}}}, "mass", "ends of one sign"),
         ({"vary": {"a": [1.0, 2.0], "b": [1.0]}, "combine": "list"}, "sweep", "a 2, b 1"),
         (
@@ -227,9 +227,9 @@ def test_members_give_mean_and_deviation(root: Path):
         ({"keep": ["bob.velocity.sections", "bob.velocity.final"]}, "keep", "two sweeps"),
         ({"keep": ["bob.velocity.sections"], "error": True}, "keep", "estimated error"),
         ({"set": {"time.end": "1 kg"}}, "set", "mass"),
-        ({"members": 3}, "members", "no clearance joint"),
+        ({"members": 3}, "members", "neither clearance joint"),
         ({"sample": {"method": "sobol", "points": 4}}, "sweep", "without count"),
-        ({"set": {"solver.integrator": "rk4", "solver.step": 1e-3}, "error": True}, "error", "fixed length"),
+        ({"set": {"solver.integrator": "rk4", "solver.step": 1e-3}, "error": True}, "error", "fixed steps"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_runs(

@@ -294,7 +294,7 @@ def test_what_fits_nowhere_is_refused_before_it_is_run(
     assert "flexclear[zarr]" in capsys.readouterr().err
     assert _dataset(tmp_path / "small.toml", "", "grid", f"--out={tmp_path / 'x.zarr'}") == 2
     few = {"limits.memory": "1 kB"}
-    with pytest.raises(ResourceError, match="keep less"):
+    with pytest.raises(ResourceError, match="record fewer quantities"):
         fc.sweep(root / "scenes/checks/pendulum.toml", {"body.bob.mass": [1.0, 2.0]}, ["bob.position.series"], set=few)
     monkeypatch.undo()
     assert asked == []

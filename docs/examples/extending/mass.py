@@ -8,7 +8,7 @@ from flexclear.commands import scenes
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """Add the command's arguments to its parser."""
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
 
 

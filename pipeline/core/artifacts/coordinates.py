@@ -15,7 +15,7 @@ QUATERNION = ("w", "x", "y", "z")
 TRANSLATION, ROTATION = "translation", "rotation"
 
 
-_MOTION = "translation or rotation: what it is along or about"
+_MOTION = "translation or rotation: kind of the coordinate"
 COORDINATES: Schema = table(f"""
 time? | time | s | time
 separation_time? | separation_time | s | time at which run and perturbed run were compared
@@ -25,39 +25,39 @@ axis? | axis | | component along x, y, z
 axis2? | axis2 | | component along x, y, z
 quat? | quat | | component of a quaternion
 body? | body | | name of the body
-ensemble_body? | ensemble_body | | name of the body whose motion the ensemble keeps
+ensemble_body? | ensemble_body | | name of the body whose motion the ensemble records
 frame? | frame | | name of the frame; of a mechanism body.frame
 frame_body? | frame | | body that the frame is fixed to
-frame_held? | frame_held | | frame that is held meanwhile
+frame_held? | frame_held | | frame that is held
 joint? | joint | | name of the joint
 joint_type? | joint | | type of the joint
-joint_first_frame? | joint | | its first frame, whose axes are those of its motion
-joint_second_frame? | joint | | its second frame, on which its force acts
+joint_first_frame? | joint | | first frame of the joint, whose axes are those of the joint's motion
+joint_second_frame? | joint | | second frame of the joint, on which the joint's force acts
 joint_first_body? | joint | | body of the first frame
 joint_second_body? | joint | | body of the second frame
-coordinate? | coordinate | | joint, or joint.coordinate where it has several
-coordinate_joint? | coordinate | | name of its joint
+coordinate? | coordinate | | joint, or joint.coordinate where the joint has several
+coordinate_joint? | coordinate | | name of the coordinate's joint
 coordinate_motion? | coordinate | | {_MOTION}
 drive? | drive | | name of the drive, of its coordinate, or of an actuator
 drive_motion? | drive | | {_MOTION}
 load? | load | | name of the load
 load_type? | load | | type of the load
-load_motion? | load | | translation or rotation: what its length measures
+load_motion? | load | | translation or rotation: kind of the load's length
 bushing? | bushing | | name of the bushing
 controller? | controller | | name of the controller
 controller_motion? | controller | | {_MOTION}
 gear? | gear | | name of the gear
-gear_motion? | gear | | translation or rotation: what its second coordinate is
+gear_motion? | gear | | translation or rotation: kind of the gear's second coordinate
 contact? | contact | | name of the joint with clearance, or of the stop's end
-contact_type? | contact | | type of that joint, or stop
-event_motion? | event | | rotation where it acts along an angle, else translation
-contact_motion? | contact | | rotation where it ends an angle, else translation
+contact_type? | contact | | type of the joint with clearance, or stop
+event_motion? | event | | rotation for an event along an angle, else translation
+contact_motion? | contact | | rotation for a contact that limits an angle, else translation
 rubbing? | rubbing | | name of the ideal joint with friction
 worn? | worn | | name of the contact that wears
 band? | band | 1 | number of the band of equal height on a sphere, from its lower pole on
 sector? | sector | 1 | number of the sector about z of the surface's frame, from x on
 pass_joint? | singular_pass | | joint on whose coordinate the branches differ most
-mode? | mode | | body.number, or in the files of one body its number
+mode? | mode | | body.number; in the files of one body, the number of the mode
 mode2? | mode2 | 1 | number of the mode
 mode_body? | mode | | body that the mode belongs to
 mode_number? | mode | 1 | number of the mode in the body's bundle

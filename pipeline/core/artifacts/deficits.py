@@ -32,7 +32,7 @@ def table(bundle: xr.Dataset) -> str:
         f"  rigid motion: {a['rigid_motion']}",
         f"  frequencies of the free body within 1 %: up to {resolved:.6g} Hz"
         if resolved
-        else f"  frequencies of the free body within 1 %: not even the first, {first:.6g} Hz",
+        else f"  frequencies of the free body within 1 %: none; the first is at {first:.6g} Hz",
         "  static compliance, per cent of the full model, axes of the frame",
         _row("frame", "held", bundle["direction"].values.tolist()),
     ]
@@ -77,7 +77,7 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
         amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(directions[low], fraction[low], strict=True))
         messages.append(
             f"{body}: its {bundle.attrs['reference']} modes have too little of the static compliance {where} "
-            f"({amounts} of the full model's); joints there find the body too stiff. {_remedy(bundle, used)}"
+            f"({amounts} of the full model's): the body is too stiff at joints of these frames. {_remedy(bundle, used)}"
         )
     return messages
 
@@ -85,17 +85,15 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
 def _remedy(bundle: Labelled, used: Sequence[str]) -> str:
     """Return the remedy for missing compliance: static shapes, static shapes of all frames used, or more modes."""
     if bundle.attrs["reference"] not in STATIC:
-        return (
-            f'Static shapes mend that, as modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
-        )
+        return f'Add static shapes: modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
     had = str(bundle.attrs.get("interfaces", "")).split()
     without = [name for name in used if name not in had]
     if without:
         return (
-            f"Its static shapes are not made for {_listed(without)}: name all the frames used, "
-            f"as modes = {{ interfaces = {_listed(used)}, ... }}"
+            f"The body has no static shapes for {_listed(without)}; name all the frames used: "
+            f"modes = {{ interfaces = {_listed(used)}, ... }}"
         )
-    return f"Its static shapes are there: keep more normal modes than now (count = {bundle.attrs['count']})"
+    return f"The body has static shapes; retain more normal modes than now (count = {bundle.attrs['count']})"
 
 
 def _percent(fraction: float) -> str:

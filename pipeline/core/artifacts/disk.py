@@ -49,7 +49,7 @@ def require_ordinary(path: Path) -> int:
     """Return a file's size [bytes]; raise OSError for a folder, a device (possibly endless) or a pipe (may wait)."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
-        raise OSError(errno.EINVAL, "it is no ordinary file", str(path))
+        raise OSError(errno.EINVAL, "it is not an ordinary file", str(path))
     return status.st_size
 
 
@@ -73,7 +73,7 @@ def publish(path: Path, content: bytes) -> str:
     with temporary(path) as scratch:
         scratch.write_bytes(content)
         if scratch.read_bytes() != content:
-            raise OSError(errno.EIO, "what was written does not read back", str(path))
+            raise OSError(errno.EIO, "the written content cannot be read back", str(path))
         digest = settle(scratch, path)
     platforms.sync_folder(path.parent)
     return digest
@@ -153,7 +153,7 @@ def disk_limits(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         why = "the disk is full or a file size limit was reached" if error.errno in FULL else str(error.strerror)
-        raise ResourceError(f"cannot write below {folder}: {why}; nothing half-written was left") from None
+        raise ResourceError(f"cannot write below {folder}: {why}; no partial file remains") from None
 
 
 @contextlib.contextmanager

@@ -53,7 +53,7 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
             damaged.append(fault)
         statuses = [file.stat() for file in files if file.is_file()]
         artifacts.append(Artifact(record, sum(s.st_size for s in statuses), time.time() - path.stat().st_mtime))
-    damaged += [f"{store.below(path)} is no record, or damaged" for path in unreadable]
+    damaged += [f"{store.below(path)} is damaged or is not a record" for path in unreadable]
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
 
@@ -103,7 +103,7 @@ def shown_faults(store: Store, below: Path) -> list[str]:
         for path in sorted(facts.parent.iterdir()) if known else ():
             whole = path.suffix == ".nc" and not path.stem.endswith((PARTIAL, ".edited"))
             if (whole or path.name in names) and path.is_file() and sha256(path.read_bytes()) not in known:
-                faults.append(f"{store.below(path)} differs from what was shown; the next command shows it again")
+                faults.append(f"{store.below(path)} differs from its artifact; the next command restores it")
     return faults
 
 

@@ -45,10 +45,10 @@ class Modal:
 
     def _check(self, count: int) -> None:
         if not 1 <= count <= self.count:
-            raise InputError("modal.truncate", f"{count} of {self.count} modes", f"ask for 1 to {self.count}")
+            raise InputError("modal.truncate", f"{count} of {self.count} modes", f"request 1 to {self.count}")
         if "frequency" in self._dataset and count < self.count:
             last, following = self._dataset["frequency"].values[count - 1 : count + 1]
             if following - last <= 1e-6 * following:
                 raise InputError(
-                    "modal.truncate", f"{count} modes cut a pair of equal frequencies at {last:.6g} Hz", "keep both"
+                    "modal.truncate", f"{count} modes split a pair of equal frequencies at {last:.6g} Hz", "keep both"
                 )

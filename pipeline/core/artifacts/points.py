@@ -106,13 +106,13 @@ def dataset(
         variables[variable(one, statistic)] = ((*dims, *one.dims), rows, described)
     status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
     plain = {
-        "status": (np.array(status, dtype=np.int8), "what became of the point"),
-        "reason": (np.array(["" if p is None else p.refused for p in every], dtype=object), "why it was refused"),
+        "status": (np.array(status, dtype=np.int8), "state of the point"),
+        "reason": (np.array(["" if p is None else p.refused for p in every], dtype=object), "reason of the refusal"),
         "evaluations": (
             np.array([0 if p is None else p.evaluations for p in every], dtype=np.int64),
             "evaluations of the equations of motion, all runs of the point together",
         ),
-        "key": (np.array(keys, dtype=object), "digest of all that decides the point"),
+        "key": (np.array(keys, dtype=object), "digest of all inputs of the point"),
     }
     for name, (values, meaning) in plain.items():
         variables[name] = (dims, values.reshape(shape), {"long_name": meaning})

@@ -65,7 +65,7 @@ stiffness_column | stiffness_entry | 1 | column
 stiffness_value | stiffness_entry | J | stiffness, per unit of row and of column: m for ux uy uz, rad for rx ry rz
 mass_row | mass_entry | 1 | row
 mass_column | mass_entry | 1 | column
-mass_value | mass_entry | kg m2 | mass, per unit of row and of column likewise
+mass_value | mass_entry | kg m2 | mass, per unit of row and of column: m for ux uy uz, rad for rx ry rz
 frame_position | frame axis | m | origin of the named frame in the mesh frame
 frame_rotation | frame axis axis2 | 1 | rotation matrix, frame to mesh frame
 tie_node | tie | 1 | number of the node whose motion, or mean motion, is the frame's
@@ -107,8 +107,8 @@ gauge_index? | gauge_entry | 1 | index of that gauge among `gauge`
 #: stages 2 and 3: deficits of the reduced body against the full model
 DEFICITS: Schema = table("""
 compliance_full? | frame frame_held direction | m N-1, rad N-1 m-1 | static compliance of a frame with another held
-    (itself: with nothing held), full model, axes of the frame
-compliance_share? | frame frame_held direction | 1 | fraction of that compliance which the modes have
+    (the frame itself: nothing held), full model, axes of the frame
+compliance_share? | frame frame_held direction | 1 | fraction of the full model's compliance that the modes have
 error_bound? | frame direction bound_frequency | m N-1, rad N-1 m-1 | largest error of a frame's motion along a unit
     harmonic load on it, axes of the frame
 effective_mass? | direction mode | kg, kg m2 | squared momentum of the mode per unit rigid motion about the centre of
@@ -135,8 +135,8 @@ product_moment? | cell | m4 | integral of y z over the section (stiffness)
 inertia_product? | cell | m4 | integral of y z over the section (mass)
 area_profile? | cell point | 1 | area at the Gauss points over that of the cell
 second_moment_profile? | cell point axis | 1 | second moments at the Gauss points over those of the cell
-inertia_moment_profile? | cell point axis | 1 | second moments of the mass likewise
-shear_coefficient_profile? | cell point axis | 1 | shear coefficients likewise
+inertia_moment_profile? | cell point axis | 1 | second moments of the mass at the points of the cell
+shear_coefficient_profile? | cell point axis | 1 | shear coefficients at the points of the cell
 lump_node? | lump | 1 | node that carries the lumped mass
 lump_mass? | lump | kg | lumped mass
 lump_offset? | lump axis | m | centre of the lumped mass seen from its node, mesh axes
@@ -215,9 +215,9 @@ SECTIONS: Schema = _OF_SECTION | table("""
 orbit_position | waypoint body axis | m | centre of mass at waypoints of the last period
 orbit_quaternion | waypoint body quat | 1 | unit quaternion at waypoints of the last period
 orbit_velocity | waypoint body axis | m s-1 | velocity at waypoints of the last period
-orbit_contact_offset? | waypoint contact axis | m, rad | ball centre relative to the socket centre there
+orbit_contact_offset? | waypoint contact axis | m, rad | ball centre relative to the socket centre at waypoints
 contact_offset? | section contact axis | m, rad | ball centre relative to the socket centre, socket axes
-growth | followed | 1 | logarithm of how a neighbour's distance grew in the period
+growth | followed | 1 | logarithm of the growth factor of a neighbour's distance in the period
 impact_section? | impact | 1 | number of the period in which the impact began
 impact_contact? | impact | | name of the contact
 impact_phase? | impact | s | time of the closing since the period began
@@ -255,9 +255,9 @@ whirl_frequency~ | speed branch | Hz | frequency in fixed axes, negative for bac
     whirl
 decay_rate~ | speed branch | s-1 | rate at which the vibration decays; negative when it grows
 growth~ | speed | s-1 | largest rate at which a small motion grows; 0 where stable, NaN without steady motion
-whirl | branch | | forward or backward; empty for what does not whirl
-dominant | branch | | body with the largest share of the kinetic energy at most speeds
-critical_speed~ | branch | rad s-1 | lowest speed at which the whirl is as fast as the turning, or NaN
+whirl | branch | | forward or backward; empty for vibrations without whirl
+dominant | branch | | body with the largest fraction of the kinetic energy at most speeds
+critical_speed~ | branch | rad s-1 | lowest speed at which the whirl frequency equals the speed, or NaN
 frame_position~ | speed frame axis | m | origin of the named frame in steady motion, world axes
 """)
 
@@ -333,7 +333,7 @@ def require_complete(run: xr.Dataset | LabelledArrays, what: str = "the run") ->
     if not run.attrs.get("complete", 1):
         raise InputError(
             what,
-            f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
-            f"({run.attrs.get('stopped_by', 'nobody knows why')})",
+            f"the run is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
+            f"({run.attrs.get('stopped_by', 'reason unknown')})",
             "run the scene again",
         )

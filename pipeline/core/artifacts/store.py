@@ -53,7 +53,7 @@ REPORTED = ("warnings", "accuracy_verdict")
 OUTDATED = "OUTDATED.txt"
 #: inserted before the suffix in the file name of an incomplete run
 PARTIAL = ".partial"
-OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
+OUTDATED_TEXT = "Results in this folder are outdated: updating them failed.\n\n"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class Store:
             return None
         fault = self.fault(record)
         if fault is not None:
-            self.say(f"{fault}; it is made again")
+            self.say(f"{fault}; it will be computed again")
         return record if fault is None else None
 
     def fault(self, record: Record) -> str | None:
@@ -110,7 +110,7 @@ class Store:
             try:
                 actual = digest_of(path)
             except OSError:
-                return f"{self.below(path)} is missing, or no file"
+                return f"{self.below(path)} is missing or is not a file"
             if actual != digest:
                 return f"{self.below(path)} is corrupt (its content differs from its sha256)"
         return None
@@ -155,7 +155,7 @@ class Store:
         try:
             return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # the digest is right: it never was a dataset
-            raise ResourceError(f"{self.below(path)} holds no dataset ({shown(str(error))}); remove it") from None
+            raise ResourceError(f"{self.below(path)} is not a dataset ({shown(str(error))}); remove it") from None
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Show the current artifact: read-only copies in `folder`, and its facts in ``folder/.facts``.
@@ -188,7 +188,7 @@ class Store:
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             platforms.replace(target, aside)
-            self.say(f"{self.below(target)} was edited; the edit is stored as {aside.name}, and the result shown again")
+            self.say(f"{self.below(target)} was edited; the edited file is now {aside.name}, the result is restored")
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
         """Write an incomplete run next to the shown files; return its path, or None where nothing is shown.

@@ -35,7 +35,7 @@ def check_axes(axes: Mapping[str, Vector] | Sequence[Vector]) -> None:
 def check_axis(axis: Vector) -> None:
     """Raise ValueError, in words, for a direction of length zero."""
     if not math.hypot(*axis) > 0.0:
-        raise ValueError(f"an axis must not have the length zero; here it is {[float(x) for x in axis]}")
+        raise ValueError(f"an axis must not have length zero; the given one is {[float(x) for x in axis]}")
 
 
 def dot(a: Vector, b: Vector) -> float:

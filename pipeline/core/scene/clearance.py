@@ -43,7 +43,7 @@ class NormalLaw(Part):
     def _one_restitution(self) -> Self:
         if self.restitution is not None and self.delivered_restitution is not None:
             raise ValueError(
-                "restitution (the law's parameter) and delivered_restitution (the rebound) say the same; give one"
+                "restitution (the law's parameter) and delivered_restitution (the rebound) are alternatives; give one"
             )
         return self
 
@@ -87,7 +87,7 @@ class Ambrosio(Part):
     def _ordered(self) -> Self:
         if not self.v0 < self.v1:
             raise ValueError(
-                "v0 must be below v1, as friction rises from nothing at v0 to `dynamic` at v1; "
+                "v0 must be below v1, as friction rises from zero at v0 to `dynamic` at v1; "
                 f"v0 = {self.v0:g} m/s, v1 = {self.v1:g} m/s"
             )
         return self
@@ -118,8 +118,8 @@ class LuGre(Part):
         most = 4.0 * self.dynamic / (0.42888194248035340 * self.v_stribeck)
         if self.bristle_damping > most:
             raise ValueError(
-                f"bristle_damping = {self.bristle_damping} s/m would drive the sliding; "
-                f"with these coefficients at most {most:.6g} s/m dissipates"
+                f"bristle_damping = {self.bristle_damping} s/m would add energy to the "
+                f"sliding; with these coefficients at most {most:.6g} s/m dissipates"
             )
         return self
 
@@ -329,8 +329,8 @@ def require_fitting(kind: str, friction: Any) -> None:
     given = {name for name in ("radius", "length", "axial_radius") if getattr(friction, name) is not None}
     for name in sorted(needed - given):
         raise ValueError(
-            f"friction in a {kind} joint needs a {name}: its moment is the friction force times that; none is given"
+            f"friction in a {kind} joint needs a {name}, the lever arm of the friction force; none is given"
         )
     for name in sorted(given - possible):
         may = ", ".join(sorted(possible))
-        raise ValueError(f"the bearing of a {kind} joint has no {name}; sizes that it may have: {may}")
+        raise ValueError(f"the bearing of a {kind} joint has no {name}; sizes of such a joint: {may}")

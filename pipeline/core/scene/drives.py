@@ -55,9 +55,7 @@ class PathDrive(Part):
             raise ValueError("a path must prescribe at least one component of position or rotation")
         turning = self.rotation.laws() if self.rotation is not None else {}
         if self.angles == "rotation-vector" and 0 < len(turning) < 3:
-            raise ValueError(
-                "a rotation vector needs all its three components: give rotation.x, rotation.y and rotation.z"
-            )
+            raise ValueError("a rotation vector needs all three components: give rotation.x, rotation.y and rotation.z")
         if self.actuators is not None and len(set(self.actuators)) < len(self.actuators):
             twice = next(name for name in self.actuators if self.actuators.count(name) > 1)
             raise ValueError(f"each actuator must be named once; '{twice}' is named twice")

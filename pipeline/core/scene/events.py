@@ -57,7 +57,7 @@ class Event(Part):
     def _one_change(self) -> Self:
         require_one(self, CHANGES, "says what changes")
         if (self.switch is None) != (self.to is None):
-            raise ValueError("switch and to belong together: a part, and the keys of it that change")
+            raise ValueError("switch needs to, and to needs switch: a part, and the keys of the part that change")
         return self
 
     @property
@@ -119,15 +119,15 @@ def require_possible(scene: Any) -> None:
     _require_distinct(scene)
     for name, load in scene.load.items():
         if isinstance(load, SampledPid):
-            raise ValueError(f"load.{name}: a sampled controller does not go on over events: use a continuous 'pid'")
+            raise ValueError(f"load.{name}: a sampled controller cannot continue across events: use a continuous 'pid'")
     for name, drive in scene.drive.items():
         if isinstance(drive, PathDrive) and drive.actuators:
             raise ValueError(
-                f"drive.{name}.actuators: a path with actuators has no events: drive the joints themselves"
+                f"drive.{name}.actuators: a path with actuators allows no events: drive the joints instead"
             )
     for setting in ("ensemble", "sections"):
         if getattr(scene, setting) is not None:
-            raise ValueError(f"{setting}: a run with events is a single one: remove [{setting}], or the events")
+            raise ValueError(f"{setting}: only a single run may have events: remove [{setting}] or the events")
 
 
 def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
@@ -138,7 +138,7 @@ def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
     elif part not in getattr(scene, family):
         yield kind, f"there is no {family} '{part}' ({suggestion(part, getattr(scene, family))})"
     elif family == "event" and scene.event[part].kind != "lock":
-        yield kind, f"'{part}' is no lock: there is nothing to release"
+        yield kind, f"'{part}' is not a lock and cannot be released"
     elif kind == "release" and family == "joint" and scene.joint[part].type == "free":
         yield kind, f"joint '{part}' is free already"
     elif kind == "lock":
@@ -166,7 +166,7 @@ def _of_lock(scene: Any, name: str, joint: Any) -> Iterator[tuple[str, str]]:
     elif joint.type not in COORDINATES:
         yield "lock", f"a {joint.type} joint has no coordinate to hold: lock a {' or '.join(COORDINATES)} joint"
     elif name in scene.drive:
-        yield "", f"a drive is called '{name}', too, and the lock is recorded as one: choose another name"
+        yield "", f"a drive has the name '{name}', under which the lock would be recorded: choose another name"
 
 
 def _of_switch(scene: Any, part: Any, event: Event) -> Iterator[tuple[str, str]]:
@@ -181,11 +181,11 @@ def _of_switch(scene: Any, part: Any, event: Event) -> Iterator[tuple[str, str]]
         yield "to", str(error)
         return
     if isinstance(part, JointDrive) and (new.joint, new.coordinate) != (part.joint, part.coordinate):
-        yield "to", "a drive stays on its coordinate: give another law"
+        yield "to", "an event cannot change a drive's coordinate: give another law"
     elif isinstance(part, JointDrive) and "law" not in (event.to or {}):
-        yield "to", "gives no law; a drive is switched to another law"
+        yield "to", "gives no law; switching a drive needs another law"
     elif isinstance(new, SampledPid):
-        yield "to", "a sampled controller does not start at an event: use a continuous 'pid'"
+        yield "to", "a sampled controller cannot start at an event: use a continuous 'pid'"
 
 
 def _chain(events: Mapping[str, Event], name: str) -> Collection[str]:

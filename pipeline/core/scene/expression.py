@@ -69,15 +69,15 @@ def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) ->
     exponents, dim, _ = fold(steps, _measured, _combined)
     if bool(dim) != vector:
         raise ValueError(
-            "it is a number, but a vector belongs here: give three components"
+            "it is a number, but a vector is expected: give three components"
             if vector
-            else "it is a vector, but a number belongs here: take a component, or norm(...)"
+            else "it is a vector, but a number is expected: take a component, or norm(...)"
         )
     needed = units.exponents(dimension)
     if exponents is not None and not _same(exponents, needed):
         turned = "; rad is a unit: divide by 1 rad" if _same((*exponents[:3], 0.0), needed) else ""
         raise ValueError(
-            f"its value is in {units.si(exponents)}, but {units.a(dimension)} [{units.si(needed)}] belongs here{turned}"
+            f"its value is in {units.si(exponents)}, but {units.a(dimension)} [{units.si(needed)}] is expected{turned}"
         )
 
 
@@ -96,15 +96,15 @@ def _combined(operator: str, operands: list[Measure]) -> Measure:
         return a, "", None
     if operator in "*/":
         if second and (first or operator == "/"):
-            raise ValueError("one of two vectors that are multiplied, or a divisor, must be a component, or norm(...)")
+            raise ValueError("no products of two vectors, no vector divisors: take a component, or norm(...)")
         sign = 1.0 if operator == "*" else -1.0
         return _sum(a or NUMBER, b or NUMBER, sign), first or second, None
     if operator in "+-" or operator in SEVERAL:
         if a is not None and b is not None and not _same(a, b):
             verb = "added or subtracted" if operator in "+-" else "compared"
-            raise ValueError(f"{units.si(a)} and {units.si(b)} are not {verb}; numbers need their unit")
+            raise ValueError(f"{units.si(a)} and {units.si(b)} cannot be {verb}; give numbers their unit")
         if first != second:
-            raise ValueError("a vector and a number are not added or subtracted; take a component, or norm(...)")
+            raise ValueError("a vector and a number cannot be added or subtracted; take a component, or norm(...)")
         if not first or operator in "+-":
             return a or b, first, None
     if first:
@@ -211,7 +211,7 @@ def _leaf(token: re.Match[str], term: Callable[[str], Any], constants: Mapping[s
         return math.pi, "1"
     quantity = term(name)
     if not quantity.over_time or quantity.dim == "quat":
-        raise ValueError(f"'{name}' cannot be part of an expression: it is no number or vector over time")
+        raise ValueError(f"'{name}' cannot be part of an expression: it is neither a number nor a vector over time")
     return quantity
 
 
@@ -227,8 +227,8 @@ def _shortened(text: str) -> str:
 
 def _misread(text: str) -> ValueError:
     return ValueError(
-        f"'{_shortened(text)}' is no quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or an expression "
-        "of them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and -"
+        f"'{_shortened(text)}' is not a quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or combine "
+        "them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and -"
     )
 
 

@@ -91,7 +91,7 @@ def _inertia(value: Any) -> list[list[float]]:
     moments = _principal(rows)
     if moments[0] < -_ROUNDING * moments[2] or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise ValueError(
-            f"principal moments {moments} kg m^2 belong to no body: each must be >= 0 and at most the sum of the others"
+            f"principal moments {moments} kg m^2 are impossible: each must be >= 0 and at most the sum of the others"
         )
     return rows
 
@@ -99,9 +99,7 @@ def _inertia(value: Any) -> list[list[float]]:
 def _symmetric(rows: list[list[float]]) -> list[list[float]]:
     off = max(abs(rows[i][j] - rows[j][i]) for i in range(3) for j in range(i))
     if off > _ROUNDING * max(abs(entry) for row in rows for entry in row):
-        raise ValueError(
-            f"an inertia matrix must be symmetric; entries opposite to each other differ by up to {off:.3g} kg m^2"
-        )
+        raise ValueError(f"an inertia matrix must be symmetric; opposite entries differ by up to {off:.3g} kg m^2")
     return [[0.5 * (rows[i][j] + rows[j][i]) for j in range(3)] for i in range(3)]
 
 
@@ -130,11 +128,11 @@ LONGEST_NAME, LONGEST_BYTES = 100, 200
 def part_name(name: str) -> str:
     """Return a part's name if it fits into paths such as ``body.FRAME`` and into file names; else raise ValueError."""
     if len(name) > LONGEST_NAME or not re.fullmatch(_NAME, name):
-        raise ValueError(f"'{name}' is no name: it is made of up to {LONGEST_NAME} letters, digits, _ and -")
+        raise ValueError(f"'{name}' is not a name: use up to {LONGEST_NAME} letters, digits, _ and -")
     if len(name.encode()) > LONGEST_BYTES:
         raise ValueError(f"'{name}' is too long for the name of a file: {LONGEST_BYTES} bytes in UTF-8 at most")
     if name == "source":
-        raise ValueError("'source' is no name for a part: it says where values come from")
+        raise ValueError("'source' cannot be the name of a part: this key cites where values come from")
     return name
 
 
@@ -190,7 +188,7 @@ def require_one(part: Part, keys: tuple[str, ...], says: str) -> None:
 def given_once(part: Part, ways: tuple[str, ...]) -> None:
     """Raise ValueError when an orientation is given in more than one of these ways."""
     if len(present := given(part, ways)) > 1:
-        raise ValueError(f"an orientation is given once, not by {' and '.join(present)}")
+        raise ValueError(f"give an orientation once, not by {' and '.join(present)}")
 
 
 class Pose(Part):
@@ -214,7 +212,7 @@ class Pose(Part):
         given_once(self, ("quaternion", "rotation_vector", "axes", "axis"))
         if self.quaternion is not None and not 0.999 < math.hypot(*self.quaternion) < 1.001:
             raise ValueError(
-                f"a quaternion (w, x, y, z) must have the norm 1; {list(self.quaternion)} has "
+                f"a quaternion (w, x, y, z) must have norm 1; {list(self.quaternion)} has "
                 f"{math.hypot(*self.quaternion):.6g}"
             )
         if self.axes is not None:

@@ -121,7 +121,7 @@ def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     for name, value in values.items():
         if not re.fullmatch(r"[^\W\d]\w*", name) or name in (*FUNCTIONS, *SEVERAL, "t", "time", "pi", *OF_LINES):
             raise ValueError(
-                f"values.{name}: '{name}' is no name for a constant: choose letters, digits and _, and no function, t, "
+                f"values.{name}: '{name}' cannot name a constant: choose letters, digits and _, but no function, t, "
                 "pi, length or rate"
             )
         number, _, unit = value.partition(" ") if isinstance(value, str) else (value, "", "1")
@@ -140,18 +140,18 @@ def _check(scene: Any, step: Any) -> None:
     """Raise ValueError for a step that no load can compute."""
     if step in JUMPING:
         raise ValueError(
-            f"{step}(...) jumps, and no step of the integration can cross that: write a steep tanh(...), or a ramp of "
+            f"{step}(...) jumps, and integration steps cannot cross a jump: write a steep tanh(...), or a ramp of "
             "min(...) and max(...)"
         )
     if not isinstance(step, Quantity):
         return
     if step.kind not in READ:
         raise ValueError(
-            f"'{step.name}' does not follow from positions and velocities alone, so no load can depend on it: use "
+            f"'{step.name}' depends on more than positions and velocities, so no load can depend on it: use "
             f"{', '.join(READ)}"
         )
     if KINDS[step.kind].owner == "body" and isinstance(scene.body[step.owner], FlexibleBody):
-        raise ValueError(f"'{step.name}' is of a flexible body: use the frame_position of one of its frames")
+        raise ValueError(f"'{step.name}' belongs to a flexible body: use the frame_position of one of its frames")
 
 
 def _encoded(steps: list[Any], numbers: list[float], reads: list[tuple[str, str]]) -> str:

@@ -27,13 +27,13 @@ def scene_schema() -> dict[str, Any]:
     for name in list(definitions):
         definitions[PARTIAL + name] = _partial(definitions[name])
     properties["extends"] = {"type": "string", "description": "scene file that this one edits, relative to it"}
-    properties["replace"] = _edit("parts put instead of others; nothing of the old ones stays", properties)
-    properties["set"] = _edit("keys that change in parts and settings; the others stay", properties, SETTINGS)
+    properties["replace"] = _edit("parts that replace others completely", properties)
+    properties["set"] = _edit("keys of parts and settings to change; all others are unchanged", properties, SETTINGS)
     properties["set"]["properties"] = {k: _partial(p) for k, p in properties["set"]["properties"].items()}
     properties["remove"] = {
         "type": "array",
         "items": {"type": "string"},
-        "description": 'paths that are taken away, such as "joint.A1"',
+        "description": 'paths to remove, such as "joint.A1"',
     }
     schema |= {
         "if": {"not": {"required": ["extends"]}},

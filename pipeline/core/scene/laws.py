@@ -139,9 +139,7 @@ class Spline(Part):
     @model_validator(mode="after")
     def _drawable(self) -> Self:
         if len(self.time) != len(self.value):
-            raise ValueError(
-                f"each time must have one value; there are {len(self.time)} times, but {len(self.value)} values"
-            )
+            raise ValueError(f"each time needs one value; {len(self.time)} times have {len(self.value)} values")
         _check_points(self.time, self.degree, self.ends)
         return self
 
@@ -198,8 +196,8 @@ class Table(Part):
         _check_points([t for t, _ in self.points], self.degree, self.ends)
         if self.ends == "periodic" and self.points[0][1] != self.points[-1][1]:
             raise ValueError(
-                "a periodic table must end with the value that it starts with; "
-                f"it starts with {self.points[0][1]:g} and ends with {self.points[-1][1]:g}"
+                "a periodic table must end with its first value; it starts "
+                f"with {self.points[0][1]:g} and ends with {self.points[-1][1]:g}"
             )
         return self
 
@@ -238,7 +236,7 @@ class Piecewise(Part):
     def _ordered(self) -> Self:
         starts = [s.start for s in self.sections]
         if any(not a < b for a, b in pairwise(starts)):
-            raise ValueError(f"the sections must start one after the other, not at {starts} s")
+            raise ValueError(f"the sections must start at increasing times, not at {starts} s")
         _check_count(self)
         return self
 
@@ -334,7 +332,7 @@ def _count(law: Any) -> int:
 def _check_count(law: Any) -> None:
     if _count(law) > MOST_PIECES:
         text = f"{min(_count(law), 10**300):.6g}"
-        raise ValueError(f"it is made of {text} pieces, at each of which integration stops: at most {MOST_PIECES}")
+        raise ValueError(f"it has {text} pieces, at each of which integration stops; the limit is {MOST_PIECES}")
 
 
 def law_types(node: object) -> Iterator[str]:
@@ -351,7 +349,7 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
     """Return two columns of a CSV file, time in seconds; raise ValueError, in words, for unreadable files."""
     try:
         if not path.is_file() and path.exists():
-            raise ValueError(f"the table {path.name} cannot be read: it is no ordinary file")
+            raise ValueError(f"the table {path.name} cannot be read: it is not an ordinary file")
         if path.stat().st_size > LARGEST_TABLE:
             raise ValueError(f"the table {path.name} is larger than {LARGEST_TABLE >> 20} MB: leave rows out")
         with path.open(newline="", encoding="utf-8-sig") as file:

@@ -51,7 +51,7 @@ class Limits(Part):
     @property
     def time_words(self) -> str:
         """The message when the time is over."""
-        return f"it has taken the {self.time or 0.0:.6g} s that limits.time allows"
+        return f"the run reached the {self.time or 0.0:.6g} s of limits.time"
 
     def written(self) -> dict[str, Any]:
         """Return the limits as a table that can be read again."""
@@ -62,7 +62,7 @@ def check_rows(rows: float, interval: float, limits: Limits) -> None:
     """Raise ResourceError when an output interval [s] requests more rows than a run may have."""
     if rows > limits.rows:
         raise ResourceError(
-            f"[output.interval]: {interval:g} s asks for {rows:.3g} rows, more than the {limits.rows} that limits.rows "
+            f"[output.interval]: {interval:g} s requests {rows:.3g} rows, more than the {limits.rows} that limits.rows "
             "allows; choose a longer one"
         )
 
@@ -77,7 +77,7 @@ def check_members(members: int, limits: Limits, where: str = "[ensemble.members]
 def require_scatter(scene: Any, where: str) -> None:
     """Raise InputError for a scene whose ensemble members would all be the same run."""
     if not scene.contacts() and not scene.stop:
-        problem = "members differ by a ball's offset, but there is no clearance joint and no stop"
+        problem = "members differ in their ball offsets, but the scene has neither clearance joint nor stop"
         raise InputError(where, problem, "remove it")
 
 
@@ -90,8 +90,8 @@ def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) ->
         count = len(table[family]) if isinstance(table.get(family), dict) else 0
         if count > most:
             raise ResourceError(
-                f"{path} [{family}]: there are {count}, more than the {most} that limits.parts allows; "
-                "the work grows with the square of their number and more"
+                f"{path} [{family}]: {count} parts are more than the {most} that limits.parts allows; "
+                "the work grows at least with the square of their number"
             )
 
 

@@ -96,7 +96,7 @@ def _keys(dotted: str) -> tuple[str, ...]:
 LONGEST_MENDED = 300
 _NUMBER = re.compile(r"\(at line (\d+)")
 _AT = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
-_OTHER = "names with other characters than letters A to z, digits, - and _ are written in quotation marks"
+_OTHER = "put names with characters other than A to z, digits, - and _ in quotation marks"
 #: text in quotation marks, or a comment, both left unchanged; or a number and the text after it that may be a unit
 _PARTS = re.compile(
     r"""("[^"]*"|'[^']*'|\#.*)"""
@@ -124,17 +124,17 @@ def _common_error(line: str) -> tuple[str, str] | None:
     if len(re.findall(r"(?<!\\)\"", bare.partition(" #")[0])) % 2:
         return (
             f"a quotation mark is missing: {bare}",
-            'text and quantities with units are written between two marks: "1 mm"',
+            'put text and quantities with units between two quotation marks: "1 mm"',
         )
     quoted = _quoted(line) if len(line) <= LONGEST_MENDED else line
     if quoted != line:
         return f"a quantity with a unit needs quotation marks: {bare}", f"write {quoted.strip()}"
     if value and re.fullmatch(r"[-+]?\d+,\d+", value[2]):
-        return f"a decimal comma is none of TOML's: {bare}", f"write {value[1]} = {value[2].replace(',', '.')}"
+        return f"a decimal comma is not allowed: {bare}", f"write {value[1]} = {value[2].replace(',', '.')}"
     if value and re.fullmatch(r"[A-Za-z][\w -]*", value[2]) and value[2] not in ("true", "false", "inf", "nan"):
         return f"text needs quotation marks: {bare}", f'write {value[1]} = "{value[2]}"'
     if value and not value[2].partition("#")[0]:
-        return f"a value is missing: {bare}", "write one, or take the line away"
+        return f"a value is missing: {bare}", "write one, or remove the line"
     colon = re.match(r"([\w.-]+)\s*:\s*(.+)$", bare)
     if colon:
         return f"key and value are joined by =: {bare}", f"write {colon[1]} = {colon[2]}"
@@ -147,13 +147,13 @@ def _reader_message(message: str, line: str) -> tuple[str, str | None]:
     twice = re.match(r"Cannot declare \((.*?),?\) twice", text)
     if twice:
         name = ".".join(re.findall(r"'([^']*)'", twice[1]))
-        return f"the table [{name}] is there twice", "give it another name, or join both"
+        return f"the table [{name}] is defined twice", "give it another name, or join both"
     if "Unescaped '\\'" in text or "hex value" in text:
-        return f'\\ begins a special character in "...": {line.strip()}', "write / between folders, on Windows, too"
+        return f'\\ begins a special character in "...": {line.strip()}', "write / between folders, also on Windows"
     if text == "Cannot overwrite a value":
-        return f"a key is given twice: {line.strip()}", "take one of the two away"
+        return f"a key is given twice: {line.strip()}", "remove one of the two"
     if "key part" in text and line.strip().endswith("{"):
-        return f"{text}: {line.strip()}", "a table in { } is on one line; longer ones have a [heading] of their own"
+        return f"{text}: {line.strip()}", "write a table in { } on one line, or give it a [heading] of its own"
     if "Unclosed" in text or "Expected ']'" in text:
         hint = _OTHER if _odd_name(line) else "close each bracket, with commas between entries"
         return f"{text}: {line.strip()}", hint

@@ -49,7 +49,7 @@ TYPICAL_KEYS = {
 USE = {
     SCENE: "flexclear run {path}",
     SWEEP: "flexclear sweep {path}",
-    RECIPE: 'flexclear check {path} looks at it; bodies of scenes name it: mesh = "{path}"',
+    RECIPE: 'flexclear check {path} checks it; bodies of scenes name it: mesh = "{path}"',
 }
 
 
@@ -87,7 +87,7 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
     copied = copy.deepcopy(dict(table))
     _require_tables(copied, origin)
     if any(key in copied for key in EDITS):
-        raise InputError("scene", "edits another scene, which only files do", "use edited(scene, changes)")
+        raise InputError("scene", "edits another scene, which only files can do", "use edited(scene, changes)")
     _absolute_files(copied, Path.cwd() / origin)
     for key, value in (override or {}).items():
         _put(copied, key, value, "override of scene")
@@ -171,7 +171,7 @@ def number_at(scene: Scene, path: str) -> tuple[float, str]:
         with contextlib.suppress(ValueError):
             number, _, unit = str(any_quantity(parent[key])).partition(" ")
             return float(number), unit
-    raise InputError(path, f"is no number but {parent[key]!r}", "name one number, of a list by its index: com.0")
+    raise InputError(path, f"is not a number but {parent[key]!r}", "name one number, of a list by index: com.0")
 
 
 @cache
@@ -189,7 +189,7 @@ def scene_name(path: Path) -> str:
     """
     whole = _resolved(path).with_suffix("")
     if not whole.name.strip(".") or not whole.name.isprintable():
-        raise InputError(shown(str(path)), "is no name for a scene: results go into a folder of that name", "rename it")
+        raise InputError(shown(str(path)), "cannot name a scene: results go into a folder of that name", "rename it")
     if "scenes" in whole.parts[:-1]:
         last = len(whole.parts) - 1 - whole.parts[::-1].index("scenes")
         parts = whole.parts[last + 1 :]
@@ -207,7 +207,7 @@ def _resolved(path: Path) -> Path:
     try:
         return path.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # the path loops, is too long, or contains a NUL
-        raise InputError(str(path), f"is no path: {error}", "name a TOML file") from None
+        raise InputError(str(path), f"is not a path: {error}", "name a TOML file") from None
 
 
 def is_file(path: Path) -> bool:
@@ -271,12 +271,12 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            raise InputError(str(path), "cannot be read: it is no ordinary file", "name a TOML file")
+            raise InputError(str(path), "cannot be read: it is not an ordinary file", "name a TOML file")
         if status.st_size > LARGEST_FILE:
             raise InputError(
                 str(path),
                 f"is larger than {LARGEST_FILE >> 20} MB",
-                "name a TOML file; longer courses of a law go into a table (CSV)",
+                "name a TOML file; put long tables of laws into a CSV file",
             )
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
@@ -311,7 +311,7 @@ def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
 
 def _neighbours(path: Path) -> str | None:
     if any("\\" in part for part in path.parts) or not str(path).isprintable():  # \ separates folders on Windows only
-        return "write / between folders: every system takes it"
+        return "write / between folders, which works on every system"
     names = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
     return suggestion(path.name, names) if names else None
 

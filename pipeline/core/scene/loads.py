@@ -71,7 +71,7 @@ def _checked(rows: list[list[float]], what: str) -> Matrix:
     mended = tuple(tuple(0.5 * (rows[i][j] + rows[j][i]) for j in range(6)) for i in range(6))
     for k in range(6):
         if mended[k][k] < 0.0:
-            raise ValueError(f"a {what} must not be negative; that along {_DIRECTIONS[k]} is {mended[k][k]:g}")
+            raise ValueError(f"a {what} must not be negative; the entry along {_DIRECTIONS[k]} is {mended[k][k]:g}")
     if any(mended[i][j] for i in range(6) for j in range(i)):
         _require_semidefinite(mended, sizes, what)
     return mended
@@ -83,16 +83,16 @@ def _require_semidefinite(matrix: Matrix, sizes: list[float], what: str) -> None
     for i, j in product(range(6), repeat=2):
         if matrix[i][j] and not sizes[i]:
             raise ValueError(
-                f"a {what} matrix must be positive semidefinite: {_DIRECTIONS[i]} has none of its own, "
-                f"but {matrix[i][j]:g} with {_DIRECTIONS[j]}"
+                f"a {what} matrix must be positive semidefinite: {_DIRECTIONS[i]} has none on the "
+                f"diagonal, but {matrix[i][j]:g} with {_DIRECTIONS[j]}"
             )
     unit = np.array([size or 1.0 for size in sizes])
     values, vectors = np.linalg.eigh(np.array(matrix) / np.outer(unit, unit))
     if values[0] < -_ROUNDING:
         direction = ", ".join(f"{v:.3g}" for v in vectors[:, 0] / unit / np.abs(vectors[:, 0] / unit).max())
         raise ValueError(
-            f"a {what} matrix must be positive semidefinite, or it would be a source of energy; "
-            f"along [{direction}] it is negative"
+            f"a {what} matrix must be positive semidefinite, or it would supply energy; along "
+            f"[{direction}] it is negative"
         )
 
 
@@ -162,7 +162,7 @@ class SpringDamper(Part):
         if self.stiffness == 0.0 and self.damping == 0.0:
             raise ValueError("a spring-damper needs a stiffness, a damping, or both; it has neither")
         if self.stiffness > 0.0 and self.free_length is None:
-            raise ValueError("a spring needs a free_length, at which it pulls and pushes nothing; none is given")
+            raise ValueError("a spring needs a free_length, its length without force; none is given")
         return self
 
 

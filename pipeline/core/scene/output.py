@@ -86,7 +86,7 @@ class Output(Part):
         for name, gauge in (self.gauges or {}).items():
             if gauge.body not in (self.stress or ()):
                 known = ", ".join(self.stress or ()) or "none"
-                raise ValueError(f"gauges.{name}: '{gauge.body}' is none of the bodies in `stress` ({known}); add it")
+                raise ValueError(f"gauges.{name}: '{gauge.body}' is not a body in `stress` ({known}); add it")
         return self
 
     def gauge_names(self, body: str) -> list[str]:
@@ -118,15 +118,15 @@ VARIABLES: dict[str, Schema] = {
     "stress": table("""
 section_force? | time section axis | N | N, Qy, Qz: force of the far part of the rod on the near one, axes of the
     section (x along the rod)
-section_moment? | time section axis | N m | T, My, Mz: its moment about the section's centre, likewise
+section_moment? | time section axis | N m | T, My, Mz: moment of the far part about the section's centre, section axes
 peak_axial_stress? | time section | Pa | axial stress of the section that is largest in size, tension positive
 peak_von_mises_stress? | time section | Pa | largest von Mises stress of the section
 von_mises_stress? | time gauge | Pa | von Mises stress of the gauge's node where it is largest
-first_principal_stress? | time gauge | Pa | largest principal stress there, tension positive
-second_principal_stress? | time gauge | Pa | middle principal stress there, tension positive
-third_principal_stress? | time gauge | Pa | smallest principal stress there, tension positive
+first_principal_stress? | time gauge | Pa | largest principal stress at the gauge's node, tension positive
+second_principal_stress? | time gauge | Pa | middle principal stress at the gauge's node, tension positive
+third_principal_stress? | time gauge | Pa | smallest principal stress at the gauge's node, tension positive
 stress_position? | time gauge axis | m | undeformed position of that node, body frame
-stress_tensor? | time gauge tensor | Pa | stress there, body axes
-stress_factor? | time stress_field | 1 | what the bundle's stress field is multiplied by, SI
+stress_tensor? | time gauge tensor | Pa | stress at the gauge's node, body axes
+stress_factor? | time stress_field | 1 | factor of the bundle's stress field, SI
 """),
 }

@@ -53,7 +53,7 @@ class BoxShape(Part):
     @model_validator(mode="after")
     def _extended(self) -> Self:
         if min(self.size) <= 0.0:
-            raise ValueError(f"the edges of a box are longer than zero, not {list(self.size)} m")
+            raise ValueError(f"the edges of a box must be longer than zero, not {list(self.size)} m")
         return self
 
 
@@ -316,7 +316,7 @@ class Stop(OnCoordinate):
         if self.normal.law == "kelvin-voigt" and mass and self.normal.effective_mass is None:
             raise ValueError(
                 "the mass that meets a stop depends on the pose, so a linear stop needs a damping, "
-                "or a restitution with the effective_mass [kg or kg m^2] that is to rebound with it"
+                "or a restitution with the effective_mass [kg or kg m^2] for that restitution"
             )
         return self
 

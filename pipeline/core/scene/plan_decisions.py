@@ -13,14 +13,14 @@ BOUND, RESPONSE, PILOT, NONE = "bound", "response", "pilot", "none"
 EVIDENCE = {
     BOUND: "a bound from the ideal motion",
     RESPONSE: "the first-order response along the ideal motion",
-    PILOT: "short runs with and without it",
+    PILOT: "screening runs",
     NONE: "not examined",
 }
 #: reason why an effect stays that no run has examined
-NOT_WORTH = "to leave it out would save no time worth the look"
+NOT_WORTH = "omitting it would save less time than examining it costs"
 
 #: reason why an effect stays that could be removed
-NO_CHEAPER = "without it the run is not cheaper"
+NO_CHEAPER = "omitting it makes the run no cheaper"
 
 
 @dataclass(frozen=True)

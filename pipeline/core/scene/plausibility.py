@@ -55,7 +55,7 @@ def _inertias(scene: Scene) -> Iterator[InputError]:
         extent = own or whole
         gyration = sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass)
         if extent > 0.0 and gyration > FAR * extent and least_density(body) < AIRY:
-            size = f"the body's frames lie within {own:.3g} m" if own else f"the whole scene is {whole:.3g} m large"
+            size = f"the body's frames span {own:.3g} m" if own else f"the whole scene spans {whole:.3g} m"
             text = f"mass and inertia give a radius of gyration of {gyration:.3g} m, but {size}"
             yield warning(scene, f"body.{name}.inertia", text, UNITS)
 
@@ -101,8 +101,8 @@ def _intervals(scene: Scene) -> Iterator[InputError]:
     duration = scene.time.end - scene.time.start
     if scene.output.interval > duration * (1.0 + 1e-9):
         text = (
-            f"{scene.output.interval:g} s is longer than the run of {duration:g} s: only its start, its end and events "
-            "are recorded"
+            f"{scene.output.interval:g} s exceeds the run's duration of {duration:g} s: only start, end and events are "
+            "recorded"
         )
         yield warning(scene, "output.interval", text, f'choose a shorter one, as "{1e3 * duration / 200:.1g} ms"')
 

@@ -91,7 +91,7 @@ def _kinds() -> dict[str, Kind]:
     known["orientation"] = known["orientation"]._replace(units=("rad", "rad"))
     known["peak_force"] = Kind("contact", "event_peak_force", ("N", "N m"), "", "largest normal force of the contact")
     known["t"] = Kind("", "time", ("s", "s"), "", "time of the run")
-    known["impact_times"] = Kind("contact", "event_time", ("s", "s"), "", "times of closings faster than 1e-4 m/s")
+    known["impact_times"] = Kind("contact", "event_time", ("s", "s"), "", "times of impacts faster than 1e-4 m/s")
     return dict(sorted(known.items(), key=lambda item: list(OWNERS).index(item[1].owner)))
 
 
@@ -199,7 +199,7 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     else:
         quantity = Quantity("", EXPRESSION, steps=tuple(read(plain, owners)))
         if not quantity.terms():
-            raise ValueError(f"'{text}' is a number, and no quantity")
+            raise ValueError(f"'{text}' is a number, not a quantity")
         _ = quantity.dim
     return quantity if quantity.name == text else replace(quantity, text=text)
 
@@ -211,7 +211,7 @@ def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     """
     sides = re.split("([<>])", text)
     if len(sides) != 3:
-        raise ValueError(f"'{text}' is no comparison: write one < or >, as in 'force(A1) > 200 N'")
+        raise ValueError(f"'{text}' is not a comparison: write one < or >, as in 'force(A1) > 200 N'")
     left, right = (_magnitude(side, owners) for side in sides[::2])
     measure([*left, *right, "max"])
     larger, smaller = (left, right) if sides[1] == ">" else (right, left)
@@ -308,9 +308,9 @@ CONTACT_REDUCTIONS = {
     "peak_force": {"largest": "largest normal force of the contact"},
     "impulse": {"final": "impulse of the normal force over the run"},
     "impact_times": {
-        "count": "impacts with an approach above 1e-4 m/s",
-        "first": "time of the first of them",
-        "last": "time of the last of them",
+        "count": "number of impacts faster than 1e-4 m/s",
+        "first": "time of the first such impact",
+        "last": "time of the last such impact",
     },
 }
 _REDUCTIONS = (*SERIES, "count", "first", "last")
@@ -370,11 +370,11 @@ def parse_recorded(text: str, owners: Mapping[str, Collection[str]]) -> Recorded
     quantity = parse(head if last in _REDUCTIONS else text, owners)
     known = list(reductions(quantity))
     if quantity.steps and not head.endswith(")"):
-        raise ValueError(f"what of '{text}' is kept? write ({text if last not in _REDUCTIONS else head}).largest")
+        raise ValueError(f"'{text}' has no reduction; write ({text if last not in _REDUCTIONS else head}).largest")
     if last in known:
         return Recorded(quantity, last)
     if last in _REDUCTIONS:
         raise ValueError(f"'{quantity.name}' has no '{last}' ({suggestion(last, known)})")
     if len(known) > 1:
-        raise ValueError(f"what of '{text}' is kept? write {' or '.join(f'{text}.{name}' for name in known)}")
+        raise ValueError(f"'{text}' has no reduction; write {' or '.join(f'{text}.{name}' for name in known)}")
     return Recorded(quantity, known[0])

@@ -27,9 +27,9 @@ ELSEWHERE = (
     (("ball", "ball-joint"), "spherical", ""),
     (("weld", "rigid-joint"), "fixed", ""),
     (("cardan", "hooke"), "universal", ""),
-    (("spring", "damper"), "spring-damper", "it is between two points, 'joint-spring' along a joint"),
+    (("spring", "damper"), "spring-damper", "it acts between two points; 'joint-spring' acts along a joint"),
     (("force", "torque"), "law", "a drive prescribes a motion; a force along a joint is a load of type 'joint-force'"),
-    (("motor", "torque"), "joint-force", "it is along a joint; what prescribes a motion is a drive"),
+    (("motor", "torque"), "joint-force", "it acts along a joint; a drive prescribes a motion"),
     (
         ("constant-speed", "constant-velocity", "speed", "velocity", "ramp", "linear"),
         "polynomial",
@@ -38,7 +38,7 @@ ELSEWHERE = (
     (("sine", "sin", "cosine", "sinusoidal"), "harmonic", ""),
     (("mu", "coefficient"), "dynamic", ""),
     (("frames",), "mesh", "frames of a flexible body are in its recipe"),
-    (("mass", "inertia", "com", "density"), "mesh", "of a flexible body they follow from its recipe"),
+    (("mass", "inertia", "com", "density"), "mesh", "those of a flexible body follow from its recipe"),
 )
 
 

@@ -17,20 +17,20 @@ frame_position | time frame axis | m | origin of the named frame, world axes
 joint_force | time joint axis | N | force on the joint's second body at its frame's origin, world axes
 joint_moment | time joint axis | N m | moment on the joint's second body at its frame's origin, world axes
 joint_bearing_load? | time rubbing | N | normal force in the bearings of a joint with friction
-joint_sliding_speed? | time rubbing | m s-1 | sliding speed there, the largest
+joint_sliding_speed? | time rubbing | m s-1 | largest sliding speed in the joint
 joint_friction_power? | time rubbing | W | power of the joint's friction, <= 0
 joint_friction_loss? | time rubbing | J | energy lost to the friction of the joint since the start
 joint_friction_force? | time rubbing axis | N | friction's part of joint_force, world axes
 joint_friction_moment? | time rubbing axis | N m | friction's part of joint_moment, world axes
 modal_coordinate? | time mode | m | modal coordinate, for a modal mass of 1 kg
 modal_velocity? | time mode | m s-1 | rate of the modal coordinate
-drive_force? | time drive | N, N m | what the drive supplies along its coordinate
+drive_force? | time drive | N, N m | force or torque of the drive along its coordinate
 drive_position? | time drive | m, rad | prescribed coordinate
 joint_position? | time coordinate | m, rad | joint coordinate of the second frame against the first
 joint_velocity? | time coordinate | m s-1, rad s-1 | rate of the joint coordinate
 joint_acceleration? | time coordinate | m s-2, rad s-2 | second rate of the joint coordinate
 load_force? | time load axis | N | force of the load on its frame, or its second one, world axes
-load_moment? | time load axis | N m | moment of the load there, about that frame's origin, world axes
+load_moment? | time load axis | N m | moment of the load on the frame, about the frame's origin, world axes
 load_length? | time load | m, rad | length of a spring, or joint coordinate that a load acts along
 bushing_displacement? | time bushing axis | m | second frame's origin in the first one's axes
 bushing_rotation? | time bushing axis | rad | rotation vector from the first frame to the second
@@ -83,7 +83,7 @@ event_approach_speed? | event | m s-1, rad s-1 | rate of penetration at a closin
 event_peak_force? | event | N, N m | largest normal force of the contact that this closing begins
 event_peak_penetration? | event | m, rad | largest penetration of that contact
 event_duration? | event | s | duration of that contact
-event_energy_loss? | event | J | energy that a scene's event takes from the mechanism, also what released parts had
-    stored
+event_energy_loss? | event | J | energy that the event removes from the mechanism, including that
+    stored in released parts
 event_impulse? | event | N s, N m s | impulse along the coordinate that a scene's event holds or drives
 """) | {name: variable for requested in VARIABLES.values() for name, variable in requested.items()}

@@ -151,7 +151,7 @@ class View(Part):
     def _points(self) -> Self:
         for direction in (self.direction, self.up):
             if direction is not None and not any(direction):
-                raise ValueError("a direction must not have the length zero")
+                raise ValueError("a direction must not have length zero")
         return self
 
 
@@ -229,7 +229,7 @@ class Scene(Part):
             samples = (self.time.end - self.time.start) / load.period
             if samples > MOST_SAMPLES:
                 raise ValueError(
-                    f"load.{name}.period = {load.period:g} s asks for {samples:.3g} samples, more than "
+                    f"load.{name}.period = {load.period:g} s requires {samples:.3g} samples, more than "
                     f"{MOST_SAMPLES:g}: choose a longer one, or a continuous 'pid'"
                 )
 
@@ -242,7 +242,7 @@ class Scene(Part):
                 one = parse(name, known)
                 written = self.accuracy.quantities[name].unit if self.accuracy and where == "accuracy." else None
                 if written is not None and measured(written) != measured(one.unit):
-                    raise ValueError(f"its accuracy is given in {written}, but the quantity is in {one.unit}")
+                    raise ValueError(f"the accuracy is in {written}, but the quantity is in {one.unit}")
             except ValueError as error:
                 raise ValueError(f"{where}{name}: {error}") from None
 
@@ -250,7 +250,7 @@ class Scene(Part):
         for name in self.output.stress or ():
             if name not in self.flexible():
                 known = ", ".join(self.flexible()) or "none"
-                raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
+                raise ValueError(f"output.stress: '{name}' is not a flexible body of this scene; known: {known}")
 
     def _bodies_have_files_of_their_own(self) -> None:
         """Raise ValueError for a body whose name, also that of files, some operating system does not distinguish."""
@@ -258,13 +258,13 @@ class Scene(Part):
         for name in self.recipes():
             if file_names.is_device(name):
                 raise ValueError(
-                    f"body.{name}: '{name}' is a device on Windows, and files are called by this name: give it another"
+                    f"body.{name}: '{name}' is a device on Windows, but files get this name: choose another"
                 )
             other = names.setdefault(file_names.folded(name), name)
             if other != name:
                 raise ValueError(
-                    f"body.{name}: is called as '{other}' but for capitals or accents, which names of files on Windows "
-                    "and macOS do not distinguish: give it another"
+                    f"body.{name}: differs from '{other}' in capitals or accents only, which file names on Windows and "
+                    f"macOS do not distinguish: choose another"
                 )
 
     @model_validator(mode="before")

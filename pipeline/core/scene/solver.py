@@ -49,7 +49,7 @@ class Solver(Part):
             raise ValueError(f"no integrator is called '{name}'; {suggestion(name, INTEGRATORS)}")
         for key, (owner, _) in OWN.items():
             if table.get(key) is not None and owner != name:
-                raise ValueError(f"{key} belongs to {owner}, {name} does not have it: remove it")
+                raise ValueError(f"{key} is a setting of {owner}, not of {name}: remove it")
         own = {key: default for key, (owner, default) in OWN.items() if owner == name and table.get(key) is None}
         return dict(table) | own
 
@@ -62,7 +62,7 @@ class Solver(Part):
     @model_validator(mode="after")
     def _has_what_chooses_steps(self) -> Self:
         if self.step is None and not INTEGRATORS[self.integrator].estimates:
-            raise ValueError(f'{self.integrator} has no error estimate to choose steps by: give step, e.g. "1e-5 s"')
+            raise ValueError(f'{self.integrator} has no error estimate to choose steps: give step, e.g. "1e-5 s"')
         return self
 
 

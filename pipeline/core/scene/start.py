@@ -28,9 +28,9 @@ class JointStart(Part):
     @model_validator(mode="after")
     def _something(self) -> Self:
         if not given(self, KEYS):
-            raise ValueError(f"one of {', '.join(KEYS)} says how the coordinate starts; here none does")
+            raise ValueError(f"one of {', '.join(KEYS)} must give the start of the coordinate; none is given")
         if self.position is not None and self.near is not None:
-            raise ValueError("position says where the coordinate starts, near only about where; give one of them")
+            raise ValueError("position is the exact start of the coordinate, near an approximate one; give one of them")
         return self
 
 
@@ -90,7 +90,6 @@ class Start(Part):
         given = [name for name, modal in self.modal.items() if modal.coordinate]
         if self.at is not None and given:
             raise ValueError(
-                f"at = '{self.at}' says how bodies are deformed, and so does modal.{given[0]}.coordinate: "
-                "give one of them"
+                f"at = '{self.at}' and modal.{given[0]}.coordinate both determine the deformation: give one of them"
             )
         return self

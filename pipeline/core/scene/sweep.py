@@ -58,7 +58,7 @@ class Parameter(Part):
         named = [key for key, value in {**given, "deviation": self.deviation}.items() if value is not None]
         if tuple(named) not in WAYS:
             ways = ", or ".join(" and ".join(way) for way in WAYS)
-            raise ValueError(f"its values are given by {ways}; here by {' and '.join(named) or 'nothing'}")
+            raise ValueError(f"its values are given by {ways}, not by {' and '.join(named) or 'nothing'}")
         if self.count is not None and self.first is None:
             raise ValueError("count belongs to a range, from .. to")
         if self.first is not None:
@@ -70,7 +70,7 @@ class Parameter(Part):
     def _check_range(self) -> None:
         a, b = self.numbers("first", "last")
         if a == b:
-            raise ValueError(f"from and to are both {self.first!r}: a range needs two different ends")
+            raise ValueError(f"from and to are both {self.first!r}, but the ends of a range must differ")
         if self.spacing == "log" and not a * b > 0.0:
             raise ValueError(f"a logarithmic range needs ends of one sign, not {self.first!r} and {self.last!r}")
 
@@ -85,7 +85,7 @@ class Parameter(Part):
         units = {number_and_unit(getattr(self, name))[1] for name in fields}
         if len(units) > 1:
             one, other = (getattr(self, name) for name in fields)
-            raise ValueError(f"{one!r} and {other!r} are not of one unit")
+            raise ValueError(f"{one!r} and {other!r} differ in unit")
         return units.pop()
 
     @model_validator(mode="after")
@@ -155,18 +155,18 @@ class Sweep(Part):
             if parameter.mean is not None:
                 raise ValueError(f"vary.{name}: a normal distribution needs a [sample]")
             if parameter.first is not None and parameter.count is None:
-                raise ValueError(f"vary.{name}: a range needs its count where there is no [sample]")
+                raise ValueError(f"vary.{name}: a range without [sample] needs a count")
         lengths = {name: self.length(name) for name in self.vary}
         if self.combine == "list" and len(set(lengths.values())) > 1:
             text = ", ".join(f"{name} {n}" for name, n in lengths.items())
-            raise ValueError(
-                f"combine: parameters that go together must have as many values as each other; here {text}"
-            )
+            raise ValueError(f"combine: parameters of one list must have equally many values, not {text}")
         points = 1
         for n in lengths.values() if self.combine == "grid" else list(lengths.values())[:1]:
             points *= n
         if points > MOST_POINTS:
-            raise ValueError(f"vary: these are {points} points, more than {MOST_POINTS}; make several sweeps of them")
+            raise ValueError(
+                f"vary: the sweep has {points} points, more than {MOST_POINTS}; split it into several sweeps"
+            )
         return self
 
     @model_validator(mode="after")
@@ -176,7 +176,7 @@ class Sweep(Part):
             if name in RESERVED or name.startswith(self.keep):
                 raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
             if not name.strip() or "/" in name or not name.isprintable():
-                raise ValueError(f"vary.{name}: is no name of a dimension; choose one without slashes")
+                raise ValueError(f"vary.{name}: cannot name a dimension; choose a name without slashes")
             for where in self.places(name):
                 if where in varied_by:
                     raise ValueError(f"vary.{name}: '{where}' is varied by '{varied_by[where]}' already")
@@ -185,9 +185,9 @@ class Sweep(Part):
 
     def _check_sample(self) -> None:
         if self.combine == "list":
-            raise ValueError('combine: a [sample] makes its own points; leave combine = "list" out')
+            raise ValueError('combine: a [sample] chooses its own points; remove combine = "list"')
         if self.sample is not None and self.sample.points * len(self.vary) > MOST_VALUES:
-            raise ValueError(f"sample.points: all points together have more than {MOST_VALUES} values; ask for fewer")
+            raise ValueError(f"sample.points: all points together have more than {MOST_VALUES} values; request fewer")
         for name, parameter in self.vary.items():
             if parameter.values is not None or parameter.count is not None:
                 raise ValueError(f"vary.{name}: in a [sample] write from and to without count, or mean and deviation")

@@ -156,7 +156,7 @@ def measured(text: str) -> Exponents:
     """Return the exponents of kg, m, s and rad of a product of known units, or of "1"; raise ValueError for others."""
     product = (1.0, _EXPONENTS["number"]) if text == "1" else _product(_plain(text))
     if product is None:
-        raise ValueError(f"'{text}' is no unit")
+        raise ValueError(f"'{text}' is not a unit")
     return product[1]
 
 
@@ -220,7 +220,7 @@ def components(values: Iterable[object], dimension: str) -> list[float]:
 def _computable(number: float, written: object) -> float:
     if number != 0.0 and not 1.0 / LARGEST_NUMBER <= abs(number) <= LARGEST_NUMBER:
         bounds = f"{1.0 / LARGEST_NUMBER:g} to {LARGEST_NUMBER:g}"
-        raise ValueError(f"{written!r} is beyond what can be computed with: {bounds} in SI units")
+        raise ValueError(f"{written!r} is outside of the supported range, {bounds} in SI units")
     return number
 
 
@@ -239,8 +239,8 @@ def _read(value: object, dimension: str) -> float:
         number, written = float(match[1]), match[2]
         factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension, value)
         if factor_and_dimension != dimension:
-            rule = f"{a(dimension)} belongs here, in {_known(dimension)}"
-            rule = "a number without a unit belongs here" if dimension == "number" else rule
+            rule = f"{a(dimension)} is expected, in {_known(dimension)}"
+            rule = "a number without a unit is expected" if dimension == "number" else rule
             raise ValueError(f"'{value}' is {a(factor_and_dimension)}, but {rule}")
         result = number * factor
     else:
@@ -278,9 +278,9 @@ def unknown(written: str, value: str = "") -> str:
     """Return the message about a text that is no unit; value: the quantity that contains the text."""
     fraction = _FRACTION.fullmatch(value.strip())
     if fraction is not None and float(fraction[2]):
-        return f"'{value}' is a fraction; a value is one number: write {float(fraction[1]) / float(fraction[2]):.12g}"
+        return f"'{value}' is a fraction; write one number: {float(fraction[1]) / float(fraction[2]):.12g}"
     near = get_close_matches(written, list(UNITS), n=1)
-    hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(COMMON)} and products of such units"
+    hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(COMMON)} and products of these"
     return f"unknown unit '{written}'; {hint}"
 
 

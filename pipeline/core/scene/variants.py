@@ -92,7 +92,7 @@ def named(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
     known = {effect.name: effect for effect in effects(scene)}
     for name in names:
         if name not in known:
-            raise InputError(f"{where} {name}", "is no effect of this scene", suggestion(name, known))
+            raise InputError(f"{where} {name}", "is not an effect of this scene", suggestion(name, known))
     return tuple(known[name] for name in names)
 
 
@@ -117,7 +117,7 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
     if not gone:
         raise InputError(
             str(scene.path or scene.name),
-            f"has no {' and no '.join(effects_gone)} that could be taken away",
+            f"has no {' and no '.join(effects_gone)} that can be removed",
             "compare it with another scene: flexclear compare A B",
         )
     result = without(scene, gone)

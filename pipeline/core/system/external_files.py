@@ -47,11 +47,11 @@ def require_file(path: Path, where: str) -> None:
     try:
         exists, ordinary = path.exists(), path.is_file()
     except (OSError, ValueError) as error:
-        raise InputError(where, f"'{path}' can be no file: {error}") from None
+        raise InputError(where, f"'{path}' cannot be a file: {error}") from None
     if not exists:
         raise InputError(where, f"there is no file {path}", "paths are relative to the file that names them")
     if not ordinary:
-        raise InputError(where, f"'{path}' is no ordinary file")
+        raise InputError(where, f"'{path}' is not an ordinary file")
 
 
 @contextlib.contextmanager
@@ -67,7 +67,7 @@ def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> 
     except ImportError as error:  # a library that only few formats need, such as h5py
         raise InputError(where, f"{problem}: {error}", HDF5 if error.name == "h5py" else remedy) from None
     except MemoryError:
-        raise ResourceError(f"{where}: '{path.name}' takes more memory than there is, or is damaged") from None
+        raise ResourceError(f"{where}: '{path.name}' is damaged, or needs more memory than available") from None
     except Exception as error:
         raise InputError(where, f"{problem}: {shown(str(error) or type(error).__name__)}", remedy) from None
 
@@ -92,14 +92,14 @@ def _require_mesh(path: Path, where: str, largest: int | None) -> None:
     require_file(path, where)
     size = path.stat().st_size
     if largest is not None and size > largest:
-        raise InputError(where, f"'{path.name}' is larger than {machine.size(largest)}", "write it coarser")
+        raise InputError(where, f"'{path.name}' is larger than {machine.size(largest)}", "export it coarser")
     machine.require_memory(COPIES * size, f"{where}: '{path.name}'", "use a coarser mesh")
     if path.suffix == ".vtk":
         with path.open("rb") as file:
             match = _GRID.search(file.read(HEADER))
         count = prod(int(number) for number in match[1].split()) if match is not None else 0
         if count > MOST_POINTS:
-            raise InputError(where, f"'{path.name}' promises a grid of {count:.3g} points, more than {MOST_POINTS}")
+            raise InputError(where, f"'{path.name}' declares a grid of {count:.3g} points, more than {MOST_POINTS}")
 
 
 def _require_whole(path: Path, where: str) -> None:
@@ -193,7 +193,7 @@ def companions(path: Path) -> Iterator[Path]:
                 circle = includes and os.path.realpath(other) in within
                 if circle or len(waiting) > MOST_INCLUDES:
                     problem = "in a circle" if circle else f"after {MOST_INCLUDES} others, and more are not read"
-                    raise InputError(str(path), f"includes '{other}' {problem}", "leave that include out")
+                    raise InputError(str(path), f"includes '{other}' {problem}", "remove that include")
                 yield other
                 if includes:
                     waiting.append((other, within))
@@ -217,7 +217,7 @@ def _named_by(path: Path) -> Iterator[Path]:
         yield path.with_suffix(".node" if path.suffix == ".ele" else ".ele")
     elif suffix == ".xml":
         if PATTERN & set(path.stem):
-            problem = f"its name has one of {' '.join(sorted(PATTERN))}, which its reader takes for a pattern"
+            problem = f"its name has one of {' '.join(sorted(PATTERN))}, which its reader interprets as a pattern"
             raise InputError(str(path), problem, "rename it")
         part = re.compile(f"{path.stem}_([^.]+)\\.xml")
         yield from sorted(file for file in path.resolve().parent.iterdir() if part.match(file.name))

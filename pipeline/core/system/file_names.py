@@ -27,5 +27,5 @@ def unfit(name: str) -> str:
     if is_device(name):
         return f"'{name}' is a device on Windows"
     if wrong := sorted(set(name) & set(FORBIDDEN)):
-        return f"'{name}' contains {' '.join(wrong)}, which names on Windows cannot have"
-    return f"'{name}' ends with a dot or a space, as names on Windows cannot" if name.endswith((".", " ")) else ""
+        return f"'{name}' contains {' '.join(wrong)}, which file names on Windows cannot contain"
+    return f"'{name}' ends with a dot or a space, which Windows does not allow" if name.endswith((".", " ")) else ""

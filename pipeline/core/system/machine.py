@@ -31,7 +31,7 @@ def require_memory(need: float, what: str, remedy: str, limit: float | None = No
     """Raise ResourceError when `what` needs more memory than `limit` [bytes]; default: a fraction of what is left."""
     allowed = ALLOWED_FRACTION * memory() if limit is None else limit
     if need > allowed:
-        raise ResourceError(f"{what} takes about {size(need)} of memory, and {size(allowed)} are allowed; {remedy}")
+        raise ResourceError(f"{what} takes about {size(need)} of memory, more than {size(allowed)}; {remedy}")
 
 
 def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float | None = None) -> None:
@@ -39,7 +39,7 @@ def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float
     allowed = ALLOWED_FRACTION * disk(folder) if limit is None else limit
     if need > allowed:
         raise ResourceError(
-            f"{what} takes about {size(need)} of the disk of {folder}, and {size(allowed)} are allowed; {remedy}"
+            f"{what} takes about {size(need)} of disk space in {folder}, more than {size(allowed)}; {remedy}"
         )
 
 

@@ -45,7 +45,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
     """
     known = _facts(task, inputs, sources)
     name = key(known)
-    with store.lock(task.stage, name, lambda: progress(None, "waiting for another process that makes the same")):
+    with store.lock(task.stage, name, lambda: progress(None, "waiting for another process with the same task")):
         record = _stored(task, inputs, Store(store.root), sources)  # silent store: `find` has reported faults already
         if record is None:
             module, _, function = task.run.partition(":")
@@ -84,7 +84,7 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
     now = _facts(task, fresh, sources, names)
     if last is None and stale:
         return State(task, None, ("never run",))
-    above = [f"its input {name} would be made again" for name in sorted(stale)]
+    above = [f"its input {name} would be computed again" for name in sorted(stale)]
     if not stale:
         record = _stored(task, fresh, store, sources)
         if record is not None:
@@ -95,7 +95,7 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
         why = [store.fault(last) or "its record in the cache is missing"]
     failure = store.why_outdated(task.folder, task.label)
     if failure is not None:
-        why.append(f"what is shown is of an earlier state: {failure.splitlines()[0]}")
+        why.append(f"the shown results are outdated: {failure.splitlines()[0]}")
     return State(task, None, tuple(why))
 
 

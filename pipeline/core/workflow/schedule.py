@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
 
 #: note next to shown results until they are up to date
-UNFINISHED = "making it again was begun and not finished"
+UNFINISHED = "an update was started and not finished"
 #: interval at which the progress of workers is examined [s]
 TICK = 0.2
 #: time for workers to stop [s]: enough for a step of 20 000 evaluations and for writing the partial results
@@ -184,7 +184,7 @@ def _leave_waiting(plan: _Plan, why: str) -> None:
     """Abandon all unfinished tasks when the command must stop, and report this once."""
     if plan.waiting:
         code = StoppedError(why, interrupted=why == stopping.INTERRUPTED).exit_code
-        rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks are left undone: {why}")
+        rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks were not run: {why}")
         plan.failed |= {task: rest for task in plan.waiting}
         plan.waiting.clear()
 
@@ -294,7 +294,7 @@ def attempt(
     except MemoryError:
         code, text = ResourceError.exit_code, "the memory is full"
     except Exception:
-        code, text = 1, f"unexpected error, please report it\n{traceback.format_exc()}"
+        code, text = 1, f"unexpected error; please report it\n{traceback.format_exc()}"
     return Failure(task, code, f"{task.scene} {task.label}: {text}")
 
 
@@ -302,9 +302,9 @@ def _stopped_message(task: Task, stopped: StoppedError, store: Store) -> str:
     """Return the message about a stopped task, and write its partial result, if any, next to the shown files."""
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
     if time is None:  # the partial result is of a piece of the work, such as an ensemble member, and no dataset
-        return f"{stopped}; run it again, and what is finished of it is not computed again"
+        return f"{stopped}; run it again: finished parts are not computed again"
     path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
     partial = (
-        f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)" if path is not None else ""
+        f"; the partial result up to t = {time:.6g} s is in {path} (attribute complete = 0)" if path is not None else ""
     )
     return f"{stopped}; run it again{partial}"

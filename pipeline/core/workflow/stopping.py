@@ -99,7 +99,7 @@ def gently(say: Callable[[str], None]) -> Iterator[None]:
         if not heeds() or _why:
             raise KeyboardInterrupt
         request(INTERRUPTED)
-        say("stopping in good order; Ctrl-C again ends at once")
+        say("stopping after storing finished results; press Ctrl-C again to stop at once")
 
     ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     before = None if ignored else signal.signal(signal.SIGINT, handle)

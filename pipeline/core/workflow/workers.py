@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 #: message about a worker process that was killed
-LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
+LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to continue"
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ def writable(root: Path, report: Callable[[str], None]) -> Path:
     except OSError as error:
         problem = error.strerror or str(error)
     if problem:
-        report(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
+        report(f"compiled kernels cannot be stored in {folder} ({problem}); every process will compile its own")
         return Path(_temporary().name)
     refuse_shared(folder)
     return folder
@@ -46,7 +46,7 @@ def refuse_shared(folder: Path) -> None:
         if others_can_write(part, inside=part == folder):
             raise InputError(
                 str(folder),
-                f"compiled kernels are not loaded from there, since others can write to {part}",
+                f"compiled kernels are not loaded from this folder, since others can write to {part}",
                 f"chmod go-w {part}, or name another folder with FLEXCLEAR_KERNELS",
             )
 

@@ -59,7 +59,7 @@ class Composition:
     def take(self, module: str, name: str) -> str:
         """Import a name and return it."""
         others = {known for package, known in self.imports if package != module}
-        assert name not in others, f"two parts of one mechanism are called {name}"
+        assert name not in others, f"two parts of one mechanism have the name {name}"
         self.imports.append((module, name))
         return name
 

@@ -25,7 +25,7 @@ def published(stiffness: Mapping[float, Callable[[Any], float]]) -> Callable[[Cl
             return stiffness[exponent](joint)
         known = f"exponent{'s' if len(stiffness) > 1 else ''} {' and '.join(f'{one:g}' for one in stiffness)}"
         raise ValueError(
-            f"radii and materials give the stiffness of the {known}, not of {exponent:g}; "
+            f"radii and materials determine the stiffness for {known}, not for {exponent:g}; "
             f"give normal.stiffness [N/m^{exponent:g}]"
         )
 

@@ -73,7 +73,7 @@ class Hysteresis:
     def _factor(self, parameter: float) -> float:
         a = self._at(parameter)
         if not isfinite(a):
-            raise ValueError(f"the law '{self.name}' has no finite damping for a restitution of 0; ask for 0.01 or so")
+            raise ValueError(f"the law '{self.name}' has no finite damping for a restitution of 0; request 0.01 or so")
         return a
 
     def _at(self, parameter: float) -> float:
@@ -90,8 +90,8 @@ class Hysteresis:
         if self.factor(least) < a:
             lowest = closed_form.delivered(self.factor(least))
             raise ValueError(
-                f"the law '{self.name}' delivers no restitution below {lowest:.4g}; ask for more, or choose "
-                "'gonthier', 'hu-guo' or 'flores', which cover the whole range"
+                f"the law '{self.name}' delivers no restitution below {lowest:.4g}; request more, or choose "
+                "'gonthier', 'hu-guo' or 'flores', which cover all restitutions"
             )
         return closed_form.root(lambda c: self.factor(c) - a, least, 1.0)
 
@@ -100,8 +100,8 @@ class Hysteresis:
             return None
         low, high = self.valid
         return (
-            f"'{self.name}' asked for a restitution of {law.restitution:g} delivers {delivered:.4g} "
-            f"(meant for {low:g} to {high:g}); delivered_restitution = {law.restitution:g} asks for the rebound itself"
+            f"'{self.name}' with restitution = {law.restitution:g} delivers {delivered:.4g} "
+            f"(meant for {low:g} to {high:g}); delivered_restitution = {law.restitution:g} gives the rebound itself"
         )
 
 

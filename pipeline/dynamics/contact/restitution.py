@@ -38,7 +38,7 @@ def delivered(a: float) -> float:
 def factor(e: float) -> float:
     """Return the factor a that delivers the restitution 0 < e <= 1; raise ValueError for 0, which none delivers."""
     if e <= 0.0:
-        raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
+        raise ValueError("no finite damping delivers a restitution of 0; request a small one, such as 0.01")
     if 1.0 - e < SLIGHT_DAMPING:
         return 1.5 * (1.0 - e)
 
@@ -85,6 +85,6 @@ def linear_delivered(zeta: float) -> float:
 def damping_ratio(e: float) -> float:
     """Return zeta with linear_delivered(zeta) = e, 0 < e <= 1; raise ValueError for 0."""
     if e <= 0.0:
-        raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
+        raise ValueError("no finite damping delivers a restitution of 0; request a small one, such as 0.01")
     # beyond zeta = 1 the restitution falls below (2 zeta)^-2, so that this bracket suffices
     return root(lambda z: linear_delivered(z) - e, 0.0, 2.0 + e**-0.5)

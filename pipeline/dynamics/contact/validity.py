@@ -32,14 +32,14 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
     size = surfaces.contact_size(joint, depth, force)
     if joint.normal.stiffness is None and size > SMALL_CONTACT * joint.radius:
         found.append(
-            f"{name}: the contact grows to a radius of {size:.3g} m, {size / joint.radius:.2g} of the inner "
-            f"surface's; its stiffness from radii and materials (Hertz) holds below {SMALL_CONTACT:g}"
+            f"{name}: the contact radius reaches {size:.3g} m, {size / joint.radius:.2g} of the inner "
+            f"surface's radius; the stiffness from radii and materials (Hertz) holds below {SMALL_CONTACT:g}"
         )
     if depth > SHALLOW * joint.radius:
         found.append(
-            f"{name}: the surfaces are up to {depth:.3g} m deep in each other, {depth / joint.radius:.2g} of the "
-            f"inner surface's radius; contact laws hold below {SHALLOW:g}: a stiffer contact, a slower impact or "
-            "smaller loads keep it there"
+            f"{name}: the penetration reaches {depth:.3g} m, {depth / joint.radius:.2g} of the "
+            f"inner surface's radius; contact laws hold below {SHALLOW:g}: "
+            "choose a stiffer contact, a slower impact or smaller loads"
         )
     return found
 
@@ -72,8 +72,9 @@ def pressed_through(name: str, joint: Any, depth: float) -> str:
     if not depth > joint.radius > 0.0:
         return ""
     return (
-        f"{name}: the surfaces went {depth:.3g} m deep into each other, more than the inner surface's radius "
-        f"({joint.radius:.3g} m), so that its centre left through the outer surface; there is no contact law for that"
+        f"{name}: the penetration reached {depth:.3g} m, more than the inner surface's radius "
+        f"({joint.radius:.3g} m), so that the inner surface's centre passed the "
+        "outer surface, where no contact law holds"
     )
 
 

@@ -49,7 +49,7 @@ def pieces(law: Expression, dimension: str) -> Pieces:
         check_unit(steps, dimension)
         bent = any(step in (*BENT, *JUMPING) for step in steps if isinstance(step, str))
         if bent and law.end is None:
-            raise ValueError("max, min, abs, sign and step need an `end`, up to which their kinks are searched for")
+            raise ValueError("max, min, abs, sign and step need an `end`, up to which their kinks are located")
         span = (law.start, law.end) if bent and law.end is not None else (-math.inf, math.inf)
         course = fold(
             steps,
@@ -106,7 +106,7 @@ def _roots(piece: Piece, start: float, end: float) -> list[float]:
     fastest = max((abs(w) for _, w, _ in piece.terms), default=0.0)
     count = FEWEST_SAMPLES + PER_PERIOD * fastest * (end - start) / (2.0 * math.pi)
     if count > MOST_SAMPLES:
-        raise ValueError(f"it has {count / PER_PERIOD:.3g} periods up to its end, too many to search for kinks in")
+        raise ValueError(f"it has {count / PER_PERIOD:.3g} periods up to its end, too many to locate kinks")
     grid = np.linspace(start, end, int(count))
     values = np.array([piece.value(float(t)) for t in grid])
     crossed = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0.0)
@@ -121,7 +121,7 @@ def _roots(piece: Piece, start: float, end: float) -> list[float]:
 def _number(a: Piece, what: str) -> float:
     """Return the value of a constant; raise ValueError for a piece that varies."""
     if a.terms or any(a.coefficients[1:]):
-        raise ValueError(f"{what} does not lead to polynomials and sines: use a law of type 'spline' or 'table'")
+        raise ValueError(f"{what} cannot be written in polynomials and sines: use a law of type 'spline' or 'table'")
     return a.coefficients[0]
 
 
@@ -172,7 +172,7 @@ def _function(name: str, a: Piece) -> Piece:
     if name not in ("sin", "cos"):
         return Piece(0.0, (float(PLAIN.get(name, abs)(_number(a, f"{name}(...) of the time"))),))
     if a.terms or any(a.coefficients[2:]):
-        raise ValueError(f"{name}(...) takes an angle that grows steadily, as {name}(w * t)")
+        raise ValueError(f"{name}(...) takes an angle linear in t, as {name}(w * t)")
     phase, rate = (*a.coefficients, 0.0)[:2]
     return _sine(1.0, rate, phase + (0.5 * math.pi if name == "cos" else 0.0))
 

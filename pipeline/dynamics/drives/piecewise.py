@@ -16,7 +16,7 @@ def pieces(law: Piecewise, dimension: str) -> Pieces:
     for k, (section, end) in enumerate(zip(law.sections, ends, strict=True)):
         inner, start = pieces_of(section.law, dimension), section.start
         if (k and inner.span[0] > start) or (end < inf and inner.span[1] < end):
-            raise ValueError(f"the law from {start} s on is known between {inner.span[0]} and {inner.span[1]} s only")
+            raise ValueError(f"the law from {start} s on is defined between {inner.span[0]} and {inner.span[1]} s only")
         low, high = (inner.span[0] if k == 0 else low), (inner.span[1] if end == inf else high)
         collected.append(inner.at(start).moved(start))
         collected += [p for p in inner.pieces[1:] if start < p.start < end]

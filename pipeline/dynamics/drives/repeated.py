@@ -17,7 +17,7 @@ def pieces(law: Repeated, dimension: str) -> Pieces:
     # a table's last time may fall short of the period by rounding
     if inner.span[0] > start + 1e-9 * law.period or inner.span[1] < end - 1e-9 * law.period:
         raise ValueError(
-            f"the repeated law is known between {inner.span[0]} and {inner.span[1]} s only, not over its period from "
+            f"the repeated law is defined between {inner.span[0]} and {inner.span[1]} s only, not over its period from "
             f"{start} to {end} s"
         )
     before = [p for p in inner.pieces if p.start < start]

@@ -24,7 +24,7 @@ def pieces(law: Spline, dimension: str) -> Pieces:
 def through(time: Sequence[float], value: Sequence[float], degree: int, ends: Ends) -> Pieces:
     """Return the spline through the points; raise ValueError when periodic ends differ in value."""
     if ends == "periodic" and value[0] != value[-1]:
-        raise ValueError("a periodic spline must end with the value that it starts with")
+        raise ValueError("a periodic spline must end with its first value")
     t, x = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
     if degree == 3:
         drawn = CubicSpline(t, x, bc_type=ends)

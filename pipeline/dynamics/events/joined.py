@@ -127,7 +127,7 @@ def _events(phases: Sequence[Phase]) -> list[tuple[Happened, float]]:
 
 def _sentence(one: Happened, loss: float) -> str:
     impulse = "" if np.isnan(one.impulse) else f", impulse {one.impulse:.6g} {'N m s' if one.turns else 'N s'}"
-    return f"{one.name}: {one.kind} at t = {one.time:.9g} s, {loss:.6g} J taken{impulse}"
+    return f"{one.name}: {one.kind} at t = {one.time:.9g} s, {loss:.6g} J of energy lost{impulse}"
 
 
 def _names(parts: Sequence[LabelledArrays], dim: str) -> list[Any]:

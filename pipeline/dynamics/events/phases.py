@@ -72,7 +72,7 @@ def simulated(
         progress(None, f"at t = {phase.end:.6g} s: {event} ({happened.kind})")
     notes = [f"event {name} did not happen in this run" for name in waiting]
     if scene.contacts() or scene.stop:
-        notes.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
+        notes.append("no predictability horizon with events: repeat the run from a perturbed start to estimate one")
     for note in notes:
         progress(None, f"warning: {note}")
     return joined(scene, phases, notes)
@@ -87,7 +87,7 @@ def _in_words(phases: list[Phase]) -> Iterator[None]:
     except InputError as error:
         if last is None or error.place.startswith("[event."):
             raise
-        text = f"the scene that it leaves cannot go on: {error.place} {error.problem}"
+        text = f"the scene after the event cannot be continued: {error.place} {error.problem}"
         raise InputError(f"[event.{last}]", text, error.remedy) from None
 
 
@@ -128,8 +128,8 @@ class _Plan:
             name = watch.held[0]
             raise InputError(
                 f"[event.{name}.at]",
-                f"'{waiting[name].at}' is true already where the run begins",
-                "turn the comparison, or change the scene that the event would make",
+                f"'{waiting[name].at}' is already true at the start of the run",
+                "reverse the comparison, or correct the event's change",
             )
         at_once = watch.held[0] if watch.held else first if until <= t else None
         if at_once is not None:
@@ -218,7 +218,7 @@ class _Plan:
         if not held:
             raise InputError(
                 f"[event.{name}.{event.kind}]",
-                f"{family}.{part} has been released before",
+                f"{family}.{part} is released by an earlier event",
                 "remove one of the two events",
             )
         free = freed(still, held)

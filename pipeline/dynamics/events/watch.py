@@ -119,7 +119,7 @@ class Watch:
         engine = another(self._engine)
         first = recording.record(row, len(engine.model.contacts))
         modes, latched = first.modes[0], first.latched[0]
-        watched, begun = np.zeros_like(engine.view(m.WATCH.place)), list[tuple[float, ...]]()
+        watched, begun = np.zeros_like(engine.view(m.WATCH.at)), list[tuple[float, ...]]()
         for c in np.flatnonzero(modes > 0.0):
             m.named(m.WATCH, watched)["event_row"][c] = len(begun)
             begun.append((float(c), float(m.CLOSING), float(times[0]), float(latched[c]), 0.0, 0.0, np.nan))

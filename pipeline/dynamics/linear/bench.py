@@ -121,7 +121,7 @@ def drive_number(model: Model, name: str) -> int:
     """Return the index of a drive; raise InputError for an unknown name."""
     if name not in model.drives:
         remedy = suggestion(name, list(model.drives)) if model.drives else "the scene has no drives"
-        raise InputError(f"drive '{name}'", "there is no such drive", remedy)
+        raise InputError(f"drive '{name}'", "unknown drive", remedy)
     return model.drives.index(name)
 
 

@@ -124,7 +124,7 @@ def _drive(bench: Bench, name: str | None) -> int:
         return 0 if len(names) == 1 else int(moving[0])
     raise InputError(
         "speeds",
-        f"{len(moving)} of the scene's {len(names)} drives move, and one has to take the speeds",
+        f"{len(moving)} of the scene's {len(names)} drives move; choose the drive whose speed varies",
         f"name it by drive (--drive): {', '.join(names)}" if names else "drive a joint",
     )
 

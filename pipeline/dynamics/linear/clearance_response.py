@@ -177,7 +177,7 @@ def centre(model: Model, poses: Sequence[Placement], body: str) -> np.ndarray:
     """Return the position of a body's centre of mass."""
     i, part = model.mechanism.link_of[body], model.scene.body[body]
     com = np.array(part.com) if isinstance(part, RigidBody) else np.zeros(3)
-    return np.asarray(poses[i].of(model.mechanism.links[i].places[body].of(Placement(com))).p)
+    return np.asarray(poses[i].of(model.mechanism.links[i].placements[body].of(Placement(com))).p)
 
 
 def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[str, Wrench]) -> np.ndarray:
@@ -189,7 +189,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
     """
     model = motions.model
     i = model.mechanism.link_of[name]
-    place = model.mechanism.links[i].places[name]
+    place = model.mechanism.links[i].placements[name]
     own = motions.link(i).at(place.p, place.R)
     a, alpha, omega = (np.einsum("tji,tj->ti", own.R, x) for x in (own.a - model.gravity, own.alpha, own.omega))
     A = skew(alpha) + skew(omega) @ skew(omega)
@@ -224,7 +224,7 @@ def openings(
     These are rotation and displacement of the centre of mass, world axes, shape (3, mode).
     """
     i = model.mechanism.link_of[name]
-    placement = poses[i].of(model.mechanism.links[i].places[name])
+    placement = poses[i].of(model.mechanism.links[i].placements[name])
     frames = [str(frame) for frame in bundle["frame"].values]
     matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, tuple[Any, Any]]()
     for body, frame in _carried(model.scene, name).items():

@@ -87,7 +87,7 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
     raise SolverError(
         f"the search for a static equilibrium close to this pose failed in {MOST_MOVES} iterations: "
         f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; "
-        "hold that motion by a joint, a drive or a spring"
+        "restrain that motion by a joint, a drive or a spring"
     )
 
 
@@ -130,7 +130,7 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
         if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -OVERSHOOT * power:
             return new
         fraction *= 0.5
-    raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")
+    raise SolverError(f"at t = {bench.time:.6g} s: no step from this pose reduces the unbalanced forces")
 
 
 def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
@@ -254,7 +254,7 @@ def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     left = float(np.linalg.norm(forces + K[:, firm] @ along))
     if left > max(negligible, STALLED_CORRECTION * float(np.linalg.norm(forces))):
         raise SolverError(
-            f"at t = {bench.time:.6g} s: nothing holds a motion against a force of {residual(bench, at):.3g} N"
+            f"at t = {bench.time:.6g} s: a motion has no stiffness against a force of {residual(bench, at):.3g} N"
         )
     return motions[:, firm] @ along
 
@@ -281,7 +281,7 @@ def _require_steady(bench: Bench, at: Tangent) -> None:
     _require_turning_frames(bench)
     raise SolverError(
         f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
-        "as they go on; hold the drives instead"
+        "with the drives; hold the drives instead"
     )
 
 
@@ -295,12 +295,12 @@ def _rounding(bench: Bench, at: Tangent) -> float:
 
 def _require_turning_frames(bench: Bench) -> None:
     """Raise SolverError for a body with bushings only: its coordinates do not move with the drives."""
-    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.places}
+    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.placements}
     for name, load in bench.scene.forces().items():
         mounted = loose & {frame.partition(".")[0] for frame in load.between} if isinstance(load, Bushing) else ()
         for body in mounted:
             raise SolverError(
-                f"at t = {bench.time:.6g} s: {body} is held by no joint: its coordinates ignore the drives, and "
-                f"no pose of it is steady; give it a joint of type `free` with the frames of the bushing {name}: "
+                f"at t = {bench.time:.6g} s: {body} has no joint: its coordinates do not follow the drives, so "
+                f"that none of its poses is steady; give it a joint of type `free` with the frames of bushing {name}: "
                 f'between = ["{load.between[0]}", "{load.between[1]}"]'
             )

@@ -161,7 +161,7 @@ def _mass(
         if not isinstance(body, RigidBody):
             continue
         placement = poses[model.mechanism.link_of[name]].of(
-            model.mechanism.links[model.mechanism.link_of[name]].places[name]
+            model.mechanism.links[model.mechanism.link_of[name]].placements[name]
         )
         inertia = placement.R @ np.array(body.inertia) @ placement.R.T
         rigid = [clearance_response.body_motion(model, poses, name, turning=turning) for turning in (True, False)]

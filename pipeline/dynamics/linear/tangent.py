@@ -75,7 +75,7 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
         Z, lower, spread = free_motions(b.mass, b.jacobian)
     except np.linalg.LinAlgError:
         raise SolverError(
-            f"at t = {bench.time:.6g} s: bodies are so far deformed that the mass matrix is not positive definite"
+            f"at t = {bench.time:.6g} s: the bodies deform so much that the mass matrix is not positive definite"
         ) from None
     load = scipy.linalg.solve_triangular(lower, b.bias, lower=True)
     multipliers = np.linalg.lstsq(spread.T, load, rcond=REDUNDANT_ROW)[0] if len(spread) else np.zeros(0)

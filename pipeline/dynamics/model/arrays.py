@@ -39,15 +39,15 @@ class Arrays:
 
     def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
         """Return a view of a table of h or f with named fields, shape (rows,); h: another copy of the topology."""
-        topology, after = _neighbours()[table.place]
+        topology, after = _neighbours()[table.at]
         array = (self.h if h is None else h) if topology else self.f
         end = len(array) if after is None else self.h[after]
-        return m.named(table, array[self.h[table.place] : end])
+        return m.named(table, array[self.h[table.at] : end])
 
     def rows(self, table: Any) -> np.ndarray:
         """Return a table of h or f as `pack` takes it, shape (rows, size)."""
         stretch = self.table(table)
-        return stretch.view(np.int64 if _neighbours()[table.place][0] else np.float64).reshape(-1, table.size)
+        return stretch.view(np.int64 if _neighbours()[table.at][0] else np.float64).reshape(-1, table.size)
 
     def work_space(self, room: m.Room) -> WorkSpace:
         """Return a work space with a copy of h, in which the ground's frame is set and all else is zero.
@@ -61,7 +61,7 @@ class Arrays:
             end += length
         laws, contacts = self.size(m.N_LAWS), self.size(m.N_CONTACTS)
         w, n = np.zeros(end), np.zeros(m.INTEGERS + laws + contacts, dtype=np.int64)
-        axes = h[m.LINK_FRAMES.place] + m.FRAME.axes
+        axes = h[m.LINK_FRAMES.at] + m.FRAME.axes
         w[axes : axes + 9] = np.eye(3).ravel()
         n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + laws
         return WorkSpace(h, w, n, lengths)
@@ -72,7 +72,7 @@ def _neighbours() -> dict[int, tuple[bool, int | None]]:
     """Return, for each table of h and f by its index: True for one of h, and the index of the next table."""
     neighbours: dict[int, tuple[bool, int | None]] = {}
     for array in ("h", "f"):
-        places = [table.place for table in m.TABLES[array]]
+        places = [table.at for table in m.TABLES[array]]
         neighbours |= {index: (array == "h", after) for index, after in zip(places, [*places[1:], None], strict=True)}
     return neighbours
 
@@ -99,7 +99,7 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
     for array, start in (("h", m.HEADER), ("f", 0)):
         for table in m.TABLES[array]:
             filled = rows(table, tables[table])
-            counts[table], h[table.place] = len(filled), start
+            counts[table], h[table.at] = len(filled), start
             start += filled.size
             arrays[array].append(filled.ravel())
     for index, size in (_sizes(counts, tables) | dict(sizes)).items():

@@ -147,8 +147,8 @@ def _refuse_starts(mechanism: Mechanism, joints: list[Constraint], placed: set[i
         reached = ", ".join(f"{s.name} {there[s.joint, s.number]:.6g} {s.coordinate.unit}" for s in requested)
         raise InputError(
             f"{requested[0].place[:-1]}.position]",
-            f"the joints fit together, but not at the positions given; they do, for example, at {reached}",
-            "correct the position, or say with near about where the coordinate starts",
+            f"the joints cannot be assembled at the given positions, but for example at {reached}",
+            "correct the position, or give an approximate value as near",
         )
 
 
@@ -167,8 +167,8 @@ def _out_of_reach(mechanism: Mechanism, joints: Sequence[Constraint]) -> InputEr
     names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in driven]
     return InputError(
         f"[drive.{names[0]}.law]",
-        f"the joints fit together, but not where the drives ({', '.join(names)}) are at t = {scene.time.start:.6g} s: "
-        "the mechanism is over-driven, or a drive starts out of reach",
+        f"the joints can be assembled, but not at the positions of the drives ({', '.join(names)}) at "
+        f"t = {scene.time.start:.6g} s: the mechanism is over-driven, or a drive starts out of reach",
         "correct the start of a drive, or remove one",
     )
 
@@ -180,13 +180,13 @@ def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Plac
         f"{name} {value:.3g}" for name, value in left.items() if value > CLOSED_EXACTLY * mechanism.length
     )
     posed = len(given_start.given_links(mechanism)) > 1
-    where = "close to the poses given; residuals there" if posed else "by its joints; residuals of the first attempt"
+    where = "close to the given poses; residuals" if posed else "by its joints; residuals of the first attempt"
     slight = misfit(mechanism, joints, poses).worst < MEANT_TO_FIT
     return InputError(
         f"[joint.{worst}.between]",
         f"the mechanism cannot be assembled {where} (m, or sines of angles): {listed}"
-        + ("; several joints ask for nearly, but not exactly, the same" if slight else ""),
-        "write lengths, frames and poses with more digits, or replace a joint by one that leaves more motion"
+        + ("; several joints impose nearly equal conditions" if slight else ""),
+        "write lengths, frames and poses with more digits, or use a joint with more freedom"
         if slight
         else "correct lengths, frames, poses, or the start of a drive",
     )

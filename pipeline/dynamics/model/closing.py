@@ -108,7 +108,7 @@ def close(
 def _rounding(mechanism: Mechanism) -> float:
     """Return the rounding of the largest coordinates of the scene, as a fraction of the mechanism's size."""
     reach = [mechanism.origin, *(link.start.p for link in mechanism.links)]
-    reach += [frame.place.p for frame in mechanism.frames.values()]
+    reach += [frame.placement.p for frame in mechanism.frames.values()]
     return float(np.finfo(float).eps * np.max(np.abs(reach)) / mechanism.length)
 
 
@@ -173,16 +173,16 @@ def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Seque
         if gap > WORST_GUESS * mechanism.length:
             return InputError(
                 f"[joint.{joint.name}.between]",
-                f"'{a}' and '{b}' start {gap:.3g} m apart, where a {joint.edge.kind} joint holds them together "
-                f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
+                f"'{a}' and '{b}' start at a distance of {gap:.3g} m, where a {joint.edge.kind} joint connects "
+                f"them (limit {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
                 "correct the poses of the bodies, or the frames"
                 + ("; bare numbers are in metres" if gap >= LIKELY_MILLIMETRES else ""),
             )
         if turned > WORST_GUESS:
             return InputError(
                 f"[joint.{joint.name}.between]",
-                f"axes of '{a}' and '{b}' start {np.degrees(np.arcsin(min(turned, 1.0))):.3g} deg from where a "
-                f"{joint.edge.kind} joint holds them (more than {np.degrees(np.arcsin(WORST_GUESS)):.2g} deg)",
+                f"axes of '{a}' and '{b}' start {np.degrees(np.arcsin(min(turned, 1.0))):.3g} deg from the "
+                f"axes that a {joint.edge.kind} joint needs (limit {np.degrees(np.arcsin(WORST_GUESS)):.2g} deg)",
                 "correct the orientations of the bodies, or of the frames",
             )
     return None
@@ -199,7 +199,7 @@ def opposite(joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputE
                 return InputError(
                     f"[joint.{joint.name}.between]",
                     f"the {'xyz'[k]} axes of '{joint.edge.frame_a}' and '{joint.edge.frame_b}', which a "
-                    f"{joint.edge.kind} joint keeps parallel, do not point the same way",
+                    f"{joint.edge.kind} joint makes parallel, point in opposite directions",
                     "turn one of the frames",
                 )
     return None

@@ -43,8 +43,8 @@ def fitted(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
                 continue
             old = bodies[body]
             assert isinstance(old, RigidBody)
-            place = best[link].of(mechanism.links[link].places[body]).inverse().of(_met(joint, best, far))
-            if np.linalg.norm(place.p - mechanism.frames[name].place.p) > tolerances[body]:
+            place = best[link].of(mechanism.links[link].placements[body]).inverse().of(_met(joint, best, far))
+            if np.linalg.norm(place.p - mechanism.frames[name].placement.p) > tolerances[body]:
                 return None
             pose = {"position": place.p.tolist(), "quaternion": matrix_to_quaternion(place.R).tolist()}
             frames = old.frames | {frame: type(old.frames[frame]).model_validate(pose)}
@@ -75,4 +75,4 @@ def changed(before: Scene, after: Scene) -> str:
         if (frames := list(after.rigid()[body].frames.items()))
     }
     moved = ", ".join(f"{body} by up to {size:.2g} m" for body, size in away.items() if size > 0.0)
-    return f"frames were moved within their frame_tolerance so that the joints fit: {moved}"
+    return f"frames were moved within their frame_tolerance to assemble the joints: {moved}"

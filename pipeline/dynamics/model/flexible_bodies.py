@@ -93,7 +93,7 @@ def shortening(mechanism: Mechanism, link: int, frame: str | None = None) -> np.
     if "frame_shortening" not in bundle:
         raise InputError(
             f"[body.{body}.stiffening]",
-            "the bundle of its mesh says nothing about the shortening of a bent body",
+            "the bundle of its mesh has no shortening of bent bodies",
             "stiffening is for beams; remove it",
         )
     if frame is None:
@@ -224,9 +224,9 @@ def start_place(mechanism: Mechanism, site: Site) -> Placement:
     """Return a site's placement in its link, moved by the deformation that the scene gives the body at the start."""
     q, bundle = mechanism.deformation.get(site.link), mechanism.links[site.link].bundle
     if q is None or bundle is None or site.frame is None:
-        return site.place
+        return site.placement
     label = site.frame.partition(".")[2]
     _, moves, turns = frame_shapes(bundle, label)
     rest = np.zeros((1, len(q)))
     shifted, _, _ = shift(moves, shortening(mechanism, site.link, label), q[None], rest, rest)
-    return Placement(site.place.p + shifted[0], rotation_vector_to_matrix(turns @ q) @ site.place.R)
+    return Placement(site.placement.p + shifted[0], rotation_vector_to_matrix(turns @ q) @ site.placement.R)

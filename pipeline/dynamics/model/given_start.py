@@ -56,9 +56,8 @@ class Contradiction:
         """Return a sentence with both values and their difference."""
         unit = "rad" if self.turning else "m"
         return (
-            f"{self.what} starts at {_written(self.now)} {unit} in the poses given, and at "
-            f"{_written(self.value)} {unit} by "
-            f"{self.rule}: {self.size:.3g} {unit} apart"
+            f"{self.what} starts at {_written(self.now)} {unit} in the given poses, but at "
+            f"{_written(self.value)} {unit} by {self.rule}: they differ by {self.size:.3g} {unit}"
         )
 
 
@@ -93,7 +92,7 @@ def given_links(mechanism: Mechanism) -> set[int]:
     return {0} | {
         i
         for i, link in enumerate(mechanism.links)
-        if any(getattr(bodies[name], "pose", None) is not None for name in link.group.places)
+        if any(getattr(bodies[name], "pose", None) is not None for name in link.group.placements)
     }
 
 
@@ -143,9 +142,9 @@ def refuse_far(mechanism: Mechanism, far: Sequence[Contradiction]) -> None:
             raise InputError(
                 contradiction.place,
                 f"{contradiction.text()} (more than {limit:.3g} {unit})",
-                "correct the poses or the start of the law, or leave out the poses of the bodies that the drive moves"
+                "correct the poses or the start of the law, or remove the poses of the bodies that the drive moves"
                 if contradiction.drive
-                else "correct the poses or the position, or leave out the poses of the bodies that follow from it",
+                else "correct the poses or the position, or remove the poses of the bodies that follow from it",
             )
 
 
@@ -167,7 +166,7 @@ def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[
                     raise InputError(
                         f"{start.place[:-1]}.{key}]",
                         f"is {requested:.6g} {unit}, and by the law of drive '{name}' {law:.6g} {unit}",
-                        "leave it out; what is driven starts as its law does",
+                        "remove it; driven coordinates start as their laws do",
                     )
 
 
@@ -185,10 +184,10 @@ def corrected_starts(mechanism: Mechanism, now: Sequence[Placement]) -> list[str
         amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > INPUT_DIGITS else []
         if amounts:
             corrections.append(
-                (distance + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}")
+                (distance + turned, f"{', '.join(mechanism.links[i].group.placements)} {' and '.join(amounts)}")
             )
     if not corrections:
         return []
     texts = [text for _, text in sorted(corrections, reverse=True)]
     more = [f"and {len(texts) - MOST_REPORTED} more bodies"] if len(texts) > MOST_REPORTED else []
-    return [f"the start was mended so that joints and drives fit: {'; '.join([*texts[:MOST_REPORTED], *more])}"]
+    return [f"the start was corrected to satisfy joints and drives: {'; '.join([*texts[:MOST_REPORTED], *more])}"]

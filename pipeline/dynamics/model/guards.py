@@ -29,7 +29,7 @@ def speeds(table: Any, offset: int, count: int, levels: tuple[float, ...], conta
     """Yield guards of a sliding velocity at the speeds at which its law has kinks; a level of 0 means none."""
     for level in levels:
         if level > 0.0:
-            yield (table.place, offset, count, contact, -1), level, level
+            yield (table.at, offset, count, contact, -1), level, level
 
 
 def _of_contacts(mechanism: Mechanism) -> Iterator[Guard]:
@@ -42,4 +42,4 @@ def _of_contacts(mechanism: Mechanism) -> Iterator[Guard]:
 def _of_loads(loaded: Loaded) -> Iterator[Guard]:
     for k, levels in enumerate(loaded.bends):
         for level in levels:
-            yield (m.LOAD_BENDS.place, k * m.LOAD_BENDS.size, 1, -1, -1), level, level
+            yield (m.LOAD_BENDS.at, k * m.LOAD_BENDS.size, 1, -1, -1), level, level

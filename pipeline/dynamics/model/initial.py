@@ -193,10 +193,10 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
         names = ", ".join(path.removeprefix("[body.").removesuffix(".velocity]") for path in equations.given)
         raise InputError(
             equations.given[0],
-            f"joints and drives do not allow the velocities given for {names} (they miss by "
-            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * fraction:g} % of the "
-            "largest one are mended)",
-            "give velocities that agree with each other, or fewer of them",
+            f"joints and drives do not allow the given velocities of {names} (the error is "
+            f"{miss:.3g} of the mechanism's size, or radians, per second; up to {100.0 * fraction:g} % of the "
+            "largest one is corrected)",
+            "give consistent velocities, or fewer of them",
         )
     y = y.copy()
     y[model.speeds] = model.speed_scales * speeds
@@ -226,14 +226,14 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
         if np.nanmax(change / unit) > limit:
             turning, moving = np.fmax.reduce(change.reshape(2, 3), axis=1, initial=0.0)
             changes.append(
-                f"the start velocities given for {name} were mended so that joints and drives allow them: by up to "
+                f"the start velocities given for {name} were corrected to satisfy joints and drives, by up to "
                 f"{moving:.3g} m/s and {turning:.3g} rad/s"
             )
     for rate in given_rates(model):
         change = abs(rate.of(sites, y[model.speeds]) - rate.requested)
         if change > INPUT_DIGITS * (_slow(model) * rate.size + abs(rate.requested)):
             changes.append(
-                f"the start velocity {rate.place} was mended so that joints and drives allow it: by {change:.3g}"
+                f"the start velocity {rate.place} was corrected to satisfy joints and drives, by {change:.3g}"
             )
     return changes
 
@@ -252,12 +252,11 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
             raise InputError(
                 f"[start.modal.{name}.coordinate]",
                 f"joints and drives do not allow this deformation: they change it by {change:.3g} m",
-                "give another one, or replace a joint by one that leaves more motion",
+                "give another one, or use a joint with more freedom",
             )
         if change > INPUT_DIGITS * max(largest, INPUT_DIGITS * unit):
             changes.append(
-                f"the deformation given for {name} was mended so that joints and drives allow it: "
-                f"by up to {change:.3g} m"
+                f"the deformation given for {name} was corrected to satisfy joints and drives, by up to {change:.3g} m"
             )
     return changes
 
@@ -317,7 +316,7 @@ def centre_of(model: Model, name: str) -> Centre:
     i, body = model.mechanism.link_of[name], model.scene.body[name]
     link = model.links[i]
     if isinstance(body, RigidBody):
-        placement = link.places[name]
+        placement = link.placements[name]
         return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
@@ -352,6 +351,6 @@ def check_loads(model: Model, loads: np.ndarray) -> None:
         if has_direction and value <= SHORTEST_SPRING * model.length:
             raise InputError(
                 f"[load.{name}.between]",
-                "its two ends coincide at the start, so that it pulls in no direction",
-                "move an end; only a spring of no free length and no damping may start so",
+                "its two ends coincide at the start, so that its force has no direction",
+                "move an end; only a spring with free_length = 0 and without damping may start so",
             )

@@ -49,7 +49,7 @@ def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
         low, high = made.span
         raise InputError(
             path,
-            f"its points reach from {low:.6g} s to {high:.6g} s, the run from {start:.6g} s to {end:.6g} s",
+            f"its points cover {low:.6g} s to {high:.6g} s, the run from {start:.6g} s to {end:.6g} s",
             "add points, or shorten the run",
         )
     return made

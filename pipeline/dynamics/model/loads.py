@@ -103,7 +103,7 @@ def _read_index(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort
     if sort == "frame":
         return numbering.site(mechanism.site(name))
     i = mechanism.link_of[name]
-    place = mechanism.links[i].places[name].of(Placement(np.array(scene.rigid()[name].com)))
+    place = mechanism.links[i].placements[name].of(Placement(np.array(scene.rigid()[name].com)))
     return numbering.site(Site(i, place, None))
 
 
@@ -143,6 +143,6 @@ def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int,
     if len(links) == 2 and links[0] == links[1]:
         raise InputError(path, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
     if links == [0]:
-        raise InputError(path, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
+        raise InputError(path, f"{frames[0]} does not move, so that the load has no effect", "name a frame that moves")
     sites = [numbering.site(mechanism.site(frame)) for frame in frames]
     return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])

@@ -43,7 +43,7 @@ class Site:
     """A frame on a link that a joint, contact or load uses; frame: its name when the link is flexible."""
 
     link: int
-    place: Placement
+    placement: Placement
     frame: str | None
 
 
@@ -98,14 +98,14 @@ class Link:
     """One link of the tree, in its own frame.
 
     A rigid link's frame is its inboard joint frame; a flexible one's is its body frame.
-    places: frame of each of its bodies; none for a massless link within a joint (see `chain`).
+    placements: frame of each of its bodies; none for a massless link within a joint (see `chain`).
     start: pose in the world, from the kernels' origin.  inboard: site of its joint on the parent; None for the ground.
     inertia: of a rigid link, in its frame.  bundle: of a flexible one.
     """
 
     branch: Branch
     group: Group
-    places: dict[str, Placement]
+    placements: dict[str, Placement]
     start: Placement
     joint: InboardJoint
     inboard: Site | None
@@ -219,7 +219,7 @@ class Mechanism:
 def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, int], name: str) -> Site:
     frame = find_frame(frames, name, "frame")
     i = link_of[frame.body]
-    placement = links[i].places[frame.body].of(frame.place)
+    placement = links[i].placements[frame.body].of(frame.placement)
     return Site(i, placement, name if links[i].flexible else None)
 
 
@@ -246,7 +246,7 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
         else:
             links += _joined(body, placed, frames, links, link_of, origin)
         carried.append(len(links) - 1)
-        link_of.update(dict.fromkeys(group.places, len(links) - 1))
+        link_of.update(dict.fromkeys(group.placements, len(links) - 1))
 
     def at(frame: str) -> Site:
         return _site(frames, links, link_of, frame)
@@ -281,10 +281,10 @@ class _Body:
     def link(self, branch: Branch, own: Placement, inboard: Site, joint: InboardJoint) -> Link:
         """Return the link; own: its frame in the host's, for rigid bodies."""
         if self.bundle is not None:
-            places = dict(self.group.places)
+            places = dict(self.group.placements)
             return Link(branch, self.group, places, self.start, joint, inboard, bundle=self.bundle)
         outward = own.inverse()
-        places = {n: outward.of(p) for n, p in self.group.places.items()}
+        places = {n: outward.of(p) for n, p in self.group.placements.items()}
         inertia = rigid_inertia(self.scene, places)
         return Link(branch, self.group, places, self.start.of(own), joint, inboard, inertia)
 
@@ -292,10 +292,10 @@ class _Body:
 def _unjoined(body: _Body, branch: Branch) -> Link:
     """Return the ground, or a body without joint, with its frame at the centre of mass to decouple its motions."""
     if branch.parent < 0:
-        places = {n: body.start.of(p) for n, p in body.group.places.items()}
+        places = {n: body.start.of(p) for n, p in body.group.placements.items()}
         return Link(branch, body.group, places, Placement(), InboardJoint("fixed"), None)
     rigid = body.bundle is None
-    own = Placement(rigid_inertia(body.scene, body.group.places).com) if rigid else Placement()
+    own = Placement(rigid_inertia(body.scene, body.group.placements).com) if rigid else Placement()
     return body.link(branch, own, Site(0, Placement(), None), InboardJoint("free"))
 
 
@@ -315,18 +315,18 @@ def _joined(
     near = edge.frame_b if branch.reverse else edge.frame_a
     inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, near)
     joints = chain(edge, branch.reverse, inboard.frame is not None, body.group.flexible)
-    here = links[inboard.link].start.of(inboard.place)
+    here = links[inboard.link].start.of(inboard.placement)
     axes, between = np.eye(3), list[Link]()
     for joint in joints:
         turned = Placement(R=axes.T @ joint.axes)
-        site = Site(inboard.link, inboard.place.of(turned), inboard.frame)
+        site = Site(inboard.link, inboard.placement.of(turned), inboard.frame)
         placed, axes = replace(branch, parent=site.link), joint.axes
         if joint is joints[-1]:
             break
         pose = here.of(Placement(R=axes))
         between.append(Link(placed, Group("", {}, False), {}, pose, joint, site))
         inboard = Site(len(links) + len(between) - 1, Placement(), None)
-    own = body.group.places[frames[far].body].of(frames[far].place).of(Placement(R=axes))
+    own = body.group.placements[frames[far].body].of(frames[far].placement).of(Placement(R=axes))
     return [*between, body.link(placed, own, site, joint)]
 
 
@@ -359,9 +359,9 @@ def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequen
     """Return the size of some links [m], which is at least their largest clearance."""
     points, of_body = list[np.ndarray](), dict[str, list[np.ndarray]]()
     for frame in frames.values():
-        of_body.setdefault(frame.body, []).append(frame.place.p)
+        of_body.setdefault(frame.body, []).append(frame.placement.p)
     for link in links:
-        for name, path in link.places.items():
+        for name, path in link.placements.items():
             points += [link.start.point(path.point(p)) for p in of_body.get(name, [])]
             if link.inertia is not None:
                 points.append(link.start.point(link.inertia.com))
@@ -387,6 +387,6 @@ def require_bodies(scene: Scene) -> None:
         if scene.joint and name not in held:
             raise InputError(
                 f"[body.{name}]",
-                f"'{name}' is joined to nothing: no joint, load or path names a frame of it",
-                'join it to another body; if it is to fly freely, add a joint of type "free"',
+                f"'{name}' is not connected: no joint, load or path names a frame of the body",
+                'connect it to another body, or add a joint of type "free"',
             )

@@ -45,15 +45,15 @@ class Frame:
     """A named frame: its body and its undeformed placement there."""
 
     body: str
-    place: Placement
+    placement: Placement
 
 
 @dataclass(frozen=True)
 class Group:
-    """Bodies that move as one; places: each body's frame in that of the first one, the host."""
+    """Bodies that move as one; placements: each body's frame in that of the first one, the host."""
 
     host: str
-    places: dict[str, Placement]
+    placements: dict[str, Placement]
     flexible: bool
 
 
@@ -100,7 +100,7 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
         a, b = (find_frame(frames, f, f"[joint.{name}.between]") for f in joint.between)
         if _flexible(scene, a.body) or _flexible(scene, b.body):
             continue
-        b_in_a = a.place.of(b.place.inverse())
+        b_in_a = a.placement.of(b.placement.inverse())
         neighbours[a.body].append((b.body, b_in_a))
         neighbours[b.body].append((a.body, b_in_a.inverse()))
     groups: list[Group] = []
@@ -110,7 +110,7 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
             continue
         is_ground = root in grounds
         if is_ground and groups:
-            places = groups[0].places  # several bodies of type ground are one world
+            places = groups[0].placements  # several bodies of type ground are one world
         else:
             places = {}
             groups.append(Group(root, places, _flexible(scene, root)))
@@ -132,13 +132,13 @@ def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group],
         a, b = (frames[f] for f in joint.between)
         if group_of[a.body] != group_of[b.body]:
             continue
-        places = groups[group_of[a.body]].places
-        A, B = places[a.body].of(a.place), places[b.body].of(b.place)
+        places = groups[group_of[a.body]].placements
+        A, B = places[a.body].of(a.placement), places[b.body].of(b.placement)
         if not _close(A, B, same):
             angle = np.degrees(np.arccos(np.clip((np.trace(A.R.T @ B.R) - 1.0) / 2.0, -1.0, 1.0)))
             raise InputError(
                 f"[joint.{name}.between]",
-                f"other fixed joints hold '{joint.between[0]}' and '{joint.between[1]}' "
+                f"other fixed joints place '{joint.between[0]}' and '{joint.between[1]}' "
                 f"{np.linalg.norm(A.p - B.p):.3g} m and {angle:.3g} deg apart",
                 "remove a fixed joint, or correct the frames",
             )
@@ -190,7 +190,7 @@ def start_places(
     known: dict[int, Placement] = {0: Placement()}
     same = _same_place(scene, frames)
     for i, group in enumerate(groups[1:], start=1):
-        for name, placement in group.places.items():
+        for name, placement in group.placements.items():
             pose = scene.body[name].pose  # type: ignore[union-attr]
             if pose is None:
                 continue
@@ -201,14 +201,14 @@ def start_places(
                 raise InputError(
                     f"[body.{name}.pose]",
                     "contradicts the poses of the bodies that it is fixed to",
-                    "give one body of a rigid group its pose; the others follow",
+                    "give only one body of a rigid group a pose",
                 )
             known.setdefault(i, here)
     _propagate(scene, group_of, frames, groups, known)
     missing = [groups[i].host for i in range(len(groups)) if i not in known]
     if missing:
         raise InputError(
-            f"[body.{missing[0]}.pose]", f"nothing says where {', '.join(missing)} start", "give a pose, or a joint"
+            f"[body.{missing[0]}.pose]", f"{', '.join(missing)} have no start pose", "give poses, or joints"
         )
     return [known[i] for i in range(len(groups))]
 
@@ -217,7 +217,7 @@ def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
     """Return the distance [m] below which points coincide: 1e-9, but within 1e-9 and 1e-6 of the scene's extent."""
     poses = [pose.position for body in scene.body.values() if (pose := getattr(body, "pose", None)) is not None]
     origins = np.array([(0.0, 0.0, 0.0), *poses])
-    span = max([*np.ptp(origins, axis=0), *(float(np.linalg.norm(f.place.p)) for f in frames.values())])
+    span = max([*np.ptp(origins, axis=0), *(float(np.linalg.norm(f.placement.p)) for f in frames.values())])
     return float(np.clip(1e-9, 1e-9 * span, 1e-6 * span)) if span > 0.0 else 1e-9
 
 
@@ -244,7 +244,7 @@ def _propagate(
             if (ga in known) == (gb in known):
                 continue
             (new, inner), (old, outer) = ((gb, b), (ga, a)) if ga in known else ((ga, a), (gb, b))
-            there = known[old].of(groups[old].places[outer.body]).of(outer.place)
-            known[new] = there.of(groups[new].places[inner.body].of(inner.place).inverse())
+            there = known[old].of(groups[old].placements[outer.body]).of(outer.placement)
+            known[new] = there.of(groups[new].placements[inner.body].of(inner.placement).inverse())
             changed = True
             break

@@ -69,15 +69,15 @@ class Mobility:
     def start_refusal(self) -> str:
         """The sentence of `singular_start` with remedies."""
         return (
-            f"{self.singular_start}: give its bodies the velocities of one of these, choose one by [start] branch if "
-            "drives or forces move it, or start it in another pose of its path"
+            f"{self.singular_start}: give its bodies velocities of one branch, choose the branch by [start] branch if "
+            "drives or forces move the mechanism, or start it in another pose of its path"
         )
 
     def text(self) -> str:
         """Return mobility and redundancy as a sentence for the user."""
         says = "condition follows" if self.redundant == 1 else "conditions follow"
         more = f", {self.redundant} closure {says} from the others" if self.redundant else ""
-        return f"free motions besides the drives: {self.mobility}{more}"
+        return f"free motions in addition to the drives: {self.mobility}{more}"
 
 
 def analyse(model: Model) -> Mobility:
@@ -186,15 +186,15 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
         return
     least = float(np.min(here.values[: here.rank], initial=1.0))
     hardly = (
-        f"; one of these rows is only {least:.1g} of its natural size, as of joints whose axes hardly miss each other"
+        f"; one of these rows has only {least:.1g} of its natural size, as for joints with nearly aligned axes"
         if least < SLIGHT_ROW
         else ""
     )
     raise InputError(
         "[joint]",
-        f"the mechanism is locked: {mobility.coordinates} free coordinates of its tree against {mobility.rank} "
-        f"independent closure rows leave it no motion{hardly}",
-        "write frames and poses with more digits, or replace a joint by one that leaves more motion"
+        f"the mechanism is locked: {mobility.rank} independent closure rows constrain all "
+        f"{mobility.coordinates} free coordinates of its tree{hardly}",
+        "write frames and poses with more digits, or use a joint with more freedom"
         if hardly
         else "remove a joint, choose one with more freedom, or drive one",
     )
@@ -208,7 +208,7 @@ def _refuse_contradiction(model: Model, here: Rates) -> None:
         return
     raise InputError(
         f"[drive.{moving[0].partition('.')[0]}]",
-        f"the mechanism is over-driven: its loops tie the coordinates of {', '.join(drives)} to each other ("
+        f"the mechanism is over-driven: its loops couple the coordinates of {', '.join(drives)} to each other ("
         f"{model.nv} free coordinates, {here.rank} independent closure rows, {len(model.drives)} drives)",
         "remove a drive, or a joint",
     )
@@ -267,10 +267,10 @@ def _refuse_motion(model: Model, twists: np.ndarray) -> None:
     """Raise InputError for a motion without mass; twists: of all links in this motion, (links, 6)."""
     sizes = np.abs(twists).max(axis=1)
     links = [link for link, size in zip(model.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
-    names = sorted({name for link in links for name in link.places})
+    names = sorted({name for link in links for name in link.placements})
     raise InputError(
         f"[body.{names[0]}.inertia]",
-        f"nothing resists a motion of {', '.join(names)}: about some axis about which the joints let it turn "
-        "it has no inertia, so that its acceleration is not determined",
-        "give it an inertia about every axis, or a joint that stops this motion",
+        f"the acceleration of {', '.join(names)} is undetermined: the joints allow a rotation about an axis "
+        f"without inertia",
+        "give it an inertia about every axis, or a joint that prevents this motion",
     )

@@ -160,13 +160,15 @@ def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
         m.BODIES: [mechanism.link_of[name] for name in bodies],
         m.BODY_NUMBERS: [_body_numbers(mechanism, name) for name in bodies],
         m.FRAMES: holding,
-        m.NAMED_FRAME_NUMBERS: [links[i].places[f.body].point(f.place.p) for i, f in zip(holding, frames, strict=True)],
+        m.NAMED_FRAME_NUMBERS: [
+            links[i].placements[f.body].point(f.placement.p) for i, f in zip(holding, frames, strict=True)
+        ],
     }
 
 
 def _body_numbers(mechanism: Mechanism, name: str) -> np.ndarray:
     """Return a body's row of BODY_NUMBERS; mass and inertia are zero unless several rigid bodies share its link."""
-    body, places = mechanism.scene.body[name], mechanism.links[mechanism.link_of[name]].places
+    body, places = mechanism.scene.body[name], mechanism.links[mechanism.link_of[name]].placements
     here = places[name]
     if not isinstance(body, RigidBody):
         return np.concatenate([np.zeros(10), here.R.ravel()])
@@ -190,7 +192,7 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
     return {
         m.LINKS: _links(numbering, parts),
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
-        m.SITE_NUMBERS: [np.concatenate([s.place.p, s.place.R.ravel()]) for s in numbering.sites],
+        m.SITE_NUMBERS: [np.concatenate([s.placement.p, s.placement.R.ravel()]) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
         **index_tables.mass_entries(numbering, parts.articulated),
     }
@@ -256,7 +258,7 @@ def _borne(mechanism: Mechanism) -> np.ndarray:
             mass, com, J = link.undeformed
             sums[i] += mass, mass * np.linalg.norm(com), mass * com @ com + 0.5 * np.trace(J)
         mass, first, second = sums[i]
-        joint = above.start.point(link.inboard.place.p) if link.inboard is not None else link.start.p
+        joint = above.start.point(link.inboard.placement.p) if link.inboard is not None else link.start.p
         a = float(np.linalg.norm(link.start.p - joint) + np.linalg.norm(joint - above.start.p))
         if "t" in joint_type(link.kind).SPEEDS:
             a = max(a, mechanism.length)

@@ -57,7 +57,11 @@ class Numbering:
         """Return the number of a site, which is added unless one with the same placement exists."""
         for k, other in enumerate(self.sites):
             same = other.link == site.link and other.frame == site.frame
-            if same and np.array_equal(other.place.p, site.place.p) and np.array_equal(other.place.R, site.place.R):
+            if (
+                same
+                and np.array_equal(other.placement.p, site.placement.p)
+                and np.array_equal(other.placement.R, site.placement.R)
+            ):
                 return k
         return self.add_site(site)
 

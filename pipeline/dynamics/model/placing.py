@@ -95,8 +95,8 @@ def ambiguity(
     coordinate, called = joint_type(kind).COORDINATES[k], label(name, kind, k)
     values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in candidates[1:])
     return (
-        f"the joints can be assembled in {len(candidates)} ways, and the scene does not say in which: it starts with "
-        f"{called} at {first.coordinates[name, k]:.4g} {coordinate.unit}, elsewhere it is at {values}; "
+        f"the joints can be assembled in {len(candidates)} ways, and the scene does not select one: it starts with "
+        f"{called} at {first.coordinates[name, k]:.4g} {coordinate.unit}, the others have {values}; "
         f"[start.joint.{called}] near = ... selects one"
     )
 

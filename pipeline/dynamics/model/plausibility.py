@@ -29,7 +29,7 @@ def offsets(mechanism: Mechanism) -> Iterator[tuple[Contact, np.ndarray, Placeme
     for contact in mechanism.contacts:
         if contact.joint.type == STOP or contact.joint.type not in ROUND:
             continue
-        outer, inner = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+        outer, inner = (mechanism.links[s.link].start.of(s.placement) for s in (contact.outer, contact.inner))
         away = inner.p - outer.p
         if contact.joint.type == "clearance-revolute":
             away = away - (away @ outer.R[:, 2]) * outer.R[:, 2]
@@ -45,7 +45,7 @@ def refuse_missed(mechanism: Mechanism) -> None:
         names = ("socket", "ball") if joint.type == "clearance-spherical" else ("journal", "pin")
         raise InputError(
             f"[{contact.place}.between]",
-            f"the {names[1]} ('{joint.between[1]}') starts {length(distance)} from the middle of its {names[0]} "
+            f"the {names[1]} ('{joint.between[1]}') starts {length(distance)} from the centre of its {names[0]} "
             f"('{joint.between[0]}'), where the clearance allows {length(joint.clearance)}",
             "correct poses or frames; a bare number is in metres: 50 is 50 m",
         )
@@ -65,7 +65,7 @@ def refuse_overlap(mechanism: Mechanism) -> None:
             refuse_depth(scene, contact, depth)
     for contact in mechanism.contacts:
         if contact.joint.type == "ball-on-plane":
-            plane, ball = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+            plane, ball = (mechanism.links[s.link].start.of(s.placement) for s in (contact.outer, contact.inner))
             depth = contact.joint.radius - float((ball.p - plane.p) @ plane.R[:, 2])
             if depth > SAME_POINT * contact.joint.radius:
                 refuse_depth(scene, contact, depth)
@@ -76,15 +76,15 @@ def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
     joint = contact.joint
     if joint.initial_approach_speed is not None:
         return
-    problem, remedy = f"its surfaces start {length(depth)} deep in each other", "enlarge the clearance"
+    problem, remedy = f"its surfaces start with a penetration of {length(depth)}", "enlarge the clearance"
     problem += f" (clearance {length(joint.clearance)})"
     if joint.type == "ball-on-plane":
-        problem, remedy = f"the ball starts {length(depth)} deep in the plane", "lower the plane"
+        problem, remedy = f"the ball starts with a penetration of {length(depth)} into the plane", "lower the plane"
     elif isinstance(joint, End):
         unit = "rad" if joint.coordinate.turning else "m"
         problem, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
     elif contact.name in loose(scene):
-        remedy = "begin where the joint would be without clearance ([start] at = 'ideal'), " + remedy
+        remedy = "start the joint as without clearance ([start] at = 'ideal'), " + remedy
     raise InputError(
         f"[{contact.place}]",
         problem,
@@ -116,7 +116,7 @@ def missing_joints(mechanism: Mechanism) -> list[tuple[str, str, str]]:
         if links[0] == links[1] or frozenset(links) in connected:
             continue
         if np.linalg.norm(_position(mechanism, a) - _position(mechanism, b)) <= SAME_POINT * mechanism.length:
-            text = f"nothing uses the frames '{a}' and '{b}', which start at the same point: is a joint missing?"
+            text = f"the frames '{a}' and '{b}' are unused and start at the same point: is a joint missing?"
             remedy = f'add a joint with between = ["{a}", "{b}"], or remove the frames'
             result.append((mechanism.frames[a].body, text, remedy))
     return result
@@ -130,5 +130,5 @@ def _position(mechanism: Mechanism, frame: str) -> np.ndarray:
     """Return the start position of a frame, from the kernels' origin [m]."""
     there = mechanism.frames[frame]
     link = mechanism.links[mechanism.link_of[there.body]]
-    position: np.ndarray = link.start.of(link.places[there.body]).point(there.place.p)
+    position: np.ndarray = link.start.of(link.placements[there.body]).point(there.placement.p)
     return position

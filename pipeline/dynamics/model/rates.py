@@ -150,7 +150,7 @@ class RowAxes(NamedTuple):
 
 def row_axes(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[RowAxes]:
     """Return the rows of a closure, in radians or the mechanism's size, for each pair of sites that it acts on."""
-    frames = [(poses[a.link].of(a.place), poses[b.link].of(b.place)) for a, b in closure.ends]
+    frames = [(poses[a.link].of(a.placement), poses[b.link].of(b.placement)) for a, b in closure.ends]
     if isinstance(closure, Coupling):
         unit = 1.0 if closure.second.coordinate.turning else length
         sides = zip(closure.ends, closure.parts, frames, strict=True)
@@ -170,7 +170,7 @@ def motions(model: Model, poses: Sequence[Placement]) -> Motions:
     for i, link in enumerate(mechanism.links):
         if link.inboard is None:
             continue
-        F, G = poses[link.inboard.link].of(link.inboard.place), poses[i].of(outboard_place(mechanism, link))
+        F, G = poses[link.inboard.link].of(link.inboard.placement), poses[i].of(outboard_place(mechanism, link))
         turns, slides = freedoms(link.kind, F, G)
         first = numbering.coordinates[i].start
         middle = first + len(turns)

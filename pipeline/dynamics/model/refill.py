@@ -113,8 +113,8 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
         return None
     links = list(mechanism.links)
     for i, link in enumerate(links):
-        if link.inertia is not None and changed & link.places.keys():
-            now = rigid_inertia(scene, link.places)
+        if link.inertia is not None and changed & link.placements.keys():
+            now = rigid_inertia(scene, link.placements)
             if link.branch.edge is None and not np.array_equal(now.com, link.inertia.com):
                 return None
             links[i] = replace(link, inertia=now)

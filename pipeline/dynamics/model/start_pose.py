@@ -120,7 +120,7 @@ def _data(mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
     for name in names:
         com = drawn[name]["com"].values if name in drawn else np.array(scene.body[name].com)  # type: ignore[union-attr]
         centres.append(poses[name].point(com))
-    frames = {name: poses[frame.body].point(frame.place.p) for name, frame in mechanism.frames.items()}
+    frames = {name: poses[frame.body].point(frame.placement.p) for name, frame in mechanism.frames.items()}
     still = np.zeros((1, len(names), 3))
     data = {
         "position": (("time", "body", "axis"), np.array(centres).reshape(1, -1, 3)),
@@ -155,5 +155,5 @@ def _data(mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
 def _pose(mechanism: Mechanism, body: str) -> Placement:
     """Return the pose of a body's frame in the world."""
     link = mechanism.links[mechanism.link_of[body]]
-    here = link.start.of(link.places[body])
+    here = link.start.of(link.placements[body])
     return here if link is mechanism.links[0] else Placement(here.p + mechanism.origin, here.R)

@@ -83,6 +83,6 @@ def _padded(
         raise InputError(
             f"[start.modal.{name}.{key}]",
             f"{len(values)} numbers are given for the {modes} modes of '{name}'",
-            "give one per mode, in the order of the bundle; those left out at the end are zero",
+            "give one per mode, in the order of the bundle; missing ones at the end are zero",
         )
     return np.array([*values, *[0.0] * (modes - len(values))])

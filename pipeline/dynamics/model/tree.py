@@ -68,7 +68,7 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
         if ga == gb:
             if kind != "fixed":
                 raise InputError(
-                    f"[joint.{name}]", "its two bodies are rigidly joined already", "remove it, or a fixed joint"
+                    f"[joint.{name}]", "its two bodies are already rigidly connected", "remove it, or a fixed joint"
                 )
             continue
         result.append(Edge(name, kind, ga, gb, *joint.between, driven.get(name, ())))
@@ -125,7 +125,7 @@ def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Ed
             drive = next(d for d in edge.drives if d).partition(".")[0]
             raise InputError(
                 f"[drive.{drive}]",
-                f"'{edge.name}' closes a loop whose other joints are all driven",
+                f"'{edge.name}' closes a loop of which all other joints are driven",
                 "remove a drive",
             )
     return branches, left

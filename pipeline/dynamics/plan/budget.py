@@ -115,4 +115,4 @@ def too_much(upper: Mapping[str, float], requested: Mapping[str, float]) -> str:
     name = max(requested, key=lambda n: upper[n] / requested[n])
     if not np.isfinite(upper[name]):
         return f"without it {name} cannot be determined, or has other events"
-    return f"without it {name} may be off by {upper[name] / requested[name]:.2g} times what is requested"
+    return f"without it {name} may change by {upper[name] / requested[name]:.2g} times the requested accuracy"

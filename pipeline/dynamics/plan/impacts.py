@@ -51,7 +51,7 @@ def decide_bending(search: Search, soft: Sequence[Effect]) -> None:
     if small:
         search.spend(upper)
     for effect in soft:
-        search.judge(effect, "with or without bending the loose joints do the same" if small else "", upper, sizes)
+        search.judge(effect, "bending does not change the clearance response" if small else "", upper, sizes)
 
 
 def cheapest(search: Search) -> Chosen:

@@ -44,7 +44,7 @@ SOFTER = 0.5
 #: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
 #: reason to drop parts that do not affect the requested motion
-UNCOUPLED = "nothing couples it to the requested quantities"
+UNCOUPLED = "the requested quantities do not depend on it"
 
 
 def plan(
@@ -115,7 +115,7 @@ def _requested(
     if constant and not (watched and accuracies):
         raise InputError(
             f"{where} {constant[0]}",
-            "a relative accuracy of a quantity that never changes in the ideal mechanism",
+            "is a relative accuracy, but the quantity is constant in the ideal mechanism",
             "give an absolute one, with a unit",
         )
     quantities = [q for q in quantities if q.name in accuracies]
@@ -128,9 +128,9 @@ def _requested(
         q = quantities[0]
         raise InputError(
             f"{where} {q.name}",
-            f"{accuracies[q.name]:.3g} {q.unit} is more than it changes ({sizes[q.name]:.3g} {q.unit}), "
-            "and so are all other requested accuracies: the plan would leave out everything, even the motion",
-            "ask for an accuracy below what the quantity does",
+            f"{accuracies[q.name]:.3g} {q.unit} exceeds its change ({sizes[q.name]:.3g} {q.unit}), "
+            "and so are all other requested accuracies: the plan would remove all effects, even the motion",
+            "request an accuracy below the change of the quantity",
         )
     return accuracies
 
@@ -159,9 +159,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     if search.fits(total, BY_BOUND):
         search.spend(total)
         for effect in free:
-            search.decide(
-                effect, False, BOUND, "its clearance cannot move the requested quantities by more", reach[effect.name]
-            )
+            search.decide(effect, False, BOUND, "its effect is below the budget", reach[effect.name])
         return
     shaken = any(effect.kind == FLEXIBILITY or effect.within for effect in runs.every)
     ordered = sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf))
@@ -237,7 +235,7 @@ def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effec
         total = _with_margin(together.influence)
         if search.fits(total):
             search.spend(total)
-            why = f"it bends too little to matter: {_vibrating(together)}"
+            why = f"its effect is below the budget: {_vibrating(together)}"
             for effect in soft:
                 search.decide(effect, False, RESPONSE, why, bending[effect.name])
             return
@@ -258,7 +256,7 @@ def _vibrating(estimated: Response) -> str:
     which = (
         "that vibration"
         if estimated.excited == estimated.first
-        else f"the first they excite, of {estimated.excited:.3g} Hz,"
+        else f"the first excited vibration, of {estimated.excited:.3g} Hz,"
     )
     size = f"{estimated.amplification:.2g} times its quasi-static value"
     return f"{first}, and the loads of the ideal motion take {which} to {size}"
@@ -309,7 +307,7 @@ def _others(search: Search) -> None:
             continue
         if small:
             search.spend(upper)
-        search.judge(effect, "what it does is small" if small else "", upper, sizes)
+        search.judge(effect, "its effect is below the budget" if small else "", upper, sizes)
 
 
 def _chosen(search: Search) -> Chosen:

@@ -214,7 +214,7 @@ def _report(run: Run) -> dict[str, float | int | str]:
     if run.switched:
         facts["switched"] = run.switched
     if redundant:
-        facts["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
+        facts["redundant_reactions"] = "one of many solutions: redundant closure rows carry no force"
     facts["warnings"] = "\n".join(warnings(run))
     if run.model.contacts:
         from flexclear.pipeline.dynamics.contact import validity

@@ -132,7 +132,7 @@ class Motions:
         i = self.model.mechanism.link_of[name]
         link, body = self.model.links[i], self.model.scene.body[name]
         if isinstance(body, RigidBody):
-            placement = link.places[name]
+            placement = link.placements[name]
             return self.link(i).at(placement.point(np.array(body.com)), placement.R)
         assert link.bundle is not None
         shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
@@ -181,7 +181,7 @@ class Motions:
         """Return the link of a named frame, and the frame's undeformed placement there."""
         frame = self.model.mechanism.frames[name]
         i = self.model.mechanism.link_of[frame.body]
-        return i, self.model.links[i].places[frame.body].of(frame.place)
+        return i, self.model.links[i].placements[frame.body].of(frame.placement)
 
 
 def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:

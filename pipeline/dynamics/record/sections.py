@@ -55,7 +55,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if isinstance(load, SampledPid):
             raise InputError(
                 f"[load.{name}]",
-                "a controller that samples counts its periods from the run's start, which sections repeat",
+                "a sampled controller counts its periods from the start of the run, which sections repeat",
                 "use a continuous 'pid' here",
             )
     period = section_period(scene)
@@ -106,13 +106,13 @@ def section_period(scene: Scene) -> float:
         raise InputError(
             "[sections.period]",
             f"a period of {period:.6g} s is longer than the run, which defines the laws for {span:.6g} s",
-            "let the run last a period at least",
+            "let the run last at least one period",
         )
     if not requested.phase < period:
         raise InputError(
             "[sections.phase]",
-            f"{requested.phase:.6g} s is no time within the period of {period:.6g} s",
-            "give a time from 0 to below the period",
+            f"{requested.phase:.6g} s is not within the period of {period:.6g} s",
+            "give a time from 0 to the period",
         )
     return period
 

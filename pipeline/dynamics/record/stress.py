@@ -66,7 +66,7 @@ def record(motions: Motions, names: tuple[str, ...]) -> Series:
     solids = {name: bundle for name, bundle in bundles.items() if bundle is not None and "stress_field" in bundle}
     for name in names:
         if name not in rods and name not in solids:
-            raise InputError("[output] stress", f"the bundle of '{name}' has no stresses", "make it with the scene")
+            raise InputError("[output] stress", f"the bundle of '{name}' has no stresses", "compute it from the scene")
     variables, coordinates, gauged = Variables(), dict[str, object](), dict[str, Gauged]()
     for those, made in ((rods, _of_rods), (solids, _of_solids)):
         if those:

@@ -88,7 +88,7 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
     beyond = list[tuple[str, list[str], float]]()  # bodies on the far side; +1 where they are the second body's
     for link in model.links:
         others = {name: _joined(model, name) for name in model.scene.joint if name not in known}
-        inner = [name for name, bodies in others.items() if link.places.keys() >= set(bodies)]
+        inner = [name for name, bodies in others.items() if link.placements.keys() >= set(bodies)]
         # a redundant joint between bodies of one link gets a zero wrench
         inside |= {name: (np.zeros((rows, 3)), np.zeros((rows, 3))) for name in inner}
         tree = dict[str, tuple[str, str]]()
@@ -100,7 +100,7 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
             far, sign = reached(b, rest), 1.0
             if any(model.scene.body[body].type == "ground" for body in far):
                 far, sign = reached(a, rest), -1.0
-            bodies = [body for body in link.places if body in far and body in model.mechanism.moving_bodies]
+            bodies = [body for body in link.placements if body in far and body in model.mechanism.moving_bodies]
             beyond += [(name, bodies, sign)] if bodies else []
     acting = [(_joined(model, joint), wrench) for joint, wrench in known.items()]
     places = {name: k for k, name in enumerate(motions.moving_bodies)}

@@ -111,7 +111,7 @@ def _with_drives(scene: Scene, requested: Mapping[str, PathDrive], names: list[s
         for name in (a for a in drive.actuators or () if a in names):
             where = f"[drive.{path}.actuators]"
             if name in others or name in made or name in scene.load:
-                raise InputError(where, f"something called '{name}' acts already", "name each actuator once")
+                raise InputError(where, f"the name '{name}' is already in use", "name each actuator once")
             joint, _, _ = _coordinate(scene, name, where)
             made[name] = JointDrive(joint=joint, coordinate=_named(name), law=Constant(type="constant"))
     return scene.model_copy(update={"drive": {**others, **made}})
@@ -146,7 +146,7 @@ def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], na
         raise InputError(
             where,
             f"{len(names)} actuators act on {rank} freedoms: their forces are not unique",
-            f'name {rank} of them, or ask for allocation = "least-norm"',
+            f'name {rank} of them, or choose allocation = "least-norm"',
         )
     pivots = qr(of_actuators.T, mode="r", pivoting=True)[1]
     return [name for k, name in enumerate(names) if k in pivots[:rank]]
@@ -160,7 +160,7 @@ def _rank(matrix: np.ndarray) -> int:
 def _closure_jacobian(engine: Engine) -> np.ndarray:
     """Return the rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
     model, columns = engine.model, _columns(engine)
-    rows = engine.view(m.ROWS.place).reshape(-1, m.ROWS.size)
+    rows = engine.view(m.ROWS.at).reshape(-1, m.ROWS.size)
     J = np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), model.nv + len(model.drives)))
     closures, entries, support = (model.arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
     for c in closures:
@@ -177,7 +177,7 @@ def _closure_jacobian(engine: Engine) -> np.ndarray:
 
 def _columns(engine: Engine) -> np.ndarray:
     """Return the twists of all columns after an evaluation, shape (columns, 6)."""
-    return engine.view(m.COLUMNS.place).reshape(-1, m.COLUMNS.size)
+    return engine.view(m.COLUMNS.at).reshape(-1, m.COLUMNS.size)
 
 
 def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:

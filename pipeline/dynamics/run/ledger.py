@@ -33,7 +33,7 @@ DOUBTFUL = 1e-2
 #: speed above which a run diverges [m/s]: a hundredth of that of light, where Newton's mechanics is off by 1e-4
 DIVERGED = 3e6
 #: remedy for an unbounded motion
-REMEDY = "a controller with a smaller gain or a shorter period, or a longer time constant of a load, keeps it bounded"
+REMEDY = "reduce the gain or the period of a controller, or increase the time constant of a load"
 #: steps over many vibrations leave up to half of this in the work of oscillating forces while the drives' speeds change
 LONG_STEPS, LONG_PER_RTOL = 2e-2, 50.0
 
@@ -179,7 +179,7 @@ def _require(model: Model, trajectory: Trajectory, result: Balance, exchanged: f
     first = int(np.argmax(~(result.error <= allowed)))
     raise SolverError(
         f"at t = {trajectory.time[first]:.6g} s: the energy balance{result.of} does not close: the error is up to "
-        f"{result.error[result.worst]:.3g} J where {result.exchanged:.3g} J are exchanged (tolerance {tolerance:g}, "
+        f"{result.error[result.worst]:.3g} J of {result.exchanged:.3g} J exchanged (tolerance {tolerance:g}, "
         f"[solver.ledger_tolerance]); lost so far: {_losses(model, result.totals, first)}; "
         "choose a smaller rtol or step, or another integrator"
     )

@@ -91,7 +91,7 @@ class Moment:
 
     def enter(self, engine: Engine) -> None:
         """Store the data in the work array."""
-        engine.view(m.Y)[:], engine.view(m.WATCH.place)[:] = self.y, self.watched
+        engine.view(m.Y)[:], engine.view(m.WATCH.at)[:] = self.y, self.watched
         engine.modes[:], engine.latched[:] = self.modes, self.latched
 
 

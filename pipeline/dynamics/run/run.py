@@ -198,7 +198,7 @@ def follow(
             done = stepping.integrate(engine, y, progress, stop, left, outputs, judge)
             return engine, done, "\n".join(reasons)
         except StiffError as stiff:
-            progress(None, f"{stiff}; going on with {heir}")
+            progress(None, f"{stiff}; continuing with {heir}")
             reasons.append(str(stiff))
             specialised, engine, left = engine.specialised, other(heir), stiff.handover
             engine.specialised.exact = specialised.exact
@@ -239,8 +239,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
             raise SolverError(at + "friction of ideal joints jams the mechanism in the recorded state")
         if seen.status[bad[0]] == m.SINGULAR:
             lost = (
-                "the recorded state is so close to a singular pose that nothing determines its accelerations and "
-                "forces: let the mechanism pass the pose at speed, or stop elsewhere"
+                "the recorded state is so close to a singular pose that accelerations and forces are "
+                "undetermined: let the mechanism pass the pose at speed, or stop elsewhere"
             )
         raise SolverError(at + lost)
     return seen

@@ -196,8 +196,8 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.length
     control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
-    engine.view(m.INDEPENDENCE.place)[:] = 0.0
-    for known in range(m.MEMORY, m.QUADRATURES.place + 1):  # of another run it would change this one's last bits
+    engine.view(m.INDEPENDENCE.at)[:] = 0.0
+    for known in range(m.MEMORY, m.QUADRATURES.at + 1):  # of another run it would change this one's last bits
         engine.view(known)[:] = 0.0
     control[m.FIXED], control[m.PARAMETER] = solver.step or 0.0, engine.method.parameter(solver)
     n[m.STATUS : m.INTEGERS] = 0
@@ -232,7 +232,7 @@ def _leave_singular_start(engine: Engine, tape: Tape) -> None:
 def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
     """Begin the contacts that are closed at the start, at the approach speeds that the scene declares."""
     n, watched, event = engine.n, engine.table(m.WATCH), m.named(m.EVENT, events)[:, 0]
-    engine.view(m.WATCH.place)[:] = 0.0
+    engine.view(m.WATCH.at)[:] = 0.0
     for c in overlapping(engine, y):
         speed = engine.model.contacts[c].joint.initial_approach_speed
         if speed is None:
@@ -339,7 +339,7 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
 def _hand_over(engine: Engine, tape: Tape) -> Handover:
     """Return the handover of a paused integration to another method."""
     n = engine.n
-    here = Moment.of(engine, engine.view(m.WATCH.place), tape.events[: n[m.N_EVENTS]].copy())
+    here = Moment.of(engine, engine.view(m.WATCH.at), tape.events[: n[m.N_EVENTS]].copy())
     recorded = replace(tape, rows=tape.rows[: n[m.N_RECORDED]].copy())
     return Handover(here, n[m.STATUS : m.INTEGERS].copy(), engine.control[LASTING], recorded)
 

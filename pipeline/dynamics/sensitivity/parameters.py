@@ -53,7 +53,7 @@ class Family:
     def parameter(self, path: str) -> Parameter:
         """Return the number at a key path; raise InputError for anything else, or a number that the motion ignores."""
         if path.partition(".")[0] not in FAMILIES:
-            raise InputError(path, f"is no number of a part ({', '.join(FAMILIES)})", "name one, as joint.A1.clearance")
+            raise InputError(path, f"is not a number of {', '.join(FAMILIES)}", "name one, as joint.A1.clearance")
         return Parameter(path, *number_at(self.scene, path))
 
     def changed(self, parameter: Parameter, amount: float) -> Engine:
@@ -64,7 +64,7 @@ class Family:
         edited = with_numbers(self.scene, {parameter.path: parameter.changed(amount)})
         engine, _ = engines_alike(self.engine, edited, self.bundles)
         if not np.array_equal(engine.model.arrays.h, self.engine.model.arrays.h):
-            raise InputError(parameter.path, "changes how the mechanism is built, not only its numbers", "leave it out")
+            raise InputError(parameter.path, "changes the structure of the mechanism, not only numbers", "leave it out")
         return engine
 
     def direction(self, parameter: Parameter) -> Direction:

@@ -23,9 +23,9 @@ from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Loop, Sym
 #: largest number of operations of a tangent per operation of its tape
 LONGEST_TANGENT = 8
 #: work arrays in w, besides the state, with given changes
-GIVEN = {m.LAW.place, m.LATCHED}
+GIVEN = {m.LAW.at, m.LATCHED}
 #: work arrays in w, besides the rates, with stored changes
-STORED = {m.TOUCH.place}
+STORED = {m.TOUCH.at}
 
 
 def tangent(program: Program, longest: int) -> Program:

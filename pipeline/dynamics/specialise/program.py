@@ -23,8 +23,8 @@ from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 #: the processor's first caches; and the limit for tangents, for which kernels are no alternative
 LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
 #: arrays of w that the steps read after an evaluation; for ROW_SCALE and SCHUR see `_kept`
-KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, topologies.RATES}
-KEPT |= {m.NAMED[watched].place for watched in ("bends", "bearing")}
+KEPT = {m.TOUCH.at, m.LOAD_BENDS.at, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, topologies.RATES}
+KEPT |= {m.NAMED[watched].at for watched in ("bends", "bearing")}
 #: integers of n that are stored
 REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
@@ -61,7 +61,7 @@ def _stores(array: str, values: dict[int, Any], kept: Callable[[int], bool] = la
 
 def _kept(h: list[int]) -> Callable[[int, int], bool]:
     """Return the test whether an index is read after an evaluation: of the factor of J M^-1 J^T only its diagonal."""
-    o = h[m.CLOSURE_ENVELOPE.place]
+    o = h[m.CLOSURE_ENVELOPE.at]
     diagonal = {h[o + m.CLOSURE_ENVELOPE.size * r + m.CLOSURE_ENVELOPE.origin] + r for r in range(h[m.N_KEPT_ROWS])}
 
     def kept(stretch: int, index: int) -> bool:

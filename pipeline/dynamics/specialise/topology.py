@@ -43,7 +43,7 @@ def header(topology: Topology) -> list[int]:
     """Return the array h of a topology, with work array numbers in place of all offsets in f and w."""
     h = [*topology[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
     for table, rows in zip(m.TABLES["h"], topology[1:], strict=True):
-        h[table.place] = len(h)
+        h[table.at] = len(h)
         h += rows
     return h
 
@@ -60,7 +60,7 @@ def start(stretch: int) -> int:
 
 def ground(h: list[int]) -> dict[int, Any]:
     """Return the entries of w for the ground, which no kernel changes: its frame, at rest, and zero inertia."""
-    frame, own = h[m.LINK_FRAMES.place], h[m.OWN.place]
+    frame, own = h[m.LINK_FRAMES.at], h[m.OWN.at]
     axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
     return {
         **{index: 0.0 for index in range(frame, frame + m.FRAME.size)},

@@ -24,7 +24,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     Raises InputError for a scene that cannot be built, SolverError without an equilibrium close to its poses.
     """
     bench, rest, _ = balanced(placed(scene), bundles, progress)
-    progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
+    progress(None, f"starts at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
     rest_state = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
     return rest_state, bench.engine.model.mechanism.choice
 

@@ -68,8 +68,8 @@ def placed(scene: Scene) -> Scene:
     if scene.contacts() and not loose(scene):
         raise InputError(
             "[start.at]",
-            f"is 'ideal', but of {', '.join(scene.contacts())} none has an ideal counterpart, as pins and balls do",
-            "leave it out, and place the bodies by poses or [start.joint]",
+            f"is 'ideal', but none of {', '.join(scene.contacts())} has an ideal counterpart, as pins and balls have",
+            "remove it, and give poses or [start.joint]",
         )
     joints = scene.joint | {
         name: IdealJoint.model_validate({"type": WITHOUT_CLEARANCE[joint.type], "between": joint.between})
@@ -162,8 +162,8 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
             return y
         y = _move_pins(engine, y, pins, np.concatenate(missing), modal)
     raise SolverError(
-        f"at t = {engine.start:.6g} s: the pins cannot be put where their joints' forces press them; "
-        "give poses and velocities instead of [start] at = 'ideal'"
+        f"at t = {engine.start:.6g} s: the pins cannot reach their pressed positions; give "
+        "poses and velocities instead of [start] at = 'ideal'"
     )
 
 

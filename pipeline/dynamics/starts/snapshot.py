@@ -34,7 +34,7 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         if isinstance(body, Ground):
             bodies[name] = body
             continue
-        placement, frame = model.links[i].places[name], frames[i]
+        placement, frame = model.links[i].placements[name], frames[i]
         p = frame["origin"] + frame["axes"] @ placement.p + model.mechanism.origin
         quaternion = matrix_to_quaternion(frame["axes"] @ placement.R)
         pose = Pose(position=tuple(_given(p)), quaternion=tuple(_given(quaternion)))

@@ -24,14 +24,14 @@ UNKNOWN = Point({}, {}, {}, 0, "not run")
 #: ratio of an axis's limits below which it has ticks between the powers of ten
 FEW = 30.0
 #: labels of the chart's bars
-LEGEND = {"dropped": "taken away", "added": "put in alone"}
+LEGEND = {"dropped": "removed", "added": "added alone"}
 #: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
 WHISKER = 0.9
 #: variables of the dataset, and their meaning
 MEANINGS = {
-    "dropped": "what the quantity loses when the effect, or both, are taken from the full scene",
-    "added": "what it gains when the effect, or both, are put into the bare scene, what it lies within being there",
-    "interaction": "what two effects do to the bare scene together beyond the sum of what each does alone",
+    "dropped": "change of the quantity when the effect, or both effects, are removed from the full scene",
+    "added": "change when the effect, or both, are added to the bare scene (friction: with its clearance)",
+    "interaction": "change by both effects together in the bare scene minus the sum of their single changes",
 }
 
 
@@ -99,7 +99,7 @@ def assemble(
     )
     for name, text in MEANINGS.items():
         result[name].attrs = {"long_name": text}
-        result[f"{name}_uncertainty"].attrs = {"long_name": f"{text}: what of it may be chance"}
+        result[f"{name}_uncertainty"].attrs = {"long_name": f"{text}: part that may be due to chance"}
     refused = {"+".join(sorted(gone)) or "full": p.refused for gone, p in points.items() if p.refused}
     return result.assign_attrs(refused="\n".join(f"without {gone}: {why}" for gone, why in refused.items()))
 
@@ -138,14 +138,14 @@ def table(dataset: xr.Dataset) -> Table:
             cells = [cell(dataset, name, (i, i, k), unit) for name in ("dropped", "added")]
             rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
     notes = [
-        "Dropped: largest change of the quantity over the run when the effect is taken from the full scene. Added: "
-        "when it is put into the bare one (friction: into the one with its clearance). Interaction: what it does "
-        "together with the effect named, beyond the sum of both.",
-        "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
+        "Dropped: largest change of the quantity over the run when the effect is removed from the full scene. Added: "
+        "when it is added to the bare scene (friction: to the one with its clearance). Interaction: change by both "
+        "effects together minus the sum of their single changes.",
+        "For runs with contacts, the number after ± may be due to chance (Student's t of the members' means).",
     ]
     notes += [f"Refused: {line}" for line in filter(None, dataset.attrs["refused"].split("\n"))]
     columns = ("quantity", "effect", "dropped", "added", "interaction", "with")
-    return Table("What each effect does", columns, tuple(rows), tuple(notes))
+    return Table("Effect sizes", columns, tuple(rows), tuple(notes))
 
 
 def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
@@ -169,7 +169,7 @@ def written(value: float, uncertainty: float, unit: str) -> str:
     if np.isnan(value):
         return "–"
     if np.isinf(value):
-        return "not the same events"
+        return "other events"
     return measured(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
 
 

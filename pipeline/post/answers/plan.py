@@ -19,14 +19,14 @@ from flexclear.pipeline.post.plotting.table import Table
 #: variables of a plan; those of quantities are in the unit of each
 PLAN: Schema = described("""
 influence | effect quantity | | estimated influence of the effect on the quantity, in the quantity's unit
-uncertainty | effect quantity | | what the estimate may be wrong by
+uncertainty | effect quantity | | uncertainty of the estimate, in the quantity's unit
 kept | effect | | 1: the planned scene has the effect
-evidence | effect | | what the decision rests on
+evidence | effect | | evidence of the decision
 reason | effect | | the decision in words
 requested | quantity | | requested accuracy
 integration | quantity | | estimated error of the planned run's integration, and of the modes that it leaves out
 elements | body | | finite elements of the body
-elements_called_for | body | | finite elements that the requested accuracy calls for
+elements_called_for | body | | finite elements that the requested accuracy requires
 mesh_frequency_error | body | | largest error of a retained frequency due to the mesh, as a fraction
 mesh_compliance_error | body | | largest error of the frames' compliance due to the mesh, as a fraction
 mesh_error | body quantity | | estimated error of the quantity due to the body's mesh, at most, in the quantity's unit
@@ -113,21 +113,19 @@ def table(planned: xr.Dataset) -> Table:
     rows.append(("requested", "", *requested, "", ""))
     decided = json.loads(planned.attrs["planned"])
     notes = [words(planned)]
-    notes += [
-        f"{name} keeps {count} of its modes, which do the same as all." for name, count in decided["modes"].items()
-    ]
+    notes += [f"{name} retains {count} of its modes, which suffice." for name, count in decided["modes"].items()]
     notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
     if decided["uncoupled"]:
         notes.append(
-            f"Not integrated, since nothing couples it to the requested quantities: {listed(decided['uncoupled'])}."
+            f"Not integrated, since the requested quantities do not depend on it: {listed(decided['uncoupled'])}."
         )
     notes += _constant(decided)
     notes.append(
-        f"{_integrated(decided)} The plan rests on {planned.attrs['runs']} short runs, "
+        f"{_integrated(decided)} The plan is based on {planned.attrs['runs']} short runs, "
         f"{planned.attrs['evaluations']:,} evaluations."
     )
     return Table(
-        "What the requested accuracy calls for",
+        "Effects that the requested accuracy requires",
         ("effect", "decision", *names, "evidence", "why"),
         tuple(rows),
         tuple(notes),
@@ -146,7 +144,7 @@ def _constant(decided: Mapping[str, Any]) -> list[str]:
 def _integrated(decided: Mapping[str, Any]) -> str:
     """Return a sentence on integrator and tolerance of the planned run."""
     if "integrator" not in decided:
-        return "No other way to run the scene is cheaper and as accurate as requested: it stays as it is."
+        return "No other integrator or tolerance is cheaper and as accurate as requested: the scene's own is used."
     return f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}."
 
 
@@ -160,15 +158,15 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
     ]
     frequency, compliance = (100.0 * float(part[f"mesh_{of}_error"]) for of in ("frequency", "compliance"))
     head = (
-        f"{part['body'].item()} has {given} finite elements, which err by {frequency:.2g} % in a frequency and "
+        f"{part['body'].item()} has {given} finite elements; errors: {frequency:.2g} % in a natural frequency, "
         f"{compliance:.2g} % in compliance"
     )
     if not errors:
-        return f"{head}; what that does to the requested quantities cannot be determined."
-    text = f"{head}, and so change {listed(errors)}"
+        return f"{head}; the effect on the requested quantities cannot be determined."
+    text = f"{head}, which change {listed(errors)}"
     if called > given:
-        return f"{text}: the requested accuracy calls for {called}."
-    return f"{text}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
+        return f"{text}: the requested accuracy requires {called}."
+    return f"{text}: enough; {called} suffice. Elements cost no time in a run, so the recipe is unchanged."
 
 
 def words(planned: xr.Dataset) -> str:
@@ -176,11 +174,11 @@ def words(planned: xr.Dataset) -> str:
     needed, unseen, gone = _sorted(planned)
     asked = " and ".join(str(name) for name in planned["quantity"].values)
     if not needed and not unseen:
-        return f"For {asked} as requested nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
-    left = f"{listed(gone)} may be left out" if gone else "nothing may be left out" if not unseen else ""
-    parts = [f"{listed(needed)} must stay" if needed else "", left]
-    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} unchanged without a run" if unseen else ""]
-    return f"For {asked} as requested {'; '.join(filter(None, parts))}."
+        return f"For the requested accuracy of {asked} the ideal mechanism suffices: {listed(gone)} may be omitted."
+    left = f"{listed(gone)} may be omitted" if gone else "nothing may be omitted" if not unseen else ""
+    parts = [f"{listed(needed)} must be modelled" if needed else "", left]
+    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} modelled unexamined" if unseen else ""]
+    return f"For the requested accuracy of {asked}: {'; '.join(filter(None, parts))}."
 
 
 MET, MET_TO_HORIZON, MISSED, UNDECIDED = "met", "met to the horizon", "missed", "not decided"
@@ -222,10 +220,10 @@ def verified(planned: xr.Dataset) -> Table:
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
         f"{int(planned.attrs['planned_evaluations']):,} as planned"
         + (f", of {planned.attrs['members']} members each." if planned.attrs["members"] else "."),
-        "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
+        "For runs with contacts, the number after ± may be due to chance (Student's t of the members' means).",
     ]
     return Table(
-        "The plan next to the full scene", ("quantity", "requested", "true error", "verdict"), tuple(rows), tuple(notes)
+        "The plan against the full scene", ("quantity", "requested", "true error", "verdict"), tuple(rows), tuple(notes)
     )
 
 
@@ -239,7 +237,7 @@ def _verdict(planned: xr.Dataset, k: int) -> str:
     one, unit = agreement_of(planned, k), str(planned["unit"].values[k])
     result, reasons = verdict(one), list[str]()
     if result == MISSED:
-        return f"missed, {one.error / one.allowed:.2g} times" if one.allowed else result
+        return f"missed, {one.error / one.allowed:.2g} times the allowed error" if one.allowed else result
     if one.horizon < 1.0:
         reasons.append(
             f"beyond {one.horizon:.0%} of the time single runs of the full scene scatter by "
@@ -266,13 +264,13 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
         method = f"{text['integrator']}, rtol {text['rtol']:.0e}" if "integrator" in text else "as the scene"
         rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
     return Table(
-        "What accuracy calls for",
-        ("accuracy", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
+        "Effects that each accuracy requires",
+        ("accuracy", "needed", "unexamined", "may be omitted", "modes", "integrated by"),
         tuple(rows),
         (
             "Each accuracy is that of all watched quantities, of positions and angles a fraction of the largest change "
             "from the start, of others of the largest value; name one in [accuracy] to get its planned scene. "
-            "Unchanged without a run: leaving the effect out would save no time worth the runs that measure its size.",
+            "Unexamined: omitting the effect would save less time than the runs that measure its size.",
             *constant,
         ),
     )

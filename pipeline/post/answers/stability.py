@@ -21,7 +21,7 @@ LOOPS = 1e-6
 ROUNDING = 1e-15
 #: largest disagreement with runs at other tolerances and by other methods, as a fraction of each quantity's size
 AGREEMENT = 0.01
-#: largest fractions of rejected steps, and of steps that stability shortens
+#: largest fractions of rejected steps, and of steps limited by stability
 REJECTED, STIFF = 0.3, 0.3
 #: condition number of the closures above which a singular pose is near
 CONDITION = 1e6
@@ -41,7 +41,7 @@ class Check:
     @property
     def verdict(self) -> str:
         """Verdict in words."""
-        return "good" if self.good else "look here"
+        return "good" if self.good else "note"
 
     @property
     def advice(self) -> str:
@@ -122,8 +122,8 @@ def _rejected(run: xr.Dataset) -> Check:
 def _stiff(run: xr.Dataset, by_need: bool) -> Check:
     fraction, chosen = float(run.attrs.get("stiff_share", 0.0)), by_need or "method_reason" in run.attrs
     limit = "none: the integrator was chosen by its cost" if chosen else f"{100.0 * STIFF:g} %"
-    remedy = "leave [solver] integrator out, or name an implicit one"
-    name = "steps that stability shortens"
+    remedy = "remove [solver] integrator, or choose an implicit one"
+    name = "steps limited by stability"
     return Check(name, f"{100.0 * fraction:.2g} %", limit, chosen or fraction < STIFF, remedy)
 
 
@@ -149,7 +149,7 @@ def _predictable(run: xr.Dataset, members: float | None) -> list[Check]:
             f"up to t = {horizon:.4g} s",
             f"{end:.4g} s, the end",
             horizon >= end,
-            "means over members beyond it: [ensemble]",
+            "beyond it, means over members: [ensemble]",
         )
     ]
 
@@ -162,9 +162,9 @@ def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -
     text = (
         f"Yes: all {len(result)} checks hold."
         if all(check.good for check in result)
-        else "The integration is stable: every check of it holds."
+        else "The integration is stable: all its checks hold."
         if not bad
-        else "Not in everything: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
+        else "Not in all checks: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
     )
     if "horizon" in run:
         text += " " + sentence(float(run["horizon"]), float(run["time"][-1]), members)
@@ -179,7 +179,7 @@ def figure(run: xr.Dataset) -> dict[str, bytes]:
         panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, drift, LOOPS))
     if "separation" in run:
         times, values = run["separation_time"].values, run["separation"].values
-        panels.append(("separation of a perturbed run", "fraction of each motion", times, values, SEPARATED))
+        panels.append(("distance of a perturbed run", "fraction of each motion", times, values, SEPARATED))
     with style.style():
         figure, axes = style.grid(1, len(panels), (3.6 * len(panels), 2.9))
         for axis, (title, label, time, values, limit) in zip(axes.ravel(), panels, strict=True):

@@ -12,7 +12,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.matters import in_words
+from flexclear.pipeline.post.answers.effect_ranking import in_words
 from flexclear.pipeline.post.answers.stability import ENERGY, lost_energy
 from flexclear.pipeline.post.overview.curves import impacts, measured
 from flexclear.pipeline.post.single_run.series import parameters, sentence
@@ -30,7 +30,7 @@ def answer(
     """Return a list of sentences, as HTML.
 
     compared: of `overview.comparison`, the ideal counterpart first and the scene last; or None. run: schema RUN of the
-    scene.  warnings: of the run.  changes: sentences of `post.answers.matters` on the differences from the ideal
+    scene.  warnings: of the run.  changes: sentences of `post.answers.effect_ranking` on the differences from the ideal
     mechanism; they replace those from two runs alone.  members: horizon of the scene's ensemble [s], or None.
     """
     sentences = [] if compared is None else [*changes] or _effects(compared)
@@ -53,7 +53,7 @@ def _effects(compared: xr.Dataset) -> list[str]:
         difference, error = float(last["difference"][j]), float(first["error"][j]) + float(last["error"][j])
         if np.isfinite(difference):
             unit = str(compared["unit"].values[j])
-            text = f"differs by <b class='n'>{measured(difference, np.nan, unit)}</b>; how exact that is is not known"
+            text = f"differs by <b class='n'>{measured(difference, np.nan, unit)}</b>; its error is unknown"
             if np.isfinite(error):
                 size = float(first["largest"][j])
                 text = in_words(Influence(difference, error), size, unit, of="the ideal mechanism")
@@ -80,7 +80,7 @@ def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
         return []
     end, horizon = float(run["time"].values[-1]), float(run["horizon"])
     later = (
-        " Later values are those of this one run; use averages over several runs (<code>[ensemble]</code>) there."
+        " Later values hold for this run only; use averages over several runs (<code>[ensemble]</code>)."
         if min(horizon, end if members is None else members) < end
         else ""
     )

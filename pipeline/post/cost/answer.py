@@ -44,7 +44,7 @@ def _own(study: xr.Dataset) -> str:
     whole = horizon == "none" or horizon >= study.attrs["end"]
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
-        return f"{took} Its error cannot be said: other runs{until} have another number of impacts."
+        return f"{took} Its error is unknown: other runs{until} have another number of impacts."
     return f"{took} Its largest error at the outputs{until} is {error:.1e} of the {of}."
 
 
@@ -79,8 +79,8 @@ def _cause(study: xr.Dataset) -> str:
     size = f"{known[first]:.0e} of a quantity's size" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
     missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
-    unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
-    helps = ", which the root finder bounds" if first == "event location" else f"; what helps is {CAUSES[first]}"
+    unseen = f" Not examined: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
+    helps = ", which the root finder bounds" if first == "event location" else f"; remedy: {CAUSES[first]}"
     return f"The largest cause of error is {first} ({size}{rest}){helps}.{unseen}"
 
 
@@ -88,7 +88,7 @@ def undone(study: xr.Dataset) -> list[str]:
     """Return a sentence for each reason why runs were skipped."""
     reasons = {
         "undone": "Not run within the budget",
-        "given_up": "Not run, since their method used up its evaluations at a tolerance no tighter",
+        "given_up": "Not run, since their method reached the limit of evaluations at the same or a looser tolerance",
     }
     return [f"{text}: {study.attrs[name]}." for name, text in reasons.items() if study.attrs.get(name)]
 
@@ -165,9 +165,7 @@ def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     choices = {target: cheapest(study, target) for target in TARGETS}
     met = {target: choice for target, choice in choices.items() if choice is not None}
     text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in met.items())
-    parts = [
-        f"{text}." if met else "None of the accuracies asked for can be had for all quantities; see the tables below."
-    ]
+    parts = [f"{text}." if met else "No requested accuracy can be reached for all quantities; see the tables below."]
     if met:
         parts += [_digits(met)]
     parts += [_some(study, target) for target in TARGETS if target not in met]
@@ -180,7 +178,9 @@ def _some(study: xr.Dataset, target: float) -> str:
     names = [str(name) for name in study["quantity"].values]
     able = [name for name in names if cheapest(study.sel(quantity=[name]), target) is not None]
     unable = ", ".join(name for name in names if name not in able)
-    return f"{target:g} can be had for {', '.join(able)}, not for {unable}." if able else f"{target:g} cannot be had."
+    return (
+        f"{target:g} is possible for {', '.join(able)}, not for {unable}." if able else f"{target:g} is not possible."
+    )
 
 
 def _digits(met: Mapping[float, Choice]) -> str:
@@ -196,10 +196,10 @@ def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     horizon, end = study.attrs["horizon"], study.attrs["end"]
     if horizon == "none" or horizon >= end:
         return ""
-    beyond = "the means of an ensemble, below, which more members make better and tighter tolerances do not"
+    beyond = "the means of an ensemble (below), which more members improve and tighter tolerances do not"
     if not any("Beyond the horizon" in table for table in tables):
-        beyond = "an ensemble, which the scene can ask for (`[ensemble]`)"
-    return f"All this holds up to t = {horizon:.3g} s of {end:.3g} s; beyond that nothing but {beyond}."
+        beyond = "an ensemble, which the scene can request (`[ensemble]`)"
+    return f"All this holds up to t = {horizon:.3g} s of {end:.3g} s; beyond that use only {beyond}."
 
 
 def _limits(study: xr.Dataset) -> str:
@@ -256,7 +256,7 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
 
 def _absent(study: xr.Dataset) -> str:
     """Return the words for an accuracy that no run of a study has."""
-    return "cannot be had" if study.attrs.get("complete", 1) else "not reached yet"
+    return "cannot be reached" if study.attrs.get("complete", 1) else "not reached yet"
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,7 +318,7 @@ def _notes(study: xr.Dataset) -> list[str]:
     ]
     if recorded == recorded:
         notes.append(
-            f"CPU is that of the integration; the record of a run takes {recorded:.2g} s more, whatever the way."
+            f"CPU is that of the integration; the record of a run takes {recorded:.2g} s more with every integrator."
         )
     missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
     if missing:
@@ -340,11 +340,11 @@ def _confirmed(study: xr.Dataset) -> str:
     uncertain, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
     reference = f"Reference: {study.attrs['reference']}. "
     if not by:
-        return f"{reference}Not confirmed: no other run was made."
+        return f"{reference}Not confirmed: there is no second run."
     if np.isnan(uncertain).any():
         return f"{reference}Not confirmed: {by} was refused."
     if np.isinf(uncertain).any():
-        return f"{reference}Not confirmed: {by} finds another number of impacts."
+        return f"{reference}Not confirmed: {by} has another number of impacts."
     worst = str(study["quantity"].values[int(np.argmax(uncertain))])
     return f"{reference}Confirmed by {by}, which differs by at most {uncertain.max():.1e} ({worst})."
 
@@ -358,8 +358,8 @@ def _why_not(study: xr.Dataset) -> str:
     if best is NOTHING:
         return "every run is refused, or has another number of impacts than the reference"
     if best.error <= ROUNDED * float(uncertain.sel(quantity=best.worst)):
-        agree = f"the reference and its confirmation, the tightest runs that were made, differ as much ({best.worst})"
+        agree = f"the reference and its confirmation, the tightest runs, differ as much ({best.worst})"
         if not study.attrs.get("complete", 1):
             return f"{agree}; a larger budget allows tighter ones"
-        return f"{agree}; rounding errors, which the motion itself magnifies, decide there, and no method helps"
-    return f"the best setting that was tried reaches {best.error:.1e} ({best.worst})"
+        return f"{agree}; rounding errors, which the motion magnifies, limit the accuracy of every method"
+    return f"the best setting tested reaches {best.error:.1e} ({best.worst})"

@@ -101,7 +101,7 @@ def _bar(ax: Axes, row: int, causes: Mapping[str, float]) -> None:
     text = ", ".join(f"{cause} {known[cause]:.1e}" for cause in first)
     if infinite:
         text = fill(f"{OTHER} by {', '.join(infinite)}", LETTERS)
-    ax.text(1.02, row, text or "no error to be seen", va="center", fontsize=7.5, color=INK)
+    ax.text(1.02, row, text or "no visible error", va="center", fontsize=7.5, color=INK)
 
 
 #: half the width of a normal distribution's 95 % interval, in standard deviations

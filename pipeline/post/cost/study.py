@@ -37,7 +37,7 @@ cpu_seconds | | s | processor time of the integration of a warm run, median of t
 cpu_spread | | s | largest minus smallest processor time of the repeats
 recording_seconds | | s | processor time of its record: rows and dataset
 evaluations | | 1 | right-hand sides evaluated
-peak_memory | | B | largest resident memory of the process that made the run
+peak_memory | | B | largest resident memory of the process of the run
 compile_seconds | | s | time to build and fetch or compile the kernels, not part of the run
 """)
 #: other variables of a run in a study
@@ -67,9 +67,7 @@ def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chos
     accepted = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
     if not accepted:
         reasons = "; ".join(dict.fromkeys(_reason(runs[p.key]) for p in points if "refused" in runs[p.key].attrs))
-        raise SolverError(
-            f"no run with chosen steps could be made, so that there is nothing to compare with: {reasons}"
-        )
+        raise SolverError(f"no run with adaptive steps succeeded, so that no reference exists: {reasons}")
     best = min(accepted, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
     others = [p for p in accepted if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
     others = others or [p for p in accepted if p is not best]
@@ -91,8 +89,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     reference = runs[next(p.key for p in points if p.group == "reference")]
     if "refused" in reference.attrs:
         raise SolverError(
-            f"nothing to compare with: the reference ({_described(points, 'reference')}) is refused: "
-            f"{reference.attrs['refused']}"
+            f"no comparison: the reference ({_described(points, 'reference')}) is refused: {reference.attrs['refused']}"
         )
     until = comparable_until(points, runs)
     scales = {q: quantities.scale(reference, q) for q in chosen}

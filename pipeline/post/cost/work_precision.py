@@ -155,5 +155,5 @@ def _legend(figure: Figure, own: list[Curve], others: Sequence[Curve], marks: tu
 def _subtitle(study: xr.Dataset) -> str:
     horizon = study.attrs["horizon"]
     span = "over the whole run" if horizon == "none" else f"up to the horizon, t = {horizon:.4g} s"
-    text = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
+    text = f"shaded: less than {MARGIN:g} times the difference between the reference and its confirmation"
     return f"errors {span}, relative to each quantity's size; {text}"

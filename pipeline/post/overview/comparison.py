@@ -157,19 +157,19 @@ def table(compared: xr.Dataset) -> Table:
             against = "reference" if i == 0 else _difference(compared, i, j, unit)
             rows.append((str(name), label, in_unit(float(part["largest"]), unit), _own(error, unit), against))
     notes = [
-        "Own error: the largest difference between this run and the same run at a hundred times tighter tolerance "
+        "Own error: the largest difference between this run and the same run at a 100 times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "
         "times that both have; for forces and velocities also that of their peaks between output times. The number "
         "after ± is the sum of both runs' own errors."
     ]
     end = float(compared["time"].values[-1])
     notes += [
-        f"{label}: {sentence(float(horizon), end)} Later values are those of this run only."
+        f"{label}: {sentence(float(horizon), end)} Later values hold for this run only."
         for label, horizon in zip(labels, compared["horizon"].values, strict=True)
         if horizon < end
     ]
     columns = ("quantity", "run", "largest", "own error", "difference")
-    return Table("Differences, and the error of each run", columns, tuple(rows), tuple(notes))
+    return Table("Differences from the reference, and the error of each run", columns, tuple(rows), tuple(notes))
 
 
 def costs(compared: xr.Dataset) -> Table:
@@ -246,7 +246,7 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
         if any(len(curve.peaks) for _, lines in drawn for curve in lines if curve is not None):
             axes[0, 0].plot([], [], ".", color=style.INK, label="peak of a contact shorter than the outputs show")
         style.shared_legend(figure, axes[0, 0], min(len(runs), 3), pale)
-        style.heading(figure, "Runs next to each other", f"right: distance from {next(iter(runs))}")
+        style.heading(figure, "Runs side by side", f"right: distance from {next(iter(runs))}")
         files = style.files(name, figure)
         return files | _orbits(f"{name}_contacts", runs)
 

@@ -182,7 +182,7 @@ ROUNDING = {"m": 1e-13, "m/s": 1e-13, "N": 1e-11, "N m": 1e-11}
 def impacts(count: int, closed: float = 0.0) -> str:
     """Return the number of impacts in words; closed: fraction of the time in contact."""
     text = "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
-    return f"{text}; the contact hardly opens ({closed:.0%} of the time closed)" if closed >= CLOSED else text
+    return f"{text}; the contact is closed most of the time ({closed:.0%})" if closed >= CLOSED else text
 
 
 def noise(run: xr.Dataset, values: np.ndarray, unit: str) -> float:

@@ -139,7 +139,7 @@ def _watched(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
     for line in (line for quantity in others for line in curves([run], quantity) if line is not None):
         factor, unit = by_unit({"": line.values}, line.unit)
         panels.append((f"{line.title} ({unit})", {"": (factor * line.values, {"lw": 0.9})}))
-    heading = ("Watched quantities", "of vectors without a component: the magnitude, or the component named")
+    heading = ("Watched quantities", "vectors: the magnitude, or the component in the name")
     return _sheet("watched", run["time"].values, panels, 1, heading, width=8.0) if panels else {}
 
 
@@ -161,7 +161,7 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
     for k, name in enumerate(drives):
         title = f"{name}: drive ({quantities.unit(run, Quantity(name, 'drive_force'))})"
         panels.append((title, {"": (run["drive_force"].values[:, k], {"color": "#D55E00", "lw": 0.9})}))
-    below = "magnitude of the force that a joint transmits"
+    below = "magnitude of the joint force"
     return _sheet(
         "reactions", run["time"].values, panels, 2, (f"Reactions and drives{_rest(len(names), JOINTS)}", below)
     )
@@ -264,7 +264,7 @@ def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
     time = 1e3 * run["time"].values
     for k, (row, name) in enumerate(zip(axes, names, strict=True)):
         row[0].plot(time, run["wear_load_path"].values[:, k], color=style.INK)
-        row[0].set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=f"{name}: normal force times way (N m)")
+        row[0].set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=f"{name}: force times sliding distance (N m)")
         for panel, side, what in zip(row[1:], ("outer", "inner"), ("socket or journal", "ball or pin"), strict=True):
             sectors = int(post["wear_sectors"].values[k])
             depth = post[f"wear_depth_{side}"].values[k].max(axis=0)[:sectors]
@@ -272,7 +272,7 @@ def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
             edges = np.linspace(0.0, 360.0, sectors + 1)
             panel.stairs(factor * depth, edges, fill=True, color="#D55E00")
             panel.set(xlim=(0.0, 360.0), xlabel="angle about z of its frame (°)", xticks=range(0, 361, 90))
-            panel.set_title(f"depth if the {what} alone wears ({unit})")
+            panel.set_title(f"wear depth if only the {what} wears ({unit})")
     more = _rest(post.sizes["worn"], CONTACTS)
     style.heading(figure, f"Wear of contacts{more}", "Archard's law with the coefficient and hardness of the scene")
     return style.files("wear", figure)

@@ -101,7 +101,7 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
         "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width, initial-scale=1'><link rel='icon' href='data:,'>"
         f"<title>{html.escape(title)}</title><style>{asset('page.css')}</style></head>\n<body>"
-        f"<a class='skip' href='#main'>To the content</a><main id='main'><h1>{html.escape(title)}</h1>\n"
+        f"<a class='skip' href='#main'>Skip to the content</a><main id='main'><h1>{html.escape(title)}</h1>\n"
         f"{below}{top}{contents}{body}</main>{''.join(f'<script>{text}</script>' for text in scripts)}</body></html>\n"
     )
     return text.encode()

@@ -73,7 +73,7 @@ def strongest(run: xr.Dataset) -> np.ndarray:
 def speed_text(slower: float) -> str:
     """Return the speed in words."""
     if 0.95 < slower < 1.05:
-        return "as fast as it is"
+        return "real time"
     return f"{slower:.2g} times slower" if slower > 1.0 else f"{1.0 / slower:.2g} times faster"
 
 

@@ -264,7 +264,7 @@ def _distinct(points: Sequence[np.ndarray], same: float) -> np.ndarray:
 def read(path: Path, unit: float) -> Surface:
     """Return the surface in a file that meshio reads; tetrahedra and hexahedra give their boundary."""
     remedy = "give an STL, VTK, PLY or OBJ file"
-    mesh = read_mesh(path, f"{path}", "is no surface that can be drawn", remedy, LARGEST_FILE)
+    mesh = read_mesh(path, f"{path}", "is not a surface that can be drawn", remedy, LARGEST_FILE)
     faces = []
     for block in mesh.cells:
         if block.type in ("triangle", "quad"):
@@ -277,9 +277,9 @@ def read(path: Path, unit: float) -> Surface:
     points[:, : mesh.points.shape[1]] = unit * mesh.points
     triangles = np.concatenate(faces)
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(points)):
-        raise InputError(f"{path}", f"its faces name points beyond the {len(points)} that it has", "export it again")
+        raise InputError(f"{path}", f"its faces refer to points beyond its {len(points)} ones", "export it again")
     if not np.abs(points).max(initial=0.0) < FARTHEST:
-        raise InputError(f"{path}", "its points are no finite numbers, or too large to be drawn", "export it again")
+        raise InputError(f"{path}", "its points are not finite numbers, or too large to be drawn", "export it again")
     return surfaces.shaded(points, triangles, sharp=True)
 
 

@@ -171,7 +171,7 @@ def mechanism(
     if stressed and not body_shape.stress_recorded(run):
         problem = "the run records no von Mises stress"
         raise InputError(
-            "--what stress", problem, 'ask for it: [output] stress = ["BODY"], a rod of known section or a solid'
+            "--what stress", problem, 'request it: [output] stress = ["BODY"], a rod of known section or a solid'
         )
     flexible = tuple(
         _flexible(run, name, bundle, looks, stressed=stressed) for name, bundle in bundles.items() if name in at.bodies

@@ -163,7 +163,7 @@ def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> C
         axes.set_title(f"{run.body.values[body]}: {turned.title} (°)")
         return _curve(axes, run, angle, "#0072B2")
     axis = int(np.argmax(np.ptp(moved, axis=0)))
-    axes.set_title(f"{run.body.values[body]}: way along {'xyz'[axis]} (mm)")
+    axes.set_title(f"{run.body.values[body]}: displacement along {'xyz'[axis]} (mm)")
     return _curve(axes, run, 1e3 * moved[:, axis], "#0072B2")
 
 

@@ -123,7 +123,7 @@ def _motion_series(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
     if not shown.bundles:
-        raise InputError("--what modes", "the scene has no flexible body, and so no modes", "show its motion")
+        raise InputError("--what modes", "the scene has no flexible body and therefore no modes", "show its motion")
     return shown.bundles
 
 
@@ -208,7 +208,7 @@ def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
     """Return the mechanism at rest, and its vibrations about that pose."""
     assert shown.linear is not None
     if not bool((shown.linear["frequency"] > 0.0).any()):
-        raise InputError("--what vibrations", "the mechanism has no motion that vibrates in this pose")
+        raise InputError("--what vibrations", "the mechanism has no vibration in this pose")
     drawn = mechanism(vibrations.as_run(shown.linear), shown.bundles, shown.looks)
     return drawn, vibrations.vibrations(drawn, shown.linear)
 

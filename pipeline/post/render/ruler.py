@@ -44,7 +44,7 @@ def exaggeration(drawn: Mechanism) -> list[str]:
     larger = "true deformation" if scale == 1.0 else f"deformation {rounded(scale, 3)} times larger"
     texts = [larger] if drawn.flexible else []
     if any(body.color is None and not body.stressed for body in drawn.flexible):
-        texts.append("light where a body deflects most")
+        texts.append("brightest at the largest deflection of a body")
     factors = []
     for joint in parameters(drawn.run).get("joint", {}).values():
         radius = joint.get("ball_radius", joint.get("pin_radius"))

@@ -205,7 +205,7 @@ def _stage(
             if not piece.plain:
                 mesh["displacement"] = np.linalg.norm(displacement, axis=1) / largest
         pixels = film.image(stage)
-        caption.onto(pixels, f"{modes.labels[vibration]}; drawn larger than it is")
+        caption.onto(pixels, f"{modes.labels[vibration]}; amplitude enlarged")
         return pixels
 
     return picture, stage.close

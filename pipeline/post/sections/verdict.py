@@ -40,7 +40,7 @@ exponent_low | | s-1 | lower end of its 95 % confidence interval
 exponent_high | | s-1 | upper end of its 95 % confidence interval
 least_exponent | | s-1 | exponent that so many periods cannot distinguish from zero
 zero_one? | | 1 | K of the 0-1 test, of the component that decides least for regular motion
-returns_after | | 1 | periods after which the states come back; 0 where they do not
+returns_after | | 1 | periods after which the states return; 0 where they do not
 return_distance | | 1 | largest distance of a return, as a fraction of the motion's size
 contraction? | | 1 | factor per period by which successive returns come closer
 few_lines? | | 1 | fraction of the variance in the sixteen largest lines of the spectrum
@@ -100,14 +100,14 @@ def _rule(
     grows, still = rate.low > least, rate.low <= least
     if after and still:
         times = "one period" if after == 1 else f"{after} periods"
-        return "periodic", (f"the states come back after {times}, to {distance:.2g} of the motion", text)
+        return "periodic", (f"the states return after {times}, to {distance:.2g} of the motion", text)
     tested = f"0-1 test K = {K:.2f}"
     if grows and K > CHAOTIC:
-        return "chaotic", (f"{text}, above the {least:.2g} that freedoms without consequence give", tested)
+        return "chaotic", (f"{text}, above the {least:.2g} of freedoms without influence", tested)
     lined = f"{100 * discrete:.0f} % of the variance in {chaos.LINES} lines of the spectrum"
     if still and K < REGULAR and discrete > DISCRETE and not after:
         return "quasi-periodic", (text, tested, lined)
-    back = f"states come back to {distance:.2g} of the motion at best"
+    back = f"the states return to {distance:.2g} of the motion at best"
     return "undecided", (text, tested, lined, back)
 
 

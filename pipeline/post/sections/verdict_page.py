@@ -34,7 +34,7 @@ A freedom on which nothing depends, such as the spin of a leg with balls at both
 largest exponent of a periodic motion is zero there, and the contraction shows how fast the rest settles.
 """
 COLUMNS = ("scene", "verdict", "periods", "exponent", "exponent_low", "exponent_high")
-HEAD = ("scene", "verdict", "exponent, 1/s", "95 %", "K", "comes back after", "to", "contraction", "in 16 lines")
+HEAD = ("scene", "verdict", "exponent, 1/s", "95 %", "K", "returns after", "to", "contraction", "in 16 lines")
 
 
 def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], page: str, pictures: str) -> str:
@@ -122,7 +122,7 @@ def _returns(axes: Axes, verdict: xr.Dataset) -> None:
 def _power(axes: Axes, verdict: xr.Dataset) -> None:
     axes.set(title="spectrum", xlabel="cycles per period", ylabel="fraction of the variance")
     if not verdict.power.values.any():
-        axes.text(0.5, 0.5, "the states stand still", transform=axes.transAxes, ha="center", color=style.SOFT)
+        axes.text(0.5, 0.5, "the states are constant", transform=axes.transAxes, ha="center", color=style.SOFT)
         return
     for component in range(verdict.sizes["component"])[::-1]:
         power = np.maximum(verdict.power.values[1:, component], 1e-16)
@@ -143,4 +143,4 @@ def _growth(axes: Axes, sections: xr.Dataset, verdict: xr.Dataset) -> None:
         alpha=0.18,
         lw=0,
     )
-    axes.set(title="how a neighbour parts", xlabel="period", ylabel="logarithm of its distance's growth")
+    axes.set(title="separation of a neighbour", xlabel="period", ylabel="logarithm of its distance's growth factor")

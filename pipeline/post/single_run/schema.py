@@ -30,7 +30,7 @@ peak_reaction | joint | N | largest reaction, of outputs and events
 peak_reaction_time | joint | s | time of the largest reaction
 peak_acceleration | body axis | m s-2 | largest magnitude of each component of the acceleration, of outputs and events
 peak_acceleration_time | body axis | s | time of that magnitude
-peak_drive_force? | drive | N, N m | largest magnitude of what the drive supplies
+peak_drive_force? | drive | N, N m | largest magnitude of the drive's force or torque
 peak_drive_force_time? | drive | s | time of that magnitude
 peak_stress? | gauge | Pa | largest von Mises stress of the gauge
 peak_stress_time? | gauge | s | time of that stress

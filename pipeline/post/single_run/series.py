@@ -57,7 +57,7 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
         "horizon_criterion": f"members or run and perturbed run differ by {SEPARATED:g} of the motion most of the time",
     }
     attributes["references"] = str(run.attrs.get("references", ""))
-    title = f"What follows from: {run.attrs['title']}"
+    title = f"Derived results: {run.attrs['title']}"
     data = {name: (POST[name].dims, values) for name, values in arrays.items()}
     return conformed(labelled(data, coords), POST, title=title, **attributes)
 
@@ -314,7 +314,7 @@ def sentence(horizon: float, end: float, members: float | None = None) -> str:
     neighbour = f"A run whose contacts start {100.0 * PERTURBATION:g} % of their clearance elsewhere"
     difference = f"{100.0 * SEPARATED:g} % of each body's largest motion"
     if horizon >= end:
-        text = f"{neighbour} does not diverge from this one: where it differs by more than {difference}, it comes back."
+        text = f"{neighbour} does not diverge from this one: differences above {difference} do not persist."
     else:
         whole = f"the run lasts {1e3 * end:.4g} ms"
         text = f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."

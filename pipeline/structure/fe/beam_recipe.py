@@ -47,7 +47,7 @@ class Piece(Part):
         if end.type != start.type:
             raise ValueError(f"a taper keeps the type of the section; it cannot go from {start.type} to {end.type}")
         if end.shear_coefficient is not None:
-            raise ValueError("the shear coefficient of a taper is said once, in `section`")
+            raise ValueError("give the shear coefficient of a taper once, in `section`")
         return self
 
 
@@ -64,7 +64,7 @@ class Segment(Piece):
     @model_validator(mode="after")
     def _has_a_length(self) -> Segment:
         if not self.start < self.end:
-            raise ValueError(f"a segment ends after it starts, not at {self.end:g} m after {self.start:g} m")
+            raise ValueError(f"a segment must end after its start, not at {self.end:g} m after {self.start:g} m")
         return self
 
 

@@ -105,7 +105,7 @@ def _model(table: Mapping[str, Any], where: str) -> type[Recipe]:
     if name is None:
         raise InputError(f"{where} [shape.type]", "is missing", "known: " + ", ".join(MODELS))
     if not isinstance(name, str) or name not in MODELS:
-        raise InputError(f"{where} [shape.type]", f"no shape is called {name!r}", suggestion(str(name), MODELS))
+        raise InputError(f"{where} [shape.type]", f"unknown shape {name!r}", suggestion(str(name), MODELS))
     return MODELS[name]
 
 

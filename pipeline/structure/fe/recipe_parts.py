@@ -64,7 +64,7 @@ class BodyRecipe(Part):
     def _interfaces_are_frames(self) -> BodyRecipe:
         for name in self.interfaces:
             if name not in self.frames:
-                raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, self.frames)}")
+                raise ValueError(f"interface '{name}' is not a frame of the recipe; {suggestion(name, self.frames)}")
         if len(set(self.interfaces)) < len(self.interfaces):
             raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
         return self

@@ -54,9 +54,7 @@ class TubeSection(Part):
     @model_validator(mode="after")
     def _has_a_wall(self) -> TubeSection:
         if not self.inner_radius < self.radius:
-            raise ValueError(
-                f"the hole's radius {self.inner_radius:g} m leaves no wall inside the radius {self.radius:g} m"
-            )
+            raise ValueError(f"the hole's radius {self.inner_radius:g} m is not below the radius {self.radius:g} m")
         return self
 
 
@@ -99,7 +97,7 @@ class GeneralSection(Part):
                 f"{self.second_y * self.second_z:g} m^8 for every area"
             )
         if self.inertia is not None and min(self.inertia) < 0.0:
-            raise ValueError(f"inertia = {list(self.inertia)} m^4: second moments of a mass are not negative")
+            raise ValueError(f"inertia = {list(self.inertia)} m^4: second moments of a mass cannot be negative")
         return self
 
 

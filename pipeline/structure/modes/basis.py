@@ -97,12 +97,12 @@ def request(count: int | None, available: int, static: int = 0) -> int:
         return available
     total = available + static
     if count > total:
-        problem = f"{count} modes are asked for, the mesh has {total} elastic coordinates"
-        raise InputError(WHERE, problem, f"ask for at most {total}")
+        problem = f"{count} modes are requested, but the mesh has {total} elastic coordinates"
+        raise InputError(WHERE, problem, f"request at most {total}")
     least = max(static, 1)
     if count < least:
-        reason = f": the {static} constraint modes of its interfaces belong to it" if static else ""
-        raise InputError(WHERE, f"a basis of {count} modes is too small{reason}", f"ask for at least {least}")
+        reason = f": the {static} constraint modes of its interfaces are part of the basis" if static else ""
+        raise InputError(WHERE, f"a basis of {count} modes is too small{reason}", f"request at least {least}")
     return count - static
 
 
@@ -117,7 +117,7 @@ def whole(values: np.ndarray, n: int, static: int = 0) -> int:
             counts = [c + static for c in (start, stop) if c + static > 0]
             hertz = float(eigen.frequency(values[start : start + 1])[0])
             nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
-            problem = f"{n + static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz"
+            problem = f"{n + static} modes split a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz"
             raise InputError(WHERE, problem, f"the nearest whole {nearest}")
     return n
 
@@ -158,7 +158,7 @@ def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> N
     first = float(eigen.frequency(modes.values[:1])[0])
     if requested.up_to is not None and first > requested.up_to and not static.shape[1]:
         problem = f"no mode lies below {requested.up_to:.6g} Hz; the first is at {first:.6g} Hz"
-        raise InputError("modes.up_to", problem, "ask for a higher frequency")
+        raise InputError("modes.up_to", problem, "request a higher frequency")
 
 
 def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested: ModeRequest) -> bool:
@@ -184,7 +184,7 @@ def _unreachable(body: Body, static: np.ndarray, modes: Normal, requested: ModeR
     if requested.compliance is not None:
         fraction, where = deficits.least(body.flexibility(), body.interfaces, vectors)
         problem = f"with every mode of this reference condition the basis has {fraction:.3g} of the compliance {where}"
-        return InputError("modes.compliance", problem, 'take one with static shapes, as reference = "craig-bampton"')
+        return InputError("modes.compliance", problem, 'choose one with static shapes, as reference = "craig-bampton"')
     fraction = _mass_fraction(body.model, vectors)
     problem = f"with every mode of this reference condition {fraction:.3g} of the mass moves with the basis"
     return InputError("modes.mass", problem, "shapes without momentum carry no mass: select by count or up_to")

@@ -11,7 +11,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Interface, Model, own_dofs
 
 WHERE = "modes.reference"
-HOLD_ONCE = "hold each motion once; interfaces that are tied to the same nodes move alike"
+HOLD_ONCE = "hold each motion once; interfaces tied to the same nodes have equal motions"
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def distinct(frames: tuple[Interface, ...]) -> None:
         for other in frames[:k]:
             if abs(frame.motion - other.motion).max() == 0.0:
                 problem = f"two interfaces lie on the same node: '{other.name}' and '{frame.name}'"
-                raise InputError("modes.interfaces", problem, "keep one of them")
+                raise InputError("modes.interfaces", problem, "remove one of them")
 
 
 def check(model: Model, condition: Condition) -> None:

@@ -60,7 +60,7 @@ def inverted(
             stiffness, k=count, M=mass, sigma=0.0, which="LM", v0=start, tol=tolerance, OPinv=operator
         )
     except scipy.sparse.linalg.ArpackError as error:
-        raise SolverError(f"modes: the sparse eigensolver gave up on {count} of {n} modes: {error}") from None
+        raise SolverError(f"modes: the sparse eigensolver failed for {count} of {n} modes: {error}") from None
     order = np.argsort(values)
     return values[order], vectors[:, order]
 
@@ -91,7 +91,7 @@ def _rayleigh_ritz(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarra
     try:
         values, combination = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
     except np.linalg.LinAlgError:
-        raise SolverError(f"modes: the {basis.shape[1]} shapes of the basis depend on each other") from None
+        raise SolverError(f"modes: the {basis.shape[1]} shapes of the basis are linearly dependent") from None
     return values, scaled @ combination
 
 

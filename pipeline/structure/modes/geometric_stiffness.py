@@ -53,7 +53,7 @@ def variables(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:
 def _require_plain_rod(mesh: xr.Dataset) -> None:
     where, remedy = "[body] stiffening", "remove stiffening, or describe the body by a straight rod along x"
     if "abscissa" not in mesh:
-        raise InputError(where, "shortening is known of beams, not of this kind of body", remedy)
+        raise InputError(where, "shortening is available for beams only", remedy)
     if not np.allclose(mesh["rod_rotation"].values, np.eye(3), rtol=0.0, atol=1e-12):
         raise InputError(where, "the rod does not lie along x of its mesh frame", remedy)
     if "area_profile" in mesh or "lump_mass" in mesh:

@@ -53,7 +53,7 @@ def lowest(
     if size <= eigen.DENSE_LIMIT or count > size // 4:
         if size > DENSE_MOST:
             most = size // 4
-            raise InputError(WHERE, f"{count} modes of {size} coordinates are too many", f"ask for up to {most}")
+            raise InputError(WHERE, f"{count} modes of {size} coordinates are too many", f"request at most {most}")
         return _dense_held(model, held, count) if held.shape[0] else _dense_free(model, count)
     return _sparse(model, held, count, flexibility(), progress, rough=rough)
 

@@ -70,8 +70,8 @@ def support(model: Model, progress: Callable[[float], None]) -> Flexibility:
 def _mechanism() -> InputError:
     return InputError(
         "mesh",
-        "the body can move without strain beyond its six rigid motions, as where parts share an edge or a node only",
-        "join the parts along faces, or make each a body of its own",
+        "the body has more motions without strain than its six rigid ones, as where parts share only an edge or a node",
+        "join the parts along faces, or define each as a separate body",
     )
 
 

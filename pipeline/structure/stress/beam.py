@@ -59,8 +59,8 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Any]) -> d
     Raises InputError for gauges, which exist on solids only.
     """
     for name in gauges:
-        problem = f"'{gauges[name]['body']}' is a rod, which has sections and no surface of nodes"
-        raise InputError(f"[output.gauges.{name}]", problem, "take the gauge out; each end of a cell is recorded")
+        problem = f"'{gauges[name]['body']}' is a rod, which has sections instead of a surface of nodes"
+        raise InputError(f"[output.gauges.{name}]", problem, "remove the gauge; each end of a cell is recorded")
     beam, vectors = beams.assemble(mesh), modes["vector"].values
     nodes = mesh["cell_node"].values.ravel()
     return _sections(mesh, beam, vectors, nodes) | _slices(mesh, beam, vectors, nodes) | _fibres(mesh)

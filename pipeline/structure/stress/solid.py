@@ -54,7 +54,7 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
     shown, doubtful = surface(mesh)[0], _doubtful(mesh)
     places = _gauges(mesh, shown, gauges)
     if doubtful[shown].all():
-        artefact = "cells that touch a rigidly tied frame, where stress is an artefact of the tie"
+        artefact = "cells at a rigidly tied frame, where stress is an artefact of the tie"
         problem = f"all surface nodes lie in {artefact}"
         raise InputError("[output] stress", problem, "refine the mesh, or tie the frame in the mean")
     vectors, omega = modes["vector"].values, 2.0 * np.pi * modes["frequency"].values
@@ -147,7 +147,7 @@ def _gauges(mesh: xr.Dataset, shown: np.ndarray, gauges: Mapping[str, Mapping[st
         dim, nodes, index = CHOSEN[kind]
         names = mesh[dim].values.tolist()
         if gauge[kind] not in names:
-            raise InputError(f"{where} {kind}", f"no {kind} is called '{gauge[kind]}'", suggestion(gauge[kind], names))
+            raise InputError(f"{where} {kind}", f"unknown {kind} '{gauge[kind]}'", suggestion(gauge[kind], names))
         chosen = mesh[nodes].values[mesh[index].values == names.index(gauge[kind])]
         found[name] = np.flatnonzero(np.isin(shown, chosen))
         if not found[name].size:

@@ -21,11 +21,11 @@ def resolve(law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
     refuse_linear("hertz", law)
     if law.delivered_restitution not in (None, 1.0):
         raise ValueError(
-            f"the law 'hertz' loses nothing and delivers no restitution of {law.delivered_restitution:g}; "
+            f"the law 'hertz' has no loss and cannot deliver a restitution of {law.delivered_restitution:g}; "
             "choose a law with damping"
         )
     warning = None
     if law.restitution is not None and 1.0 - law.restitution > RESTITUTION_ERROR:
-        warning = f"'hertz' loses nothing: it delivers a restitution of 1, not of {law.restitution:g}"
+        warning = f"'hertz' has no loss: its restitution is 1, not {law.restitution:g}"
     power = exponent if law.exponent is None else law.exponent
     return Resolved("elastic", Numbers(stiffness, power, 0.0), None, 1.0, warning)

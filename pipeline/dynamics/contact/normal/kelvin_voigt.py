@@ -29,12 +29,12 @@ def resolve(law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
         raise ValueError(f"the law 'kelvin-voigt' is linear; its exponent is 1, not {law.exponent:g}")
     mass = mass if law.effective_mass is None else law.effective_mass
     if mass is None:
-        raise ValueError("neither side of this joint has a mass of its own; give an effective_mass")
+        raise ValueError("no mass is known on either side of this joint; give an effective_mass")
     critical = 2.0 * math.sqrt(stiffness * mass)
     asked = law.restitution if law.delivered_restitution is None else law.delivered_restitution
     if law.damping is not None:
         if asked is not None:
-            raise ValueError("damping and restitution say the same; give one")
+            raise ValueError("damping and restitution are alternatives; give one")
         damping = law.damping
     elif asked is not None:
         damping = critical * restitution.damping_ratio(asked)

@@ -49,9 +49,9 @@ def explanation(engine: Engine) -> str | None:
         angle = float(np.linalg.norm(y[at : at + 3])) if row["internal0"] >= 0 else 0.0
         if angle > 0.99 * LARGEST_ANGLE:
             return (
-                f"bushing {name} has turned by {np.degrees(angle):.0f} deg: it is an elastic mount, whose rotation "
-                "vector loses its direction at a full turn; let a joint carry the turning, with a joint-spring "
-                "for its torque, or give the bushing no stiffness and no damping against rotation"
+                f"bushing {name} has turned by {np.degrees(angle):.0f} deg: the rotation vector of an elastic mount "
+                "has no direction at a full turn; use a joint for this rotation, with a joint-spring for its "
+                "torque, or give the bushing neither stiffness nor damping against rotation"
             )
     return None
 

@@ -56,11 +56,11 @@ def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[fl
     if load.limits is not None:
         low, high = (quantity(limit, coordinate.force) for limit in load.limits)
         if not low < high:
-            raise ValueError(f"limits are the least and the largest force; {low:.6g} is not below {high:.6g}")
+            raise ValueError(f"limits are the smallest and the largest force; {low:.6g} is not below {high:.6g}")
     tracking = load.tracking_time
     if tracking is None and load.limits is not None and gains[1]:
         if not gains[0] / gains[1] > 0.0:
-            raise ValueError("proportional/integral is no time here: give the tracking_time of the limited integral")
+            raise ValueError("proportional/integral is not a positive time: give a tracking_time of the integral")
         tracking = gains[0] / gains[1]
     return (*gains, low, high, 0.0 if tracking is None else 1.0 / tracking)
 

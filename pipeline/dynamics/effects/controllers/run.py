@@ -68,6 +68,6 @@ def require_controlled(model: Model, trajectory: Trajectory, seen: Observed) -> 
         bound = LOST * max(asked, float(value[0]), 2.0 * np.pi if turning else model.length)
         beyond = np.flatnonzero(~(value <= bound))
         if len(beyond):
-            text = f"the motion diverges: controller {name} has its coordinate at {value[beyond[0]]:.3g} "
+            text = f"the motion diverges: the coordinate of controller {name} reached {value[beyond[0]]:.3g} "
             text += f"{'rad' if turning else 'm'}, beyond {LOST:g} times its reference and the mechanism's size"
             raise SolverError(f"at t = {trajectory.time[beyond[0]]:.6g} s: {text}; {REMEDY}")

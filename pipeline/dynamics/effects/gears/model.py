@@ -30,7 +30,7 @@ class Side:
 
     def value(self, poses: Sequence[Placement]) -> float:
         """Return the coordinate [rad in (-pi, pi], or m] at poses of the links."""
-        F, G = (poses[site.link].of(site.place) for site in (self.a, self.b))
+        F, G = (poses[site.link].of(site.placement) for site in (self.a, self.b))
         if self.coordinate.turning:
             R = F.R.T @ G.R
             return atan2(R[self.coordinate.sine], R[self.coordinate.cosine])
@@ -39,7 +39,7 @@ class Side:
     def along(self, poses: Sequence[Placement]) -> np.ndarray:
         """Return the axis of the coordinate, shape (3,)."""
         site = self.b if self.coordinate.side else self.a
-        axis: np.ndarray = poses[site.link].of(site.place).R[:, self.coordinate.axis]
+        axis: np.ndarray = poses[site.link].of(site.placement).R[:, self.coordinate.axis]
         return axis
 
 
@@ -89,7 +89,7 @@ def _coupling(mechanism: Mechanism, name: str) -> Coupling:
     kinds = (first.coordinate.turning, second.coordinate.turning)
     ratio = measured(gear.ratio, dimensions.get(kinds, "angle per length"), f"[gear.{name}.ratio]")
     if ratio == 0.0:
-        raise InputError(path, "its ratio is 0: the second coordinate would be held", "give a ratio, or drive it")
+        raise InputError(path, "its ratio is 0, which would hold the second coordinate", "give a ratio, or drive it")
     return Coupling(name, ratio, second, first)
 
 

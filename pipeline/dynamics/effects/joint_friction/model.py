@@ -43,9 +43,9 @@ def guards(mechanism: Mechanism) -> Iterator[Guard]:
             row = bearing * BENDS.size
             yield from speeds(BENDS, row + BENDS.sliding, 3, law.kinks(joint.friction))
             if law.bristle(joint.friction) is not None:
-                yield (BENDS.place, row + BENDS.sliding, 3, -1, -1), 0.0, law.stick_speed(joint.friction)
+                yield (BENDS.at, row + BENDS.sliding, 3, -1, -1), 0.0, law.stick_speed(joint.friction)
             for pressing, count in PRESSES.items():
-                yield (BENDS.place, row + getattr(BENDS, pressing), count, -1, bearing), 0.0, 0.0
+                yield (BENDS.at, row + getattr(BENDS, pressing), count, -1, bearing), 0.0, 0.0
             bearing += 1
 
 

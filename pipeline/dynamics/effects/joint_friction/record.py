@@ -46,7 +46,7 @@ def warnings(run: Run) -> list[str]:
     if not doubted:
         return []
     return [
-        f"friction of {', '.join(doubted)} follows reactions of which rigid bodies leave a part undetermined, such as "
-        "those out of the plane of a planar loop: one of many solutions is taken; a spherical or cylindrical joint in "
-        "the loop makes it unique"
+        f"friction of {', '.join(doubted)} depends on reactions that rigid bodies do not determine, such as those out "
+        "of the plane of a planar loop: the result is one of many solutions; a spherical or cylindrical "
+        "joint in the loop makes it unique"
     ]

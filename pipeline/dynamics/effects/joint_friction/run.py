@@ -27,9 +27,9 @@ def explanation(engine: Engine) -> str | None:
     names, gains = list(engine.model.scene.rubbing()), _gains(engine)
     worst = int(np.argmax(gains))
     return (
-        f"the friction of joint {names[worst]} presses the joint the more, the more it rubs (by {gains[worst]:.3g} of "
-        "each newton): it jams, and rigid bodies with Coulomb's law have no motion there, or several (Painleve's "
-        "paradox); a smaller coefficient, a longer guide or a flexible body next to the joint is the remedy"
+        f"the friction of joint {names[worst]} increases its own normal force (by {gains[worst]:.3g} of "
+        "each newton): the joint jams, and rigid bodies with Coulomb's law then have no motion or several "
+        "(Painleve's paradox): use a smaller coefficient, a longer guide or a flexible body next to the joint"
     )
 
 

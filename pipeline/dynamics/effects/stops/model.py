@@ -66,7 +66,7 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
         raise InputError(
             path,
             f"its lower end must lie below its upper one; lower = {limits['lower']:.6g}, upper = {limits['upper']:.6g}",
-            "exchange them, or leave one out",
+            "exchange them, or remove one",
         )
     far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else lengths[joint])
     speed = "angular velocity" if coordinate.turning else "velocity"

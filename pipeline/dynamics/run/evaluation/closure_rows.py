@@ -70,7 +70,7 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
     pivots[m.LAST_PIVOT] = ratio if better else present
     pivots[m.LEAST_PIVOT] = WORN * ratio if better else WORN * present
     if better:
-        engine.view(m.INDEPENDENCE.place)[:] = 0.0  # that of other rows
+        engine.view(m.INDEPENDENCE.at)[:] = 0.0  # that of other rows
         engine.control[[m.PASS_TIME, m.MOST_REACH, m.LEFT]] = NEVER, NEVER, 1.0
     return better
 
@@ -107,7 +107,7 @@ def diagnosis(engine: Engine) -> str:
         return "no loop is closed"
     J = scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
     if not J.size:
-        return "no closure holds anything that the tree's joints leave free"
+        return "the closures constrain no free coordinate of the tree"
     if not np.isfinite(J).all():
         return "the closures cannot be evaluated"
     U, values, _ = np.linalg.svd(J)

@@ -180,7 +180,7 @@ class Engine:
 
     def table(self, table: Any) -> np.ndarray:
         """Return a table of the work array with named fields, not copied, shape (rows,)."""
-        return m.named(table, self.view(table.place))
+        return m.named(table, self.view(table.at))
 
     @property
     def control(self) -> np.ndarray:
@@ -290,5 +290,5 @@ def _check_branch(model: Model, mobility: Mobility) -> None:
         coordinate_of(model.scene, choice.joint, choice.coordinate, "[start.branch]")
     if not mobility.singular_start:
         raise InputError(
-            "[start.branch]", "the mechanism does not start in a change point: there is nothing to choose", "remove it"
+            "[start.branch]", "the mechanism does not start in a change point and has no branches", "remove it"
         )

@@ -76,7 +76,7 @@ def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
     except SolverError as error:
         paths = [name for name, drive in engine.model.scene.drive.items() if isinstance(drive, PathDrive)]
         path = f"[drive.{paths[0]}]" if paths else "[joint]"
-        what = "correct where the path starts, or the poses" if paths else "correct lengths, frames or poses"
+        what = "correct the start of the path, or the poses" if paths else "correct lengths, frames or poses"
         raise InputError(path, f"the mechanism cannot be assembled: {error}", what) from None
 
 
@@ -92,7 +92,7 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Return Y at the start with the loops closed and their rates zero. Raise SolverError when that fails."""
     seen = observe(engine, rows_of(engine, y[None], engine.start))
     if seen.status[0] != m.OK:
-        why = engine.explained() or "the loops cannot be closed from the start that the scene gives"
+        why = engine.explained() or "the loops cannot be closed from the scene's start"
         raise SolverError(f"at t = {engine.start:.6g} s: {why}")
     return seen.state[0].copy()
 

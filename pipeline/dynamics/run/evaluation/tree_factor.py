@@ -90,4 +90,4 @@ def _stretch(engine: Engine, w: np.ndarray, index: int) -> np.ndarray:
 
 def _vectors(engine: Engine, w: np.ndarray, table: Any, field: int) -> np.ndarray:
     """Return a vector of each row of a table."""
-    return _stretch(engine, w, table.place).reshape(-1, table.size)[:, field : field + 3]
+    return _stretch(engine, w, table.at).reshape(-1, table.size)[:, field : field + 3]

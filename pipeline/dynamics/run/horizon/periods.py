@@ -88,7 +88,7 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
     """
     if not len(parts[0].table(m.LAW)):
         raise InputError(
-            "[sections]", "nothing repeats: no drive and no load has a law of time", "drive a joint, or vary a load"
+            "[sections]", "no period: neither a drive nor a load has a law of time", "drive a joint, or vary a load"
         )
     values = []
     for part, t in ((parts[0], parts[0].start), (parts[-1], parts[-1].end)):
@@ -108,7 +108,7 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
             f"[drive.{driven[k].name}]" if k < len(driven) else "[load]",
             f"its law does not repeat after a period of {period:.6g} s: its {'rate' if rate else 'value'} has changed "
             f"by {change[k, rate]:.3g}",
-            "give the laws' period as sections.period, or choose laws that end as they begin",
+            "give the laws' period as sections.period, or choose laws whose period ends as it begins",
         )
 
 
@@ -188,7 +188,7 @@ def handover(part: Engine, here: Moment) -> Handover:
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:
     """Return the moment at the end of a stretch from the work space."""
-    watched, events = part.view(m.WATCH.place).copy(), list[np.ndarray]()
+    watched, events = part.view(m.WATCH.at).copy(), list[np.ndarray]()
     table = m.named(m.WATCH, watched)
     for c in range(len(part.model.contacts)):
         if part.modes[c]:

@@ -77,9 +77,9 @@ def differentiate(
     try:
         whole = integrate(mine, start, progress, jumps=jumps)
     except UnsuitedError as error:
-        raise SolverError(f"the equations of this mechanism are not differentiated: {error}") from None
+        raise SolverError(f"the equations of this mechanism cannot be differentiated: {error}") from None
     if whole.collocations:
-        raise SolverError("the motion passes a singular pose, across which it is not differentiated")
+        raise SolverError("the motion passes a singular pose, across which it has no derivative")
     kept, contacts = whole.rows.shape[1] - count * ny, len(model.contacts)
     trajectory = replace(whole, rows=np.ascontiguousarray(whole.rows[:, :kept]))
     times = np.full((len(whole.events), count), np.nan)
@@ -98,11 +98,11 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
     """
     model, count = engine.model, len(directions)
     if INTERPRETED:
-        raise SolverError("only compiled code carries derivatives: unset NUMBA_DISABLE_JIT")
+        raise SolverError("derivatives need compiled code: unset NUMBA_DISABLE_JIT")
     if any(isinstance(load, SampledPid) for load in model.scene.load.values()):
-        raise SolverError("a controller that samples is not differentiated: use a continuous 'pid'")
+        raise SolverError("derivatives do not support sampled controllers: use a continuous 'pid'")
     if engine.method.traits.implicit:
-        raise SolverError("only explicit methods carry derivatives: choose 'dop853'")
+        raise SolverError("derivatives need an explicit method: choose 'dop853'")
     wide = _widened(model.arrays, model.arrays.f, count)
     changes = [_widened(model.arrays, direction.numbers, count).f for direction in directions]
     wide = replace(wide, f=np.concatenate([wide.f, *changes]))
@@ -171,7 +171,7 @@ class _Jumps:
             return
         if np.any(moved != moved[:, :1]):
             raise SolverError(
-                "laws that break at one time, which parameters move differently, have no derivative there"
+                "laws with simultaneous kinks that the parameters move differently have no derivative at this time"
             )
         t, first = float(engine.control[m.TIME]), engine.n[m.ACTIVE]
         rates = []
@@ -230,9 +230,9 @@ class _Jumps:
 
     def _starts(self, engine: Engine) -> np.ndarray:
         """Return the changes of the start times of laws' pieces, not copied, (directions, pieces)."""
-        begin, pieces = engine.h[m.PIECES.place] + m.PIECES.start, len(engine.model.arrays.table(m.PIECES))
+        begin, pieces = engine.h[m.PIECES.at] + m.PIECES.start, len(engine.model.arrays.table(m.PIECES))
         return self._numbers(engine)[:, begin : begin + m.PIECES.size * pieces : m.PIECES.size]
 
     def _touch(self, engine: Engine, c: int, offset: int) -> np.ndarray:
         """Return the changes of a field of a contact's row in TOUCH, (directions,)."""
-        return self._work(engine)[:, engine.h[m.TOUCH.place] + m.TOUCH.size * c + offset].copy()
+        return self._work(engine)[:, engine.h[m.TOUCH.at] + m.TOUCH.size * c + offset].copy()

@@ -164,7 +164,7 @@ class Search:
             if not absolute > 0.0:
                 raise InputError(
                     f"{self.scene.path or self.scene.name} [accuracy] {name}",
-                    "a relative accuracy of a quantity that never changes",
+                    "is a relative accuracy, but the quantity is constant",
                     "give an absolute one, with a unit",
                 )
             requested[quantity] = absolute
@@ -193,7 +193,7 @@ def by_default(
 
     As `deliver`, for BY_DEFAULT of each usual quantity over time (`Scene.requested`), up to the predictability horizon.
     """
-    progress(None, f"a run good to {BY_DEFAULT:g} of the range of each quantity is made instead")
+    progress(None, f"running to an accuracy of {BY_DEFAULT:g} of the range of each quantity instead")
     names = [q.name for q in scene.requested() if q.over_time]
     request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
     wanting = edited(scene, {"accuracy": request})
@@ -278,10 +278,10 @@ def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
     """Return a sentence with the missed accuracy and the reason why no tolerance helps."""
     if not best.errors:
-        return "not verified: runs at tighter tolerances are refused, so that the error is unknown"
+        return "not verified: the error is unknown, since runs at tighter tolerances are refused"
     name = max(requested, key=lambda n: best.errors[n] / requested[n])
     error, times = best.errors[name], best.errors[name] / requested[name]
-    text = f"missed: {name} is good to {error:.2g}, {times:.2g} times what is requested"
+    text = f"missed: {name} has an error of {error:.2g}, {times:.2g} times the requested accuracy"
     looser = min((r for r in search.runs if r > best.rtol), default=None)
     if looser is None:
         return text

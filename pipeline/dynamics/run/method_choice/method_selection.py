@@ -165,9 +165,9 @@ class Costs:
 
     def why(self, rtol: float) -> str:
         """Return the reason of the choice as a sentence."""
-        name, most = self.best(rtol), f"{self.by_stability:.2g} evaluations for {DEFAULT} to be stable"
+        name, most = self.best(rtol), f"{self.by_stability:.2g} evaluations of {DEFAULT} for stability"
         known = [
-            f"{other} takes {n:.0f} at {at:.1e}"
+            f"{other} takes {n:.0f} evaluations at {at:.1e}"
             for other, runs in self.seen.items()
             if other != name
             for at, n in [min(runs.items(), key=lambda run: abs(np.log(run[0] / rtol)))]
@@ -176,22 +176,22 @@ class Costs:
             return f"{STIFF}: stability limited the steps of {DEFAULT} in a run before"
         if name in self.seen and known:
             return (
-                f"{name}: at a relative tolerance of {rtol:.1e} it is foreseen to be the cheapest; {', '.join(known)}"
+                f"{name}: at a relative tolerance of {rtol:.1e} it is predicted to be the cheapest; {', '.join(known)}"
             )
         if name == STIFF and known:
-            return f"{STIFF}: tried, as {', '.join(known)} evaluations"
+            return f"{STIFF}: tried, as {', '.join(known)}"
         if name == STIFF:
-            return f"{STIFF}: the fastest rate at the start, {self.rates.all:.3g} 1/s, would take {most}"
+            return f"{STIFF}: the fastest rate at the start, {self.rates.all:.3g} 1/s, would require {most}"
         if name == VIBRATING:
             return (
-                f"{VIBRATING}: the modes' fastest vibration, {self.rates.all / 6.283:.3g} Hz, would take {most}; "
-                f"with them followed exactly, the fastest rate is {self.rates.held:.3g} 1/s"
+                f"{VIBRATING}: the modes' fastest vibration, {self.rates.all / 6.283:.3g} Hz, would require {most}; "
+                f"with these modes integrated exactly, the fastest rate is {self.rates.held:.3g} 1/s"
             )
         if VIBRATING in self.handed_over:
-            return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
+            return f"{DEFAULT}: a run before began with {VIBRATING}, which cost more than predicted and was replaced"
         if not self.rates.all:
-            return f"{DEFAULT}: it is tried first, as nothing at the start shows a fast rate"
-        return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
+            return f"{DEFAULT}: default, as the start has no fast rate"
+        return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, requires at most {most}"
 
     def judges(self, rtol: float) -> Judges:
         """Return judges that compare a run with the prediction, and separate ones for its perturbed run."""
@@ -229,8 +229,8 @@ class Costs:
             if name == DEFAULT:
                 return refusal.stiffness(engine.n, engine.control)
             return (
-                f"at this pace the run takes {whole:.2g} evaluations with {name}, "
-                f"which {heir} is foreseen to make with {most / RELATIVE_COST[heir]:.2g}"
+                f"at this progress rate the run takes {whole:.2g} evaluations with {name} "
+                f"and with {heir} an estimated {most / RELATIVE_COST[heir]:.2g}"
             )
 
         return verdict

@@ -91,9 +91,9 @@ def require_shallow(engine: Engine) -> None:
             time, least = forced_depth(engine, k, shallow)
         if least:
             raise SolverError(
-                f"at t = {t:.6g} s: {contact.words}: the surfaces are {depth:.3g} m deep in each other, and "
-                f"at t = {time:.6g} s they have to be {least:.3g} m deep at the least, more than the inner surface's "
-                f"radius ({contact.joint.radius:.3g} m), however the mechanism gives way: {away}"
+                f"at t = {t:.6g} s: {contact.words}: the penetration is {depth:.3g} m, and at t = "
+                f"{time:.6g} s the drive forces it to at least {least:.3g} m, more than the inner surface's "
+                f"radius ({contact.joint.radius:.3g} m), in every pose of the mechanism: {away}"
             )
 
 
@@ -122,7 +122,7 @@ def rest(t: float, where: str) -> str:
     """Describe a rest in a singular pose."""
     return (
         f"at t = {t:.6g} s: the mechanism comes to rest in a singular pose ({where}), where it can continue in several "
-        "ways and no motion chooses one: let it pass the pose at speed, or stop elsewhere"
+        "ways and no motion selects one: let it pass the pose at speed, or stop elsewhere"
     )
 
 
@@ -130,16 +130,14 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
     """Return what prevents a smooth pass at speed, in words; nothing when the pass is smooth."""
     model = engine.model
     closed = [contact.name for contact, mode in zip(model.contacts, engine.modes, strict=True) if mode]
-    flexible = [name for link in model.links if link.flexible for name in link.places]
+    flexible = [name for link in model.links if link.flexible for name in link.placements]
     causes, remedies = list[str](), list[str]()
     if closed:
         causes.append(f"the closed contact of {', '.join(closed)}")
         remedies.append("soften or damp the contact")
     if flexible:
         causes.append(f"the vibration of {', '.join(flexible)}")
-        remedies.append(
-            "take fewer modes, or such as let the body become longer (craig-bampton), with which the pose is passed"
-        )
+        remedies.append("use fewer modes, or modes in which the body can change its length (craig-bampton)")
     if not causes:
         return ""
     return (
@@ -163,8 +161,8 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
         return ""
     joint = closure_rows.worst_joint(engine, U[:, len(values) - 1])
     return (
-        f"at t = {t:.6g} s: drive {drive} leads out of reach: the loop closed at joint {joint} is stretched or folded "
-        f"as far as it goes; {_shorten(drive)}"
+        f"at t = {t:.6g} s: drive {drive} leads out of reach: the loop closed at joint {joint} is fully stretched or "
+        f"folded; {_shorten(drive)}"
     )
 
 
@@ -192,7 +190,7 @@ def forced_depth(engine: Engine, contact: int, shallow: float) -> tuple[float, f
             if depth > radius:
                 return float(time), depth
     except SolverError:
-        pass  # other loops do not reach so far either: the run will show it
+        pass  # other loops do not reach this position either: the run will show it
     return np.inf, 0.0
 
 
@@ -235,7 +233,7 @@ def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tup
         except SolverError:
             continue
         return there(least.x), float(least.fun) * depth
-    raise SolverError("other loops do not reach so far")
+    raise SolverError("other loops do not reach this position")
 
 
 def _depth(engine: Engine, y: np.ndarray, contact: int) -> float:

@@ -40,9 +40,9 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         f"the loops cannot be closed: {too_long}a singular pose in which they can continue in several ways ({where})"
     )
     if not engine.model.closures:
-        unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
+        unsolvable = f"the equations cannot be solved here: {too_long}the motion diverges"
     reasons = {
-        m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is used up {EVALUATIONS}; "
+        m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is reached {EVALUATIONS}; "
         + _why_so_many(engine, n, control),
         m.STEP_TOO_SMALL: f"the step shrank to {control[m.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than the integrator can follow ({where})",
@@ -51,11 +51,11 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         "divides by zero",
         m.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
-        m.STUCK_EVENT: f"{culprit} opens and closes without end at one time: a smaller rtol distinguishes these "
-        "times, a softer contact or more damping separates them",
-        m.STEPPED_OVER: f"the contact of {culprit} began unseen within a step: a smaller rtol or a shorter "
-        "step finds it",
-        m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can continue in several ways "
+        m.STUCK_EVENT: f"{culprit} opens and closes repeatedly at the same time: choose a smaller rtol, a softer "
+        "contact or more damping",
+        m.STEPPED_OVER: f"the contact of {culprit} began undetected within a step: choose a smaller rtol or "
+        "a shorter step",
+        m.AT_SINGULAR: "the motion remains in a singular pose, where it can continue in several ways "
         f"({where}): let it pass the pose at speed, or stop elsewhere",
         m.LOST_CLOSURE: unsolvable,
     }
@@ -82,7 +82,7 @@ def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
     name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
     other = engine.method.traits.hands_over_to
     steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
-    parts = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
+    parts = [f"{steps} steps and {rejected} rejected ones, {events} events, the last one by {name}"]
     if n[m.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
         choice = f"choose an implicit integrator ({other}), or " if other else ""
         return f"{parts[0]}; {stiffness(n, control)}; {choice}a larger v_static"
@@ -90,7 +90,7 @@ def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
         parts.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
     if done > 0.0:
         whole = n[m.EVALUATIONS] * control[m.SPAN] / done
-        parts.append(f"at this pace the whole run takes {whole:.1g} evaluations")
+        parts.append(f"at this progress rate the whole run takes {whole:.1g} evaluations")
     return "; ".join([*parts, _remedy(steps, rejected, events, other)])
 
 
@@ -98,12 +98,12 @@ def _remedy(steps: int, rejected: int, events: int, other: str) -> str:
     """Return the remedy for the largest cost; other: the implicit method that may help, or nothing."""
     implicit = f", {other} where contacts or friction are stiff," if other else ""
     if events > OFTEN * steps:
-        return (
-            "contacts begin and end all the time: soften or damp them, end the run earlier, or allow more evaluations"
-        )
+        return "contacts begin and end continually: soften or damp them, end the run earlier, or allow more evaluations"
     if rejected > steps:
-        return f"most steps are rejected, as where forces set in steeply: a looser rtol{implicit} or more evaluations"
-    return f"a looser rtol{implicit} or more evaluations"
+        return (
+            f"most steps are rejected, as when forces rise steeply: choose a looser rtol{implicit} or more evaluations"
+        )
+    return f"choose a looser rtol{implicit} or more evaluations"
 
 
 def stiffness(n: np.ndarray, control: np.ndarray) -> str:

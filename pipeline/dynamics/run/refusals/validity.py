@@ -84,7 +84,7 @@ def doubts(engine: Engine) -> list[str]:
         # the last evaluation may be of a step that was rejected, at speeds that the motion never had
         engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
         coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
-        if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.place)))):
+        if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.at)))):
             return []
         time = engine.control[m.TIME : m.TIME + 1]
         return [text for body in flexibles(engine.model) for text in _judged(body, time, coordinates, frames)]
@@ -98,14 +98,14 @@ def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: n
         row, bent = largest(body.shapes, q, BENT * body.length)
         if bent > BENT * body.length:
             yield (
-                f"{body.name}: at t = {time[row]:.6g} s a point of it is {bent:.3g} m from its undeformed position, "
+                f"{body.name}: at t = {time[row]:.6g} s a point is {bent:.3g} m from its undeformed position, "
                 f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: divide it into several "
                 "bodies joined by fixed joints, or make it stiffer"
             )
     row, turned = largest(body.rotations, q, SECTION_ROTATION)
     if turned > SECTION_ROTATION:
         yield (
-            f"{body.name}: at t = {time[row]:.6g} s a section of it is turned by {turned:.3g} rad by its deformation; "
+            f"{body.name}: at t = {time[row]:.6g} s a section is rotated by {turned:.3g} rad by its deformation; "
             f"linear modes hold below {SECTION_ROTATION:g} rad: divide it into several bodies joined by fixed "
             "joints, or make it stiffer"
         )
@@ -120,8 +120,8 @@ def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
     if speeds[row] > SPIN * body.first:
         yield (
             f"{body.name}: at t = {time[row]:.6g} s it turns at {speeds[row]:.4g} rad/s, "
-            f"{speeds[row] / body.first:.2g} of its first frequency ({body.first:.4g} rad/s), and nothing stiffens it; "
-            f"linear modes hold below {SPIN:g} and diverge close to 1: give a beam stiffening = {{}}"
+            f"{speeds[row] / body.first:.2g} of its first natural frequency ({body.first:.4g} rad/s), and nothing "
+            f"stiffens it; linear modes hold below {SPIN:g} and diverge close to 1: give the beam stiffening = {{}}"
         )
 
 

@@ -122,10 +122,10 @@ def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple
     text = ", ".join(f"{change[best] / size[best]:+.2g}" for change in changes)
     joint, _, coordinate = best.partition(".")
     written = f'joint = "{joint}", ' + (f'coordinate = "{coordinate}", ' if coordinate else "") + "sign = 1"
-    ways = f"{len(changes)} ways, on which joint {best} begins to move like {text}"
+    ways = f"{len(changes)} ways, on which joint {best} starts to move by {text}"
     if choices:
         raise InputError(
-            "[start.branch]", f"leaves {ways}", f"choose by {{ {written} }} or sign = -1, as one more of a list"
+            "[start.branch]", f"leaves {ways}", f"choose by {{ {written} }} or sign = -1, as a further entry of a list"
         )
     raise SolverError(
         f"{engine.mobility.singular_start}, here in {ways}: choose by [start] branch = {{ {written} }} or sign = -1, "

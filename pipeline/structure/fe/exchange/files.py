@@ -27,7 +27,7 @@ COLUMNS = ("node", "x", "y", "z", "component")
 MOMENTS_UP_TO = 1500
 #: peak memory of reading a file, as a multiple of its content: checks and conversion to SI units make copies
 COPIES = 4.0
-SMALLER = "condense the body, or leave out what no frame needs"
+SMALLER = "condense the body, or remove parts that no frame needs"
 OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
@@ -117,7 +117,7 @@ def read_npz(path: Path, where: str) -> Contents:
         )
         n = len(content.node)
         if not len(content.component) == len(content.position) == n or not np.isfinite(content.position).all():
-            raise ValueError("node, component and position must have as many rows as each other, of finite numbers")
+            raise ValueError("node, component and position must have equally many rows of finite numbers")
         if n == 0 or content.component.min() < 0 or content.component.max() >= len(COMPONENTS):
             raise ValueError(f"components are numbers from 0 to {len(COMPONENTS) - 1}: {', '.join(COMPONENTS)}")
         matrices = []
@@ -160,7 +160,7 @@ def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) 
     content = _table(unknowns, where, max(matrix.shape[0] for matrix in matrices))
     for path, matrix in zip((stiffness, mass), matrices, strict=True):
         if matrix.shape != (len(content.node),) * 2:
-            problem = f"'{path.name}' has the shape {matrix.shape}, '{unknowns.name}' another number of lines"
+            problem = f"'{path.name}' has the shape {matrix.shape}, which does not match the lines of '{unknowns.name}'"
             raise InputError(where, problem)
     return Contents(matrices[0], matrices[1], content, {})
 
@@ -171,7 +171,7 @@ def _matrix(path: Path, where: str) -> sp.coo_array:
     NumPy reads the numbers: `scipy.io.mmread` (1.17) ends the process where a file was cut or has a flipped bit.
     """
     require_file(path, where)
-    with reading(path, where, f"'{path.name}' is no MatrixMarket file"):
+    with reading(path, where, f"'{path.name}' is not a MatrixMarket file"):
         rows, columns, count, layout, field, symmetry = scipy.io.mminfo(path)
         if field not in ("real", "integer", "double") or symmetry not in ("general", "symmetric"):
             raise ValueError(f"its header says {field} {symmetry}; known: real or integer, general or symmetric")
@@ -211,7 +211,7 @@ def _dense(value: np.ndarray, rows: int, columns: int, symmetric: bool) -> sp.co
 def _component(text: str) -> int:
     name = text.strip().lower()
     if name not in COMPONENTS:
-        raise ValueError(f"there is no component '{text}'")
+        raise ValueError(f"unknown component '{text}'")
     return COMPONENTS.index(name)
 
 
@@ -220,7 +220,7 @@ def _table(path: Path, where: str, count: int) -> Table:
     require_file(path, where)
     hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
     with (
-        reading(path, where, f"'{path.name}' is no table of unknowns", hint),
+        reading(path, where, f"'{path.name}' is not a table of unknowns", hint),
         path.open(encoding="utf-8", newline="") as file,
     ):
         rows = list(islice(csv.DictReader(file, skipinitialspace=True), count + 1))

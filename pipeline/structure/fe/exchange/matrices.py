@@ -56,7 +56,7 @@ def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
     try:
         dataset = xr.Dataset(data)
     except ValueError as error:  # integrals in a file have other sizes than its unknowns
-        raise InputError(where, f"what the file holds does not fit together: {error}") from None
+        raise InputError(where, f"the arrays do not fit together: {error}") from None
     kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "matrices")
     return conform(dataset, MATRICES, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
 
@@ -96,7 +96,7 @@ def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: st
         for node in chosen:
             own = np.bincount(table.component[table.node == node], minlength=6)
             if not own.any():
-                raise InputError(where, f"there is no node {node}", "use numbers from the table of unknowns")
+                raise InputError(where, f"unknown node {node}", "use numbers from the table of unknowns")
             if not own[:needed].all():
                 lacks = ", ".join(COMPONENTS[c] for c in np.flatnonzero(own[:needed] == 0))
                 raise InputError(where, f"node {node} has no {lacks}", remedy)
@@ -165,8 +165,8 @@ def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positions: np.nd
     pairs = (np.ones(linked.nnz), (node.ravel()[linked.row], node.ravel()[linked.col]))
     pieces, _ = scipy.sparse.csgraph.connected_components(sp.coo_array(pairs).tocsr(), directed=False)
     if pieces > 1:
-        problem = f"the stiffness matrix is that of {pieces} bodies that share no node"
-        raise InputError(WHERE, problem, "make each a body of its own")
+        problem = f"the stiffness matrix describes {pieces} bodies without common nodes"
+        raise InputError(WHERE, problem, "define each as a separate body")
     try:
         cholesky(M, positions)
     except SolverError:

@@ -87,7 +87,7 @@ def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) 
         if wrong.size:
             shown = ", ".join(str(k) for k in wrong[:5]) + (" ..." if wrong.size > 5 else "")
             problem = f"{wrong.size} of {len(cells)} cells are inverted or flat (Jacobian not positive): {shown}"
-            raise InputError(where, problem, "mend the mesh, or renumber the cells' nodes to a right-handed order")
+            raise InputError(where, problem, "repair the mesh, or renumber the cells' nodes to a right-handed order")
 
 
 def _jacobian(solid: Solid, part: slice, at: Sampled) -> tuple[np.ndarray, np.ndarray]:

@@ -86,7 +86,7 @@ def _check_overlap(geometry: Geometry, where: str) -> None:
     twice = len(corners) - len(np.unique(corners, axis=0))
     crowded = int(np.count_nonzero(_faces(geometry)[1] > 2))
     if twice or crowded:
-        problem = f"{twice} cells are there twice" if twice else f"{crowded} faces belong to more than two cells"
+        problem = f"{twice} duplicate cells" if twice else f"{crowded} faces belong to more than two cells"
         raise InputError(where, f"cells overlap: {problem}", "write each cell once; merge meshes only where they touch")
 
 
@@ -98,8 +98,8 @@ def _check_pieces(geometry: Geometry, where: str) -> None:
     if count > 1:
         sizes = np.sort(np.bincount(label[geometry.cells[:, 0]]))[::-1]
         shown = ", ".join(str(k) for k in sizes[:5])
-        problem = f"the mesh is in {count} pieces that share no node (of {shown} cells)"
-        raise InputError(where, problem, "merge the nodes where the pieces touch, or make each a body of its own")
+        problem = f"the mesh is in {count} pieces without common nodes (of {shown} cells)"
+        raise InputError(where, problem, "merge the nodes where the pieces touch, or define each as a separate body")
 
 
 def _check_numbering(geometry: Geometry, where: str) -> None:

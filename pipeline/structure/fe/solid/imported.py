@@ -24,7 +24,7 @@ FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 OTHER_CELLS = ("vertex", "line", "line3", *FACES)
 #: an integer array of cell data with more distinct values numbers the cells and names no regions
 MOST_REGIONS = 1000
-REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
+REWRITE = "export only its solid cells and named sets, or write VTU or Gmsh"
 
 
 def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
@@ -68,7 +68,7 @@ def _cells(blocks: list[np.ndarray], nodes: int, points: int, where: str) -> np.
         raise InputError(where, problem, REWRITE)
     cells = np.vstack(blocks).astype(np.int64)
     if cells.min() < 0 or cells.max() >= points:
-        raise InputError(where, f"cells name nodes beyond the {points} that the file has", REWRITE)
+        raise InputError(where, f"cells refer to nodes beyond the {points} of the file", REWRITE)
     return cells
 
 

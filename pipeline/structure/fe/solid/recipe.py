@@ -52,7 +52,7 @@ class Block(Part):
     @model_validator(mode="after")
     def _has_a_volume(self) -> Block:
         if not min(self.size) > 0.0:
-            raise ValueError(f"the sides {list(self.size)} m of a block are positive")
+            raise ValueError(f"the sides {list(self.size)} m of a block must be positive")
         return self
 
 
@@ -68,7 +68,7 @@ class MeshFile(Part):
 
 def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(direction):
-        raise ValueError("a direction must not have the length zero")
+        raise ValueError("a direction must not have length zero")
     return direction
 
 
@@ -123,7 +123,7 @@ class On(Part):
         rules = ("region", "plane", "cylinder", "sphere")
         given = [name for name in rules if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(f"one of {', '.join(rules)} says where, not {' and '.join(given) or 'none'}")
+            raise ValueError(f"give exactly one of {', '.join(rules)}, not {' and '.join(given) or 'none'}")
         return self
 
 

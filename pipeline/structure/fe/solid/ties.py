@@ -31,7 +31,7 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
     if on.region is not None:
         named = regions(geometry)
         if on.region not in named:
-            hint = suggestion(on.region, named) if named else "the mesh names none; choose by plane or cylinder"
+            hint = suggestion(on.region, named) if named else "the mesh has none; select by plane or cylinder"
             raise InputError(f"{where[:-1]}.region]", f"no region is called '{on.region}'", hint)
         nodes = named[on.region]
     else:

@@ -23,7 +23,7 @@ FAMILY = "flexclear.pipeline.structure.modes.reference"
 
 def free_free(model: Model, given: Given) -> Condition:
     """Return the condition for normal modes of the free body; `given` is not used."""
-    return _free(model, "the six rigid-body modes below the gap in the free body's frequencies were left out")
+    return _free(model, "the six rigid-body modes below the gap in the free body's frequencies were removed")
 
 
 def craig_chang(model: Model, given: Given) -> Condition:
@@ -35,7 +35,7 @@ def craig_chang(model: Model, given: Given) -> Condition:
     Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
     """
     distinct(interfaces_of(given, 1, "attachment modes need an interface to load"))
-    note = "six rigid-body modes were left out; the attachment modes' rigid motion was taken out by mass orthogonality"
+    note = "six rigid-body modes were removed; the attachment modes' rigid motion was removed by mass orthogonality"
     return _free(model, note, rows(given.interfaces, model.size))
 
 
@@ -53,10 +53,10 @@ def residual_flexibility(model: Model, given: Given) -> Condition:
 def mean_axis(model: Model, given: Given) -> Condition:
     """Return the condition that `given.of` names, with linear and angular momentum removed from its shapes."""
     if given.of is None or given.of == "mean-axis":
-        problem = "mean-axis changes the shapes of another condition, and none is named"
+        problem = "mean-axis changes the shapes of another condition; none is given"
         raise InputError("modes.of", problem, 'name it, as of = "craig-bampton"')
     based: Condition = lookup(FAMILY, given.of, where="modes.of")(model, given)
-    note = f"shapes of {given.of}; their linear and angular momentum was taken out"
+    note = f"shapes of {given.of}; their linear and angular momentum was removed"
     return replace(based, mean_axes=True, note=note)
 
 

@@ -17,7 +17,7 @@ from flexclear.pipeline.structure.modes.condition import WHERE, Condition, Given
 def cantilever(model: Model, given: Given) -> Condition:
     """Return the condition for normal modes with the first interface clamped; raise InputError without interfaces."""
     first = interfaces_of(given, 1, "a cantilever is clamped at an interface")[0]
-    return _holding(first.motion, f"the body frame rides on '{first.name}', where all shapes vanish")
+    return _holding(first.motion, f"the body frame moves with '{first.name}', where all shapes vanish")
 
 
 def craig_bampton(model: Model, given: Given) -> Condition:
@@ -30,7 +30,7 @@ def craig_bampton(model: Model, given: Given) -> Condition:
     distinct(interfaces_of(given, 1, "a Craig-Bampton basis needs at least one interface"))
     held = rows(given.interfaces, model.size)
     first = given.interfaces[0].name
-    note = f"the body frame rides on '{first}', where all shapes vanish; no rigid motion is left"
+    note = f"the body frame moves with '{first}', where all shapes vanish; no rigid motion is left"
     return _holding(held, note, moved=np.arange(6, held.shape[0]))
 
 
@@ -46,7 +46,7 @@ def fixed_fixed(model: Model, given: Given) -> Condition:
     if model.size <= 6 * len(model.ends):
         raise InputError(WHERE, "one element has no coordinate between two clamped ends", "use at least 2")
     names = " and ".join(f"'{end.name}'" for end in model.ends)
-    note = f"the body frame rides on the clamped {names}; no rigid motion is left"
+    note = f"the body frame moves with the clamped {names}; no rigid motion is left"
     return _holding(rows(model.ends, model.size), note)
 
 
@@ -66,7 +66,7 @@ def pinned_pinned(model: Model, given: Given) -> Condition:
     turning = sp.csr_array(along[None, :]) @ first.motion[3:]
     held = sp.vstack([first.motion[:3], turning, sp.csr_array(np.array(across)) @ second.motion[:3]], format="csr")
     held.eliminate_zeros()
-    note = f"the body frame rides on the pins '{first.name}' and '{second.name}'; no rigid motion is left"
+    note = f"the body frame moves with the pins '{first.name}' and '{second.name}'; no rigid motion is left"
     return _holding(sp.csr_array(held), note)
 
 
@@ -91,8 +91,8 @@ def _functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:
     if frame_name not in known:
         raise InputError("modes.held", f"the mesh has no frame called '{frame_name}'", suggestion(frame_name, known))
     if direction not in DIRECTIONS:
-        remedy = f"after the frame comes one of {', '.join(DIRECTIONS)}"
-        raise InputError("modes.held", f"'{name}' names no direction", remedy)
+        remedy = f"after the frame give one of {', '.join(DIRECTIONS)}"
+        raise InputError("modes.held", f"'{name}' has no valid direction", remedy)
     return sp.csr_array(in_own_axes(known[frame_name])[[DIRECTIONS.index(direction)]])
 
 

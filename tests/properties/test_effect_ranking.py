@@ -5,7 +5,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.matters import (
+from flexclear.pipeline.post.answers.effect_ranking import (
     IDEAL,
     Pair,
     assemble,
@@ -82,7 +82,7 @@ def test_the_summary_says_what_changes_by_how_much_and_how_sure_it_is():
     assert "does not change" in same
     (open_,) = ideal_sentences(study(ideal=Pair(point(0.0, 5e-3), point(0.0), 4)))
     assert "at most" in open_
-    assert "would decide it" in open_
+    assert "runs would decide" in open_
 
 
 def test_runs_that_scatter_about_an_undecided_mean_are_not_predictable():
@@ -92,15 +92,15 @@ def test_runs_that_scatter_about_an_undecided_mean_are_not_predictable():
 
 def test_effects_that_the_budget_did_not_reach_are_named_last():
     found = study(strong=Pair(point(0.0), point(0.2), 0)).assign_attrs(undone="gravity")
-    assert sentence(found, {}).endswith("The budget did not reach gravity.")
+    assert sentence(found, {}).endswith("Not examined within the budget: gravity.")
 
 
 def test_the_answer_says_which_accuracy_calls_for_which_effect():
     found = study(strong=Pair(point(0.0), point(0.2), 0), weak=Pair(point(0.0), point(5e-3), 0))
     text = sentence(found, {})
-    assert "An accuracy of 10 % calls for strong." in text
-    assert "An accuracy of 0.1 % calls also for weak." in text
-    assert "An accuracy of 1 % calls for no more." in text
+    assert "For errors below 10 %, model strong." in text
+    assert "For errors below 0.1 %, also model weak." in text
+    assert "For errors below 1 %, no further effect is needed." in text
     assert text.endswith(
         "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
     )
@@ -108,16 +108,18 @@ def test_the_answer_says_which_accuracy_calls_for_which_effect():
 
 def test_a_requested_accuracy_decides_instead_of_levels():
     found = study(strong=Pair(point(0.0), point(0.2), 0), weak=Pair(point(0.0), point(5e-3), 0))
-    assert sentence(found, {"slider.velocity": 0.1}) == "The requested accuracy calls for strong."  # and no percentages
+    assert (
+        sentence(found, {"slider.velocity": 0.1}) == "For the requested accuracy, model strong."
+    )  # and no percentages
 
 
 def test_what_chance_may_hide_is_not_called_absent():
     found = study(unsure=Pair(point(0.0, 0.5), point(0.0, 0.51), 4))
-    assert "not decided: unsure" in sentence(found, {})
+    assert "undecided: unsure" in sentence(found, {})
 
 
 def test_a_refused_variant_is_named_and_calls_for_nothing():
     found = study(broken=Pair(point(0.0), Point({}, {}, {}, 0, "it jams"), 0))
     assert "it jams" in found.attrs["refused"]
     assert any("it jams" in note for note in table(found).notes)
-    assert "not decided: broken" in sentence(found, {})
+    assert "undecided: broken" in sentence(found, {})

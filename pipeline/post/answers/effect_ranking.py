@@ -82,8 +82,8 @@ def assemble(
     uncertainties = np.array([[c.uncertainty for c in row] for row in changes])
     dims = ("effect", "quantity")
     data = {
-        "dropped": (dims, differences, {"long_name": "change without it"}),
-        "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be chance"}),
+        "dropped": (dims, differences, {"long_name": "change without the effect"}),
+        "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be due to chance"}),
         "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
         "scatter": (
@@ -133,13 +133,13 @@ def in_words(
     means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
     bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
-        return f"does not change: the runs agree to {bound}"
+        return f"does not change: the runs agree within {bound}"
     part = percent(change.difference) if change.difference < LARGE * scale else ""
     if not decided(change, scale) and spread > SLIGHT * scale:
         value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and percent(spread)}"
         return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
     if not decided(change, scale):
-        more = f"; about {needed(change, scale, members)} would decide it" if members else ""
+        more = f"; about {needed(change, scale, members)} runs would decide" if members else ""
         return f"changes by {bound} at most{part and percent(change.most)}{means}{more}"
     if change.difference > 0.0:
         slightly = "slightly, " if change.difference < SLIGHT * scale else ""
@@ -160,28 +160,28 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     requested: accuracies of the scene by quantity, in SI units; without them three levels are answered.
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
-    undone = [f"The budget did not reach {result.attrs['undone']}."] if result.attrs["undone"] else []
+    undone = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
     if not single.sizes["effect"]:
-        return " ".join(undone) or "The scene has no effect that could be taken away."
-    levels = [(f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
+        return " ".join(undone) or "The scene has no effect that can be removed."
+    levels = [(f"errors below {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
     if requested:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
-        levels = [("The requested accuracy", asked)]
+        levels = [("the requested accuracy", asked)]
     sentences, named, unchanged = list[str](), list[str](), list[str]()
     for name, limits in levels:
         certain, possible = _called_for(single, limits)
         added = [effect for effect in certain if effect not in named]
         uncertain = [effect for effect in possible if effect not in certain]
-        open_ = f" (not decided: {listed(uncertain)})" if uncertain else ""
-        if added or uncertain:
-            none = "no more for certain" if named else "none for certain"
-            sentences.append(f"{name} calls {'also ' if named and added else ''}for {listed(added or [none])}{open_}.")
+        open_ = f" (undecided: {listed(uncertain)})" if uncertain else ""
+        if added:
+            sentences.append(f"For {name}, {'also ' if named else ''}model {listed(added)}{open_}.")
+        elif uncertain:
+            sentences.append(f"For {name}, no {'further ' if named else ''}effect is certain to be needed{open_}.")
         else:
             unchanged.append(name)
         named += added
-    more = "no more" if named else "none"
-    sentences += [f"{name} calls for {more}." for name in unchanged[:1]]
-    sentences += [f"So does {name[0].lower()}{name[1:]}." for name in unchanged[1:]]
+    if unchanged:
+        sentences.append(f"For {listed(unchanged)}, no {'further ' if named else ''}effect is needed.")
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + undone)
 
@@ -206,10 +206,10 @@ def table(result: xr.Dataset) -> Table:
         cells = [cell(result, "dropped", (i, k), str(unit)) for k, unit in enumerate(result["unit"].values)]
         members = int(result["members"][i])
         rows.append((words, *cells, str(members) if members else "one run"))
-    notes = ["Largest change of each quantity over the run without the effect; behind ±: what of it may be chance."]
+    notes = ["Largest change of each quantity without the effect; the number after ± may be due to chance."]
     notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
     return Table(
-        "What each effect does",
+        "Effect sizes",
         ("without", *(str(q) for q in result["quantity"].values), "members"),
         tuple(rows),
         tuple(notes),
