@@ -141,6 +141,21 @@ def test_vibrations_about_a_ramp_and_a_step_have_their_closed_form_amplitudes():
     # exact for forces that are straight between the rows: rounding of 31 products
     np.testing.assert_allclose(ramp, np.broadcast_to(3.0 / omega**3, ramp.shape), rtol=1e-11)
     np.testing.assert_allclose(step, np.broadcast_to(5.0 / omega**2, step.shape), rtol=1e-11)
+    # a force that sets in at once, between two rows of one time, does the same from then on
+    jump = vibration(np.repeat([[0.0, 0.0], [5.0, 5.0]], [16, 16], axis=0), omega, np.insert(time, 15, time[15]))
+    assert not jump[:16].any()
+    np.testing.assert_allclose(jump[16:], np.broadcast_to(5.0 / omega**2, (16, 2)), rtol=1e-11)
+
+
+def test_a_jump_of_a_drives_acceleration_is_no_ramp_over_one_output(tmp_path: Path):
+    """The rates of quasi-static deformation do not grow with the number of outputs at the end of a step."""
+    leg, law = _standing_leg(tmp_path), {"type": "step", "start": 0.0, "end": 4e-4, "change": 1e-4}
+    speeds = []
+    for interval in (1e-4, 2e-5):
+        moved = edited(leg, {"drive.stroke": {"joint": "slide", "law": law}, "output.interval": interval})
+        speeds.append(pilot(moved).response(Quantity("platform", "velocity")).influence["platform.velocity"])
+    # what is left: the law between the breaks, straight from output to output; with a ramp the ratio is five
+    assert speeds[1] == pytest.approx(speeds[0], rel=0.1)
 
 
 def test_the_recommended_elements_give_the_requested_error(tmp_path: Path):

@@ -33,6 +33,7 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
 from flexclear.pipeline.dynamics.run.run import Run
 
 #: number of poses at which the vibrations are computed
@@ -75,12 +76,13 @@ def response(
     if not bundles or not clearance_response.knows_all_joints(model):
         return unknown
     once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both sides
-    time = time[once]
-    held = [
-        n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
-    ]
-    loads = joint_wrenches(motions, held)
-    forces = np.hstack([clearance_response.modal_forces(motions, n, b, loads)[once] for n, b in bundles.items()])
+    forces, time = _modal_forces(motions, bundles)[once], time[once]
+    # accelerations may jump at breaks of the laws: those after each follow the recorded ones, at the same time
+    at = np.flatnonzero(np.isin(time, run.engine.breaks[1:-1]))
+    if len(at):
+        after = observe(run.engine, run.trajectory.rows[once][at], after=True)
+        forces = np.insert(forces, at + 1, _modal_forces(Motions(model, after), bundles), axis=0)
+        time = np.insert(time, at + 1, time[at])
     joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
@@ -94,6 +96,14 @@ def response(
     return Response(
         min(r.first for r in responses), excited, max((r.amplification for r in responding), default=np.nan), worst
     )
+
+
+def _modal_forces(motions: Motions, bundles: Mapping[str, Labelled]) -> np.ndarray:
+    """Return the forces on the elastic coordinates of all bodies, shape (rows, modes) [N]."""
+    joints = motions.model.scene.joint.items()
+    held = [name for name, joint in joints if any(end.partition(".")[0] in bundles for end in joint.between)]
+    loads = joint_wrenches(motions, held)
+    return np.hstack([clearance_response.modal_forces(motions, n, b, loads) for n, b in bundles.items()])
 
 
 @dataclass(frozen=True)
@@ -196,7 +206,7 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
     f = forces @ assembled.modes[-forces.shape[1] :]
     still = f / omega**2
     amplitude = vibration(f, omega, time)
-    rate = np.gradient(still, time, axis=0) if len(time) > 1 else np.zeros(still.shape)
+    rate = _slopes(still, time)
     influence = {}
     for q in chosen:
         if q.kind in (*POSITIONS, *RATES) and q.owner in assembled.model.mechanism.link_of:
@@ -241,21 +251,30 @@ def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
 def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
     r"""Return amplitudes of the vibrations about the quasi-static motion, from rest, shape (rows, vibrations).
 
-    f: forces per modal mass, (rows, vibrations), linear between the rows.  The deviation
-    :math:`d = \eta - f/\omega^2` vibrates freely between the rows, and its rate jumps where the slope of f does.
+    f: forces per modal mass, (rows, vibrations), linear between the rows; two rows of one time are a jump.  The
+    deviation :math:`d = \eta - f/\omega^2` vibrates freely between the rows, its rate jumps where the slope of f does,
+    and it jumps by :math:`-\Delta f/\omega^2` itself.
     """
     still = f / omega**2
-    steps = np.diff(time)
-    slope = np.diff(still, axis=0) / steps[:, None]
+    steps, rises, slope = np.diff(time), np.diff(still, axis=0), _slopes(still, time)
     z = -still[0] + 1j * slope[0] / omega  # d + i times minus its rate over omega, in the turning frame
     amplitude = np.empty(still.shape)
     amplitude[0] = np.abs(z)
     for k, step in enumerate(steps):
-        z = z * np.exp(1j * omega * step)
-        if k + 1 < len(slope):
-            z = z + 1j * (slope[k + 1] - slope[k]) / omega
+        z = z * np.exp(1j * omega * step) if step else z - rises[k]
+        z = z + 1j * (slope[k + 1] - slope[k]) / omega
         amplitude[k + 1] = np.abs(z)
     return amplitude
+
+
+def _slopes(values: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return the slope of a series, linear between its rows, after each row; after the last row, that before it."""
+    steps = np.diff(time)[:, None]
+    slope = np.divide(np.diff(values, axis=0), steps, out=np.zeros_like(values[1:]), where=steps > 0.0)
+    slope = np.vstack([slope, slope[-1:]]) if len(slope) else np.zeros_like(values)
+    jumps = np.flatnonzero(np.diff(time) == 0.0)
+    slope[jumps] = slope[jumps + 1]
+    return slope
 
 
 def _reaction(assembled: _Assembled, joint: str) -> np.ndarray:
