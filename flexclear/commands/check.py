@@ -315,12 +315,25 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
 
         mechanism = assembled(mechanism)
         refuse_missed(mechanism)
+    if not _starts_ideal(whole):
+        _note_choice(whole, mechanism, findings)
     for body, text, remedy in missing_joints(mechanism):
         findings.warnings.append(scenes.placed(InputError(f"[body.{body}]", text, remedy), whole.path))
     unused = unused_frames(mechanism)
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
         findings.notes.append(f"unused frames: {', '.join(unused[:LISTED_FRAMES])}{more}")
+
+
+def _starts_ideal(whole: Scene) -> bool:
+    """Return True for a scene that starts as its ideal mechanism does."""
+    return whole.start is not None and whole.start.at == "ideal"
+
+
+def _note_choice(whole: Scene, mechanism: Mechanism, findings: Findings) -> None:
+    """Warn of a start that the scene does not choose; frames moved within their tolerance are no choice."""
+    if "[start.joint." in mechanism.choice:
+        findings.warnings.append(scenes.placed(InputError("[start]", mechanism.choice), whole.path))
 
 
 def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
@@ -345,11 +358,13 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings
 
     idealised = bool(loose(whole) or whole.flexible())
     try:
-        mechanism = _mechanism(ideal(whole) if idealised else whole, rigid)
-        free = analyse(tabulate(mechanism)).mobility
+        model = tabulate(_mechanism(ideal(whole) if idealised else whole, rigid))
+        free = analyse(model).mobility
     except InputError as error:  # other errors: the mechanism moves only with flexible bodies or with clearance
         if error.place.startswith(ACTING):
             findings.errors.append(scenes.placed(error, whole.path))
         return
+    if _starts_ideal(whole):
+        _note_choice(whole, model.mechanism, findings)
     closed = " with loose joints closed" if loose(whole) else ""
     findings.notes.append(f"free motions in addition to the drives{closed}: {free}")

@@ -11,7 +11,7 @@ from flexclear.commands.scenes import graphs, joined, pictures, print_files, sce
 from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import EFFECTS, ideal, loose
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, of_trial
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.pages import Part, page
 from flexclear.stages.graph import Graph
@@ -80,7 +80,7 @@ def bring(
     }
     outcome = workplace.bring(list(tight.values()))
     for failure in outcome.failures:
-        workplace.monitor.say(f"no error can be determined: {failure.message}")
+        workplace.monitor.say(f"no error can be determined: {of_trial(failure.message)}")
     (made,) = workplace.made(_task(graphs, {label: task for label, task in tight.items() if task in outcome.records}))
     title = f"Compared: {', '.join(graphs)}"
     publish(made.folder / "index.html", page(title, "The first run is the reference.", parts(made)))

@@ -25,7 +25,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.post.cost.answer import sentences
-from flexclear.stages import simulation
+from flexclear.stages import graph, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, open_workplace
 from tests.stages.conftest import Command
@@ -184,6 +184,19 @@ def test_a_method_that_used_up_its_evaluations_is_run_at_no_tighter_tolerance(
     study._queue([first, *tighter])
     assert [design.key for design in study.points] == [first.key]
     assert study.undone == tighter
+
+
+def test_the_limit_of_a_trial_run_is_not_called_the_scenes(
+    tmp_path: Path, fresh: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+):
+    """The run at a tighter tolerance, which determines the error of a compared run, has a limit of its own."""
+    monkeypatch.setattr(graph, "FEWEST_EVALUATIONS", 1)
+    monkeypatch.setattr(graph, "TIGHTER_EVALUATIONS", 1)
+    one = write("pendulum", tmp_path)[0]
+    other = one.with_name("heavy.toml")
+    other.write_text(one.read_text().replace('mass = "1 kg"', 'mass = "2 kg"'))
+    said = command("compare", one, other, "--jobs", "1").err
+    assert "evaluations is used up (a trial run's own limit, not the scene's [solver.evaluations])" in said
 
 
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, command: Command):

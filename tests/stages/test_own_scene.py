@@ -249,6 +249,46 @@ def test_check_looks_whether_the_joints_of_flexible_bodies_fit(tmp_path: Path, c
     assert re.search(r"\[joint\.\w+", command("check", scene, code=2).err)
 
 
+@pytest.mark.parametrize("at", ["ideal", "poses"])
+def test_check_warns_of_a_crank_behind_a_gear_that_starts_anywhere(at: str, tmp_path: Path, command: Command):
+    """The drive turns the pinion, and the gear's offset is that of the start: any angle of the crank fits."""
+    path = write("four-bar", tmp_path)[0]
+    text = "\n".join(line for line in path.read_text().split("\n") if not line.startswith("pose = "))
+    text = (
+        text.replace('"C.peak_force", ', "")
+        .replace('joint = "A"', 'joint = "m"')
+        .replace("frames.A = {}", "frames.A = {}\nframes.m = {}")
+    )
+    if at == "poses":  # with an ideal pin: loose, the loop would leave the crank at zero
+        text = (
+            f"{text.partition('[joint.C]')[0]}[joint.C]\ntype = 'revolute'\nbetween = ['coupler.C', 'rocker.C']\n"
+            + (f"[drive.motor]{text.partition('[drive.motor]')[2]}")
+        )
+    more = """
+    [body.pinion]
+    type = "rigid"
+    mass = 0.5
+    inertia = [2e-4, 2e-4, 4e-4]
+    frames.c = {}
+    [joint.m]
+    type = "revolute"
+    between = ["ground.m", "pinion.c"]
+    [gear.pair]
+    first = "m"
+    second = "A"
+    ratio = -0.25
+    [start]
+    """
+    start = 'at = "ideal"\n' if at == "ideal" else ""
+    path.write_text(f'{text}{more}{start}joint.D.near = "80 deg"\n')
+    said = command("check", path).err
+    assert "[start]" in said
+    assert "does not say where coordinates that gears couple start: A is at" in said
+    assert "[start.joint.A] position" in said
+    path.write_text(f'{text}{more}{start}joint.D.near = "80 deg"\njoint.A.position = "10 deg"\n')
+    assert "does not say" not in command("check", path).err
+
+
 def test_check_looks_at_a_recipe_as_a_recipe(tmp_path: Path, command: Command):
     _, rod = write("slider-crank", tmp_path)
     # 200 mm x 12 mm x 8 mm of 7850 kg/m^3

@@ -6,6 +6,8 @@ from typing import Any
 
 #: largest size of each piece of an error message, and of all errors of a file together [bytes]
 LONGEST_SHOWN, LONGEST_MESSAGE = 1000, 3500
+#: key that refusals name for a run's limit of evaluations, and what they name in trial runs, whose limits are lower
+EVALUATIONS, OF_TRIAL = "([solver.evaluations])", "(a trial run's own limit, not the scene's [solver.evaluations])"
 #: exit code of a command that Ctrl-C ended
 INTERRUPTED = 130
 
@@ -16,6 +18,11 @@ def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
         text = _short(text, longest)
     text = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
     return _short(text, longest) if len(text.encode(errors="replace")) > longest else text
+
+
+def of_trial(refused: str) -> str:
+    """Return why a trial run was refused, as its user reads it."""
+    return refused.replace(EVALUATIONS, OF_TRIAL)
 
 
 def _short(text: str, longest: int) -> str:

@@ -8,14 +8,14 @@ with a given pose stay still as long as that is possible.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.dynamics.model.closing import close, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint
-from flexclear.pipeline.dynamics.model.driving import joint_type, label
+from flexclear.pipeline.dynamics.model.driving import joint_type, label, named_coordinate
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
@@ -63,10 +63,7 @@ def assemblies(
         made = Assembly(poses, _coordinates(joints, poses))
         if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME_ASSEMBLY for other in distinct):
             distinct.append(made)
-        if (
-            not _isolated(mechanism, joints, poses)
-            and _distance(mechanism, joints, made.coordinates, hints) < NEAR_HINTS
-        ):
+        if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR_HINTS:
             break  # a mechanism that can move: its first assembly near the hints counts
     return sorted(
         distinct,
@@ -81,9 +78,12 @@ def assemblies(
 def ambiguity(
     mechanism: Mechanism, joints: Sequence[Constraint], candidates: Sequence[Assembly], starts: Sequence[Given]
 ) -> str:
-    """Return a sentence that lists several assemblies between which the scene does not choose; else an empty text."""
+    """Return a sentence on a start that the scene does not choose: one of several assemblies, or where coordinates that
+    gears couple start; else an empty text."""
     first = candidates[0]
-    if len(candidates) < 2 or not _isolated(mechanism, list(joints), first.poses):
+    if _freedoms(mechanism, joints, first.poses):
+        return _geared(mechanism, joints, first, starts)
+    if len(candidates) < 2:
         return ""
     hints, _ = targets(joints, starts)
     distances = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
@@ -98,6 +98,32 @@ def ambiguity(
         f"the joints can be assembled in {len(candidates)} ways, and the scene does not select one: it starts with "
         f"{called} at {first.coordinates[name, k]:.4g} {coordinate.unit}, the others have {values}; "
         f"[start.joint.{called}] near = ... selects one"
+    )
+
+
+def _geared(mechanism: Mechanism, joints: Sequence[Constraint], at: Assembly, starts: Sequence[Given]) -> str:
+    """Return a sentence that lists free coordinates which gears couple, and which start neither as given nor at 0."""
+    scene, given, left = mechanism.scene, {(start.joint, start.number) for start in starts}, dict[str, str]()
+    by_name, freedoms = {joint.name: joint for joint in joints}, _freedoms(mechanism, joints, at.poses)
+    for name, gear in scene.gear.items():
+        for side, text in (("first", gear.first), ("second", gear.second)):
+            joint, coordinate = named_coordinate(scene, text, f"[gear.{name}.{side}]")
+            if joint not in by_name:
+                continue  # its bodies move as one, which is refused
+            one, kind = by_name[joint], by_name[joint].edge.kind
+            k = joint_type(kind).COORDINATES.index(coordinate)
+            value = at.coordinates[joint, k]
+            if (joint, k) in given or k in one.values or abs(value) <= SAME_ASSEMBLY:
+                continue
+            held = [replace(other, values={**other.values, k: value}) if other is one else other for other in joints]
+            if _freedoms(mechanism, held, at.poses) < freedoms:
+                left[label(joint, kind, k)] = f"{value:.4g} {coordinate.unit}"
+    if not left:
+        return ""
+    return (
+        "the scene does not say where coordinates that gears couple start: "
+        f"{', '.join(f'{called} is at {value}' for called, value in left.items())}; "
+        f"[start.joint.{next(iter(left))}] position = ... sets one"
     )
 
 
@@ -164,10 +190,10 @@ def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, ot
     return max(differences)
 
 
-def _isolated(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> bool:
-    """Return True when the joints and the prescribed coordinates leave no motion."""
+def _freedoms(mechanism: Mechanism, joints: Sequence[Constraint], poses: list[Placement]) -> int:
+    """Return the number of motions that the joints and the prescribed coordinates leave."""
     free = [i for i, link in enumerate(mechanism.links) if i and not link.massless]
     columns = [6 * (i - 1) + k for i in free for k in range(6)]
-    gradient = misfit(mechanism, joints, poses).gradient().toarray()[:, columns]
+    gradient = misfit(mechanism, list(joints), poses).gradient().toarray()[:, columns]
     values = np.linalg.svd(gradient, compute_uv=False)
-    return len(columns) <= len(values) and bool(values[len(columns) - 1] > LOOSE * values[0])
+    return len(columns) - int(np.sum(values > LOOSE * values.max(initial=0.0)))

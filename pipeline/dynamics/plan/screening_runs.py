@@ -16,6 +16,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect, effects, with_modes, without
+from flexclear.pipeline.core.system.errors import EVALUATIONS as TAKES_LONG
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.model.mechanism import build
@@ -42,8 +43,6 @@ WHOLE_TIME = 8
 GIVEN_UP = 4.0
 #: runs at tight tolerances may take this many times more
 OF_TIGHT = 2
-#: key path that refusals name for that limit
-TAKES_LONG = "[solver.evaluations]"
 #: identity of a variant: the effects that it lacks, and its solver
 Key = tuple[frozenset[str], str]
 

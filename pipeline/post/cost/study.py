@@ -18,7 +18,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.output import Schema, Variable, table
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError, of_trial
 
 #: groups of points and the factors that span each
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -152,7 +152,7 @@ def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
 
 def _reason(refused: xr.Dataset) -> str:
     """Return why a run was refused, without the other warnings and remedies."""
-    return str(refused.attrs["refused"]).partition(";")[0]
+    return of_trial(str(refused.attrs["refused"]).partition(";")[0])
 
 
 def _over_factors(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.plausibility import negative_gains
+from flexclear.pipeline.core.system.errors import EVALUATIONS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -41,7 +42,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     if not engine.model.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion diverges"
     reasons = {
-        m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is reached ([solver.evaluations]); "
+        m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is reached {EVALUATIONS}; "
         + _why_so_many(engine, n, control),
         m.STEP_TOO_SMALL: f"the step shrank to {control[m.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than the integrator can follow ({where})",
