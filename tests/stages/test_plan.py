@@ -43,6 +43,8 @@ from tests.stages.conftest import Command
 #: of the leg's rod [m, Pa, kg/m^3], and what stands on it [kg]
 LENGTH, RADIUS, MODULUS, DENSITY, PLATFORM = 0.24, 0.01, 71.7e9, 2740.0, 3.0
 GRAVITY = 9.81
+#: acceleration with which a base starts under a rod [m/s^2]
+START = 981.0
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -106,6 +108,45 @@ def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(standi
     assert found.influence["platform.position"] == pytest.approx(2.0 * expected, rel=5e-3)
     # the part of the platform's weight that swings, and a twentieth of it more for the mass of the rod
     assert found.influence["ball.force"] == pytest.approx(PLATFORM * GRAVITY, rel=0.05)
+
+
+def _between_ball_joints(tmp_path: Path) -> Scene:
+    """The leg's rod between two ball joints, on a base that starts upwards across it; a tip slides along the rod."""
+    write("leg", tmp_path)
+    modes = {"reference": "craig-bampton", "count": 13, "interfaces": ["bottom", "top"]}
+    rail = {"axis": [1, 0, 0]}
+    base = rigid(1.0, 1e-2, {"lift": {"axis": [0, 1, 0]}, "O": {}, "rail": {**rail, "position": [LENGTH, 0, 0]}})
+    tip = rigid(1e-3, 1e-9, {"c": {}, "rail": rail}, pose={"position": [LENGTH, 0, 0]})
+    table = {
+        "title": "a rod between ball joints",
+        "time": {"end": 0.02},
+        "output": {"interval": 5e-5},
+        "body": {
+            "ground": {"type": "ground", "frames": {"O": {"axis": [0, 1, 0]}}},
+            "base": base,
+            "rod": {"type": "flexible", "mesh": str(tmp_path / "leg_rod.toml"), "modes": modes},
+            "tip": tip,
+        },
+        "joint": {
+            "lift": {"type": "prismatic", "between": ["ground.O", "base.lift"]},
+            "foot": {"type": "spherical", "between": ["base.O", "rod.bottom"]},
+            "head": {"type": "spherical", "between": ["rod.top", "tip.c"]},
+            "rail": {"type": "prismatic", "between": ["base.rail", "tip.rail"]},
+        },
+        "drive": {"lift": {"joint": "lift", "law": {"type": "polynomial", "coefficients": [0.0, 0.0, 0.5 * START]}}},
+    }
+    return Scene.model_validate(table)
+
+
+def test_the_response_has_the_change_of_length_of_a_rod_that_bends(tmp_path: Path):
+    """A beam on two supports bends by a sum of sines, of amplitudes 4 q L^4/(pi^5 E I k^5), twice that when it starts
+    suddenly. With linear shapes, about the tangent at its foot, its end is w = 4 q L^4/(pi^4 E I k^4) off that tangent
+    by each; so its length between the ends grows by w^2/(2 L), and the tip, which no bending moves at first order."""
+    found = pilot(_between_ball_joints(tmp_path)).response(Quantity("tip", "position"))
+    weight = DENSITY * np.pi * RADIUS**2 * START
+    w = 2.0 * 4.0 * weight * LENGTH**4 / (np.pi**4 * MODULUS * 0.25 * np.pi * RADIUS**4)
+    # of further sines the squares are 3^-8 of that; the elements' shear, and the light tip, a thousandth
+    assert found.influence["tip.position"] == pytest.approx(w**2 / (2.0 * LENGTH), rel=2e-3)
 
 
 def test_the_reported_vibration_is_one_that_the_loads_excite(standing: Pilot):

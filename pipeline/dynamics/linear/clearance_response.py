@@ -18,22 +18,23 @@ Source: the closure equations of `pipeline.dynamics.model.closing`, differentiat
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import block_diag
 from scipy.sparse.linalg import SuperLU, splu
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled
-from flexclear.pipeline.core.numerics.rotations import cross, skew
+from flexclear.pipeline.core.numerics.rotations import cross, rotation_vector_to_matrix, skew
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.effects import NORMAL_LAWS, SURFACES
-from flexclear.pipeline.dynamics.model.closing import misfit
+from flexclear.pipeline.dynamics.model.closing import displaced, misfit
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
@@ -53,6 +54,11 @@ BOUND_TIMES = 32
 #: squared singular values of the joints' rates far below this fraction of the largest are zero, and a watched quantity
 #: with up to this freedom counts as held: within some 3e-4 of a singular pose no bound exists
 SQUARED_RANK, FREE = 1e-13, 1e-6
+#: largest rotation, and displacement in units of the mechanism's size, at which second order is evaluated: the fourth
+#: is a millionth of it then, and rounding 1e-10
+FINITE = 1e-3
+#: fraction of the largest motion below which the square of a motion, a thousandth of the largest square, is left out
+MINOR = 0.03
 #: assumed force on a joint with clearance after separation, as a multiple of the ideal force
 KNOCK = 10.0
 #: quantities that follow from the pose
@@ -242,6 +248,61 @@ def openings(
                 if body in (end, end.partition(".")[0]):
                     matrix[rows] += sign * (wrenches @ twist)
     return matrix, carried
+
+
+def curvature(
+    model: Model, poses: Sequence[Placement], lever: OpeningMap, bundles: Mapping[str, Labelled], moves: np.ndarray
+) -> np.ndarray:
+    """Return the openings of joints at second order by motions that open none at first order, shape (rows, moves).
+
+    moves: of links and elastic coordinates, (x, q), shape (n, moves), in their actual sizes: those far smaller than the
+    largest count as zero.
+    """
+    m, length = 6 * (len(poses) - 1), model.mechanism.length
+    ends = block_diag(*(_ends(bundle, length) for bundle in bundles.values())) @ moves[m:]
+    size = np.abs(np.vstack([moves[:m], ends])).max(axis=0)
+    joints, found = list[Constraint](), np.zeros((lever.gradient.shape[0], moves.shape[1]))
+    for joint, *_ in lever.joints.values():  # driven coordinates have moved on from the start's
+        now = joint.coordinates(poses)
+        joints.append(replace(joint, values={k: now[joint.name, k] for k in joint.values}))
+
+    def residuals(move: np.ndarray) -> np.ndarray:
+        moved = displaced(model.mechanism, poses, move[:m])
+        return misfit(model.mechanism, _bent(model, joints, bundles, move[m:]), moved).values
+
+    closed = misfit(model.mechanism, joints, poses).values  # to the tolerance of the run
+    for k in np.flatnonzero(size > MINOR * size.max()):
+        step = moves[:, k] * (FINITE / size[k])
+        found[:, k] = (0.5 * (residuals(step) + residuals(-step)) - closed) * (size[k] / FINITE) ** 2
+    return found
+
+
+def _ends(bundle: Labelled, length: float) -> np.ndarray:
+    """Return rotations and displacements of a body's frames, in units of a length, per elastic coordinate."""
+    shapes = bundle["frame_rotation_shape"].values, bundle["frame_translation_shape"].values / length
+    return np.vstack([shape.reshape(-1, shape.shape[-1]) for shape in shapes])
+
+
+def _bent(
+    model: Model, joints: Sequence[Constraint], bundles: Mapping[str, Labelled], q: np.ndarray
+) -> list[Constraint]:
+    """Return the joints with their frames displaced on their links by the elastic coordinates of all bodies."""
+    bent, first = list(joints), 0
+    for name, bundle in bundles.items():
+        own, first = q[first : first + bundle.sizes["mode"]], first + bundle.sizes["mode"]
+        place = model.mechanism.links[model.mechanism.link_of[name]].placements[name]
+        frames = [str(frame) for frame in bundle["frame"].values]
+        for body, frame in _carried(model.scene, name).items():
+            k = frames.index(frame)
+            at = place.of(Placement(bundle["frame_position"].values[k])).p
+            R = rotation_vector_to_matrix(place.R @ bundle["frame_rotation_shape"].values[k] @ own)
+            moved = Placement(at + place.R @ bundle["frame_translation_shape"].values[k] @ own - R @ at, R)
+            for j, joint in enumerate(bent):
+                if body in (joint.edge.frame_a, joint.edge.frame_a.partition(".")[0]):
+                    bent[j] = joint = replace(joint, place_a=moved.of(joint.place_a))
+                if body in (joint.edge.frame_b, joint.edge.frame_b.partition(".")[0]):
+                    bent[j] = replace(joint, place_b=moved.of(joint.place_b))
+    return bent
 
 
 def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:

@@ -10,6 +10,10 @@ links. The vibrations are those of the assembled mechanism. From rest, each of t
 vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
 undamped). Rates are those of the vibrations; joint forces follow from accelerations, by the joint's adjoint solution.
 
+A soft rod between two ball joints bends without any motion of a platform at first order, but its length between them
+changes with the square of the bending. So these squares count as well for positions and rates, each vibration by
+itself, with the links' motions that close the joints at second order.
+
 Each evaluation holds the pose fixed, so several poses of the motion are examined. The result sums all amplitudes,
 which bounds the effect of the vibrations from above.
 
@@ -89,7 +93,7 @@ def response(
         assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
-        responses.append(_at(assembled, forces, time, chosen))
+        responses.append(_at(assembled, bundles, forces, time, chosen))
     worst = {q.name: max(r.influence[q.name] for r in responses) for q in chosen}
     responding = [r for r in responses if np.isfinite(r.excited)]
     excited = min((r.excited for r in responding), default=np.nan)
@@ -200,13 +204,23 @@ def _momenta(bundle: Labelled, placement: Placement, centre: np.ndarray) -> tupl
     return push, about_frame + np.cross(placement.p - centre, push, axisa=0, axisb=0).T
 
 
-def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Sequence[Quantity]) -> Response:
+def _at(
+    assembled: _Assembled,
+    bundles: Mapping[str, Labelled],
+    forces: np.ndarray,
+    time: np.ndarray,
+    chosen: Sequence[Quantity],
+) -> Response:
     """Return the response with the vibrations of one pose."""
     omega = assembled.omega
     f = forces @ assembled.modes[-forces.shape[1] :]
     still = f / omega**2
     amplitude = vibration(f, omega, time)
     rate = _slopes(still, time)
+    most, fastest = np.abs(still) + amplitude, np.abs(rate) + amplitude * omega
+    largest = most.max(axis=0, initial=np.finfo(float).tiny)
+    moves = assembled.modes * largest
+    curved = clearance_response.curvature(assembled.model, assembled.poses, assembled.lever, bundles, moves)
     influence = {}
     for q in chosen:
         if q.kind in (*POSITIONS, *RATES) and q.owner in assembled.model.mechanism.link_of:
@@ -216,10 +230,15 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
                 continue
             per_vibration = moved @ assembled.modes
             size = np.linalg.norm(per_vibration, axis=0)
+            rigid = clearance_response.body_motion(assembled.model, assembled.poses, q.owner, turning=q.kind in TURNS)
+            square = np.linalg.norm(assembled.lever.adjoint(rigid)[0] @ curved, axis=0)
             if q.kind in POSITIONS:
-                sizes = np.linalg.norm(still @ per_vibration.T, axis=1) + amplitude @ size
+                sizes = (
+                    np.linalg.norm(still @ per_vibration.T, axis=1) + amplitude @ size + (most / largest) ** 2 @ square
+                )
             else:
                 sizes = np.linalg.norm(rate @ per_vibration.T, axis=1) + amplitude @ (size * omega)
+                sizes += 2.0 * (most / largest * fastest / largest) @ square
             influence[q.name] = float(sizes.max())
         elif q.kind in FORCES and q.owner in assembled.lever.joints:
             size = np.linalg.norm(_reaction(assembled, q.owner), axis=0)

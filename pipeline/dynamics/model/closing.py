@@ -94,7 +94,7 @@ def close(
         normal, rows = G @ gradient.T, len(now.values)
         scale = max(damping * float(np.linalg.norm(now.values)), LEAST_DAMPING) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
-        there = _moved(mechanism, here, step)
+        there = displaced(mechanism, here, step)
         then = misfit(mechanism, joints, there)
         if np.linalg.norm(then.values) < np.linalg.norm(now.values):
             here, now, damping = there, then, 0.1 * damping
@@ -151,7 +151,8 @@ def _mobilities(mechanism: Mechanism, poses: Sequence[Placement], still: Collect
     return np.array(result)
 
 
-def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> list[Placement]:
+def displaced(mechanism: Mechanism, poses: Sequence[Placement], step: np.ndarray) -> list[Placement]:
+    """Return the poses after motions of the links, shape (6 (links - 1),), as in `misfit`."""
     moved = [poses[0]]
     for i, link in enumerate(mechanism.links[1:], start=1):
         turn, shift = step[6 * i - 6 : 6 * i - 3], mechanism.length * step[6 * i - 3 : 6 * i]
