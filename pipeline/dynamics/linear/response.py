@@ -1,4 +1,4 @@
-r"""First-order effect of flexible bodies along the ideal motion: on positions, rates and the forces of joints.
+r"""Estimated effect of flexible bodies along the ideal motion: on positions, rates and the forces of joints.
 
 Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that keep all joints closed
 (`clearance_response`):
