@@ -231,7 +231,7 @@ def _page(
             "Effects present and absent",
             prose(("effect", "in the scene"), effects(parameters(run)).items()) if run is not None else "",
         ),
-        Part("cost", "How it was computed", prose(("figure", "value"), _rows(attributes, COST).items())),
+        Part("cost", "How it was computed", prose(("quantity", "value"), _rows(attributes, COST).items())),
         Part("provenance", "Provenance", prose(("item", "value"), _provenance(graph, made).items())),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
     ]

@@ -196,7 +196,7 @@ def test_the_limit_of_a_trial_run_is_not_called_the_scenes(
     other = one.with_name("heavy.toml")
     other.write_text(one.read_text().replace('mass = "1 kg"', 'mass = "2 kg"'))
     said = command("compare", one, other, "--jobs", "1").err
-    assert "evaluations is used up (a trial run's own limit, not the scene's [solver.evaluations])" in said
+    assert "evaluations is reached (a trial run's own limit, not the scene's [solver.evaluations])" in said
 
 
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, command: Command):
