@@ -306,7 +306,7 @@ def refused_below(least: float, run: xr.Dataset) -> xr.Dataset:
 
     def once(scene: Scene, judges: object) -> xr.Dataset:
         if scene.solver.rtol < least:
-            raise SolverError("the limit of evaluations is used up")
+            raise SolverError("the limit of evaluations is reached")
         return run
 
     by_need = SimpleNamespace(best=lambda rtol: "dop853", why=lambda rtol: "", judges=lambda rtol: None)

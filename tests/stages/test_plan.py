@@ -149,6 +149,17 @@ def test_the_response_has_the_change_of_length_of_a_rod_that_bends(tmp_path: Pat
     assert found.influence["tip.position"] == pytest.approx(w**2 / (2.0 * LENGTH), rel=2e-3)
 
 
+@pytest.mark.parametrize("load, known", [(0.09, True), (0.11, False), (-0.11, False)])
+def test_near_a_buckling_load_the_response_is_unknown(tmp_path: Path, load: float, known: bool):
+    """An axial load P changes the square of a beam's first frequency by 2 P/(Euler's load), as a fraction, with linear
+    shapes: in a sine of amplitude a its end moves by (pi a)^2/(2 L), twice as far as that of a beam that keeps its
+    length, and the other way."""
+    euler = np.pi**2 * MODULUS * 0.25 * np.pi * RADIUS**4 / LENGTH**2
+    force = {"type": "point-force", "frame": "tip.c", "force": [load * euler, 0.0, 0.0]}
+    found = pilot(edited(_between_ball_joints(tmp_path), {"load.push": force})).response(Quantity("tip", "position"))
+    assert np.isfinite(found.influence["tip.position"]) == known
+
+
 def test_the_reported_vibration_is_one_that_the_loads_excite(standing: Pilot):
     """Loads along an upright leg leave its bending at rounding, which the sudden weight seemed to magnify 12 times.
 

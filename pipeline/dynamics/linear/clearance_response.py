@@ -277,6 +277,20 @@ def curvature(
     return found
 
 
+def multipliers(motions: Motions, lever: OpeningMap, loads: Mapping[str, Wrench], row: int) -> np.ndarray:
+    """Return the forces of joints and drives on their residuals at a row of the ideal motion, shape (rows,) [N or N m].
+
+    loads: wrenches of all joints, from `joint_wrenches`.
+    """
+    found = np.zeros(lever.gradient.shape[0])
+    for name, (_, rows, wrenches) in lever.joints.items():
+        moment, force = (part[row] for part in loads[name])
+        second = motions.positions([motions.model.scene.joint[name].between[1]])[row, 0]
+        acting = np.concatenate([moment + np.cross(second, force), force])
+        found[rows] = np.linalg.lstsq(wrenches.T, acting, rcond=None)[0]
+    return found
+
+
 def _ends(bundle: Labelled, length: float) -> np.ndarray:
     """Return rotations and displacements of a body's frames, in units of a length, per elastic coordinate."""
     shapes = bundle["frame_rotation_shape"].values, bundle["frame_translation_shape"].values / length

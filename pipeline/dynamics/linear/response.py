@@ -1,4 +1,4 @@
-r"""First-order effect of flexible bodies along the ideal motion: on positions, rates and the forces of joints.
+r"""Estimated effect of flexible bodies along the ideal motion: on positions, rates and the forces of joints.
 
 Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that keep all joints closed
 (`clearance_response`):
@@ -12,7 +12,8 @@ undamped). Rates are those of the vibrations; joint forces follow from accelerat
 
 A soft rod between two ball joints bends without any motion of a platform at first order, but its length between them
 changes with the square of the bending. So these squares count as well for positions and rates, each vibration by
-itself, with the links' motions that close the joints at second order.
+itself, with the links' motions that close the joints at second order. The forces of joints do work on these openings,
+which changes the frequencies: where it does by much, as near a buckling load, the response is unknown.
 
 Each evaluation holds the pose fixed, so several poses of the motion are examined. The result sums all amplitudes,
 which bounds the effect of the vibrations from above.
@@ -51,6 +52,9 @@ FOLLOWED, NO_STIFFNESS = 1e-9, 1e-12
 #: least force on an excited vibration, as a fraction of the largest that loads of this size could have; loads along a
 #: rod leave 2e-14 across the rod
 EXCITED = 1e-10
+#: largest change of the square of a frequency by the forces of joints, as a fraction, up to which vibrations are known:
+#: rods near their buckling load vibrate otherwise, and grow with forces that change in time
+BUCKLING = 0.2
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ def response(
     if not bundles or not clearance_response.knows_all_joints(model):
         return unknown
     once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both sides
+<<<<<<< HEAD
     forces, time = _modal_forces(motions, bundles)[once], time[once]
     # accelerations may jump at breaks of the laws: those after each follow the recorded ones, at the same time
     at = np.flatnonzero(np.isin(time, run.engine.breaks[1:-1]))
@@ -87,13 +92,22 @@ def response(
         after = observe(run.engine, run.trajectory.rows[once][at], after=True)
         forces = np.insert(forces, at + 1, _modal_forces(Motions(model, after), bundles), axis=0)
         time = np.insert(time, at + 1, time[at])
+=======
+    time = time[once]
+    held = [
+        n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
+    ]
+>>>>>>> response
     joints, responses = constraints(model.mechanism), list[Response]()
+    loads = joint_wrenches(motions, list(dict.fromkeys([*held, *(joint.name for joint in joints)])))
+    forces = np.hstack([clearance_response.modal_forces(motions, n, b, loads)[once] for n, b in bundles.items()])
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
         assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
-        responses.append(_at(assembled, bundles, forces, time, chosen))
+        multipliers = clearance_response.multipliers(motions, assembled.lever, loads, row)
+        responses.append(_at(assembled, bundles, forces, time, chosen, multipliers))
     worst = {q.name: max(r.influence[q.name] for r in responses) for q in chosen}
     responding = [r for r in responses if np.isfinite(r.excited)]
     excited = min((r.excited for r in responding), default=np.nan)
@@ -210,8 +224,9 @@ def _at(
     forces: np.ndarray,
     time: np.ndarray,
     chosen: Sequence[Quantity],
+    multipliers: np.ndarray,
 ) -> Response:
-    """Return the response with the vibrations of one pose."""
+    """Return the response with the vibrations of one pose; multipliers: of all joints in it."""
     omega = assembled.omega
     f = forces @ assembled.modes[-forces.shape[1] :]
     still = f / omega**2
@@ -221,9 +236,12 @@ def _at(
     largest = most.max(axis=0, initial=np.finfo(float).tiny)
     moves = assembled.modes * largest
     curved = clearance_response.curvature(assembled.model, assembled.poses, assembled.lever, bundles, moves)
+    buckling = bool((2.0 * np.abs(multipliers @ curved) > BUCKLING * (omega * largest) ** 2).any())
     influence = {}
     for q in chosen:
-        if q.kind in (*POSITIONS, *RATES) and q.owner in assembled.model.mechanism.link_of:
+        if buckling:
+            influence[q.name] = np.inf
+        elif q.kind in (*POSITIONS, *RATES) and q.owner in assembled.model.mechanism.link_of:
             moved = assembled.moved(q.owner, turning=q.kind in TURNS)
             if np.abs(moved @ assembled.free).max(initial=0.0) > FOLLOWED * np.abs(moved @ assembled.modes).max():
                 influence[q.name] = np.inf  # masses decide its effect along a freedom of its own

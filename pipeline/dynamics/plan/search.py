@@ -36,8 +36,8 @@ from flexclear.pipeline.dynamics.run.run import Run, integrate
 
 #: fraction of the budget that bounds of clearances may use up; bounds hold under all circumstances
 BY_BOUND = 0.9
-#: factor on the first-order response of flexible bodies, which neglects that the pose turns during a vibration and that
-#: loads follow the vibration; compared with runs the response is 0.7 to 10 times the true effect
+#: factor on the response of flexible bodies, which neglects that the pose turns during a vibration and that
+#: loads follow the vibration; compared with runs the response is 0.94 times the true effect or more
 OF_RESPONSE = 2.0
 #: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
 SOFTER = 0.5
