@@ -84,7 +84,6 @@ def response(
     if not bundles or not clearance_response.knows_all_joints(model):
         return unknown
     once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both sides
-<<<<<<< HEAD
     forces, time = _modal_forces(motions, bundles)[once], time[once]
     # accelerations may jump at breaks of the laws: those after each follow the recorded ones, at the same time
     at = np.flatnonzero(np.isin(time, run.engine.breaks[1:-1]))
@@ -92,15 +91,8 @@ def response(
         after = observe(run.engine, run.trajectory.rows[once][at], after=True)
         forces = np.insert(forces, at + 1, _modal_forces(Motions(model, after), bundles), axis=0)
         time = np.insert(time, at + 1, time[at])
-=======
-    time = time[once]
-    held = [
-        n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
-    ]
->>>>>>> response
     joints, responses = constraints(model.mechanism), list[Response]()
-    loads = joint_wrenches(motions, list(dict.fromkeys([*held, *(joint.name for joint in joints)])))
-    forces = np.hstack([clearance_response.modal_forces(motions, n, b, loads)[once] for n, b in bundles.items()])
+    loads = joint_wrenches(motions, [joint.name for joint in joints])
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
         assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
