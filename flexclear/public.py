@@ -258,12 +258,12 @@ def compare(
 
 
 def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
-    """Return the effect size of each effect of a scene on each quantity, by removal, alone and in pairs.
+    """Return the size of each effect on each quantity, removed and added, alone and in pairs.
 
     Variables and meanings: `pipeline.post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
     `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is removed alone, the most important
-    ones first, with as many members as decide the change (`post.answers.effect_ranking`); a notebook shows the answer
-    first.  Raises FlexclearError.
+    ones first, with as many members as decide the change (`pipeline.post.answers.effect_ranking`); a notebook shows the
+    answer first.  Raises FlexclearError.
     """
     if budget is not None:
         return answers.dataset("effects", _loaded(scene), budget)

@@ -137,7 +137,7 @@ COLD_COLUMNS: Columns = {
     "nothing compiled, wall [s]": lambda r: short(r["wall_s"]),
     "processor [s]": lambda r: short(r["processor_s"]),
     "kernels on disk, wall [s]": lambda r: short(r["warm_wall_s"]),
-    "processor [s] ": lambda r: short(r["warm_processor_s"]),
+    "warm processor [s]": lambda r: short(r["warm_processor_s"]),
     "another topology, wall [s]": lambda r: short(r["another_wall_s"]),
     "code [kB]": lambda r: str(r["kilobytes"]),
 }

@@ -83,7 +83,7 @@ def _check(options: argparse.Namespace) -> None:
     text = (
         f"{len(inventory.artifacts)} artifacts, {len(faults)} faults, {len(inventory.orphans)} files without a record"
     )
-    unused = f", {len(others)} unused ones of another build" if others else ""
+    unused = f", {len(others)} unused of another build" if others else ""
     print(f"{text}; {len(kernels)} compiled kernels{unused}")
     if faults:
         raise ResourceError(

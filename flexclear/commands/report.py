@@ -227,7 +227,7 @@ def _page(
             prose(("value", "assumption"), assumptions.items()),
         ),
         Part(
-            "effects",
+            "present",
             "Effects present and absent",
             prose(("effect", "in the scene"), effects(parameters(run)).items()) if run is not None else "",
         ),

@@ -22,7 +22,7 @@ def relative_twist(a, b):
 
 @kernel
 def measure(d, g):
-    """Return coordinate of gauge g, its rate, and the wrench of a unit force along it on the second body."""
+    """Return coordinate of gauge g, its rate, moment and force of a unit force along it on the second body."""
     gauge = d.gauges[g]
     a, b = d.site_frames[gauge.a], d.site_frames[gauge.b]
     F, G, p = a.axes, b.axes, b.origin

@@ -196,7 +196,7 @@ def from_quaternion(w, x, y, z):
 
 @kernel
 def to_quaternion(R):
-    """Return a quaternion (w, x, y, z) of a rotation matrix, of any norm and sign (Shepperd 1978)."""
+    """Return a quaternion (w, x, y, z) of a rotation matrix by its largest component, of any norm (Shepperd 1978)."""
     xx, yy, zz = R[0], R[4], R[8]
     w, x, y, z = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz
     wx, wy, wz = R[7] - R[5], R[2] - R[6], R[3] - R[1]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.closed_form import Span
@@ -25,6 +26,7 @@ from tests.analytic.beam_models import (
     WORDS,
     build,
     frequencies,
+    held_system,
     order,
 )
 from tests.analytic.beam_solutions import PAPER_ROD, element_stiffness
@@ -54,6 +56,12 @@ INDEPENDENT = {
     ("PP", "euler-bernoulli"): (697.5120172690308, 2790.0480690761233, 6277.608155421278),
     ("PP", "rayleigh"): (696.0228399378884, 2766.44757081701, 6159.987654567392),
     ("PP", "timoshenko"): (691.6399647065812, 2700.2694227661304, 5853.678280140553),
+}
+# first three bending frequencies [Hz] of the paper's rod with kappa = 0.9, by an independent program
+KAPPA_09 = {
+    "FF": (1552.7587669133898, 4147.311964201585, 7795.930788610589),
+    "CC": (1529.6005076471188, 4049.8981065578914, 7562.094331180602),
+    "CF": (247.5021056692413, 1515.739289901413, 4100.261575308612),
 }
 # docs/structure.md, "How many elements"
 DOCUMENTED = {
@@ -139,6 +147,19 @@ def test_bending_converges_at_order_four_in_both_planes(ends: str, theory: str) 
         np.testing.assert_allclose(order(elements, np.array(error)), 4.0, atol=0.15)
 
 
+def test_condensing_the_unknowns_inside_a_timoshenko_cell_costs_two_orders() -> None:
+    """Statically condensed it is the element of interdependent interpolation: exact in statics only."""
+    exact = closed_form.bending(SPANS["timoshenko"], "fixed-fixed", 2)
+    elements, errors = [16, 32, 64], []
+    for n in elements:
+        K, M = held_system(build(elements=n, theory="timoshenko"), BENDING, "CC")
+        nodal = 2 * (n - 1)
+        shapes = np.vstack([np.eye(nodal), -np.linalg.solve(K[nodal:, nodal:], K[nodal:, :nodal])])
+        values = scipy.linalg.eigvalsh(shapes.T @ K @ shapes, shapes.T @ M @ shapes)
+        errors.append(np.sqrt(values[:2]) / (2.0 * np.pi) / exact - 1.0)
+    np.testing.assert_allclose(order(elements, np.array(errors)), 2.0, atol=0.1)
+
+
 def test_slender_timoshenko_rods_do_not_lock() -> None:
     """Two elements of a rod a thousand times longer than thick: the Hermite value, not many times it."""
     thin = RECIPE | {"elements": 2, "section": {"type": "circle", "radius": L / 1000.0}}
@@ -147,6 +168,13 @@ def test_slender_timoshenko_rods_do_not_lock() -> None:
     )
     # the exact ratio is 1 - O((r/L)^2), 1e-5 at the second mode; a locked element is off by factors
     np.testing.assert_allclose(shear, none, rtol=5e-5)
+
+
+@pytest.mark.parametrize("ends", KAPPA_09)
+def test_a_shear_coefficient_of_the_recipe_replaces_cowpers(ends: str) -> None:
+    section = {"type": "circle", "radius": PAPER_ROD.radius, "shear_coefficient": 0.9}
+    found = frequencies(build(elements=24, theory="timoshenko", section=section), BENDING, ends, 3)
+    np.testing.assert_allclose(found, KAPPA_09[ends], rtol=WANTED)
 
 
 @pytest.mark.parametrize("degree, elements, expected", [("linear", [8, 16, 32], 2.0), ("quadratic", [4, 8, 16], 4.0)])

@@ -273,6 +273,18 @@ def test_clearance_joints_keep_the_ledger_the_loops_and_the_laws(scene: str, cou
     assert (np.diff(dataset.event_time.values) >= 0.0).all()
 
 
+def test_legs_that_mirror_each_other_hit_at_the_same_time() -> None:
+    """Legs 1 and 2 are driven alike; their first closings are simultaneous, and both are found."""
+    dataset = run(ALL)
+    closings = np.flatnonzero(dataset.event_kind.values == "closing")
+    names = dataset.event_contact.values[closings[:2]]
+    assert sorted(names) == ["A1", "A2"]
+    # mirror images in rounding, and each located to 1e-13 of the clearance at 0.2 m/s
+    assert np.diff(dataset.event_time.values[closings[:2]]) == pytest.approx([0.0], abs=1e-12)
+    approach = dataset.event_approach_speed.values[closings[:2]]
+    assert approach[0] == pytest.approx(approach[1], rel=1e-9)
+
+
 # The flexible rod, against sums over mass points, and its own rigid limit --------------------------------------------
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import flexclear as fc
 from flexclear.commands.__main__ import main
@@ -42,6 +43,25 @@ def circle(coupling: float, winding: float, n: int = N) -> tuple[np.ndarray, np.
     return np.array(states), np.array(growth)
 
 
+@pytest.fixture(scope="module")
+def duffing() -> tuple[np.ndarray, np.ndarray]:
+    """Ueda's oscillator x'' + 0.05 x' + x^3 = 7.5 cos t, strobed, with the growth of its tangent per period."""
+
+    def slope(t: float, y: np.ndarray) -> list[float]:
+        x, v, a, b = y
+        return [v, -0.05 * v - x**3 + 7.5 * np.cos(t), b, -3.0 * x**2 * a - 0.05 * b]
+
+    y, states, growth = np.array([2.5, 0.0, 1.0, 0.0]), [], []
+    for k in range(1040):
+        y = solve_ivp(slope, (0.0, 2.0 * np.pi), y, method="DOP853", rtol=1e-8, atol=1e-10).y[:, -1]
+        size = np.linalg.norm(y[2:])
+        y[2:] /= size
+        if k >= 40:
+            states.append(y[:2].copy())
+            growth.append(np.log(size))
+    return np.array(states), np.array(growth)
+
+
 def test_the_logistic_map_at_four_is_chaotic_with_exponent_log_two() -> None:
     states, growth = logistic(4.0)
     found = judge(states, growth, 1.0, 1.0)
@@ -72,6 +92,14 @@ def test_the_circle_map_below_its_critical_coupling_is_quasi_periodic() -> None:
     found = judge(*circle(0.3, 0.5 * (np.sqrt(5.0) - 1.0)), 1.0, 1.0)
     assert found.kind == "quasi-periodic"
     assert found.numbers["zero_one"] < 0.1
+
+
+def test_the_forced_duffing_oscillator_has_its_published_exponent(duffing: tuple[np.ndarray, np.ndarray]) -> None:
+    states, growth = duffing
+    found = judge(states, growth, 2.0 * np.pi, 3.0)
+    assert found.kind == "chaotic"
+    # Sprott (2003), Chaos and Time-Series Analysis, table A.5: 0.1034; 1000 periods leave two percent
+    assert found.numbers["exponent"] == pytest.approx(0.1034, rel=0.05)
 
 
 def test_a_damped_linear_oscillator_is_periodic_and_contracts_at_its_decay() -> None:

@@ -164,7 +164,7 @@ def test_beyond_the_horizon_there_is_nothing() -> None:
     [
         ("bob.position", "body.bob.type", "is not a number"),
         ("bob.position", "body.bob.weight", "there is no"),
-        ("bob.position", "solver.rtol", "is not a number of a part"),
+        ("bob.position", "solver.rtol", "is not a number of body, joint"),
         ("bob.place", "body.bob.mass", "there is no quantity"),
         ("bob.position.series", "body.bob.mass", "write bob.position"),
     ],

@@ -356,8 +356,8 @@ def test_gauges_are_nodes_of_a_frame_of_a_region_or_the_nearest_one(tmp_path: Pa
 @pytest.mark.parametrize(
     "gauge, message",
     [
-        ({"frame": "tip"}, r"\[output.gauges.g\] frame: no frame is called 'tip'"),
-        ({"region": "sid"}, r"\[output.gauges.g\] region: no region is called 'sid'\n.*'side'"),
+        ({"frame": "tip"}, r"\[output.gauges.g\] frame: unknown frame 'tip'"),
+        ({"region": "sid"}, r"\[output.gauges.g\] region: unknown region 'sid'\n.*'side'"),
         ({"position": [1.0, 0.0, 0.0]}, r"\[output.gauges.g\] position: the nearest node of the surface, at .* m away"),
         ({}, r"gauges.g.*one of position, frame, region says where; here nothing does"),
         ({"body": "ground", "frame": "wall"}, r"'ground' is not a body in `stress`"),

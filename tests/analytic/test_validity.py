@@ -239,7 +239,10 @@ WRONG: dict[tuple[str, str], list[tuple[dict[str, Any], tuple[str, ...]]]] = {
             mount([[1.0, 2.0, *NONE[2:]], [2.0, 1.0, *NONE[2:]], *[NONE] * 4]),
             ("positive semidefinite", "supply energy"),
         ),
-        (mount([[1, 0, 2, 0, 0, 0], [0, 1, 0, 0, 0, 0], [2.0, *NONE[1:]], *[NONE] * 3]), ("z has none of its own",)),
+        (
+            mount([[1, 0, 2, 0, 0, 0], [0, 1, 0, 0, 0, 0], [2.0, *NONE[1:]], *[NONE] * 3]),
+            ("z has none on the diagonal",),
+        ),
         (mount(NONE), ("it has neither",)),
     ],
 }

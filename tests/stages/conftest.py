@@ -277,3 +277,15 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(sweep_engine.Engine, "run", watched)
     return keys
+
+
+@pytest.fixture(scope="module")
+def shared_results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Results that tests share, so that each body is made once, in this process: others take seconds to start.
+
+    Who looks into results has its own, `fresh`.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FLEXCLEAR_RESULTS", str(tmp_path_factory.mktemp("results")))
+        patch.setattr(cores, "cores", lambda: 1)
+        yield

@@ -105,7 +105,7 @@ def test_kernels_of_another_build_are_counted_and_are_no_damage(store: Store, co
         (folder / f"flexclear_{name}.py").write_text("")
         (folder / f"flexclear_{name}.sum").write_bytes(checked({f"flexclear_{name}{end}": "1" for end in ends}))
     reported = command("cache", "check", code=4).out
-    assert "2 compiled kernels, 1 of another build" in reported
+    assert "2 compiled kernels, 1 unused of another build" in reported
     assert "flexclear_bad.py is damaged" in reported
     assert "flexclear_old.py is damaged" not in reported
 

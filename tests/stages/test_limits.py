@@ -40,7 +40,7 @@ def test_a_run_that_memory_cannot_hold_is_refused_at_once(
     # loading and estimating; a run of a million rows takes longer on any machine
     assert time.monotonic() - begun < 60.0
     assert "a run of 1e+06 rows takes about" in reported
-    assert "of memory, more than 800 MB" in reported
+    assert "of memory, more than the 800 MB allowed" in reported
 
 
 def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -48,7 +48,7 @@ def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monk
     path = written(tmp_path, SCENE + JOINT + '[limits]\nmemory = "1 GB"\ndisk = "1 GB"\n')
     simulation.check_run(load_scene(path), tmp_path)
     for key in ("memory", "disk"):
-        with pytest.raises(ResourceError, match="more than 10 kB"):
+        with pytest.raises(ResourceError, match="more than the 10 kB allowed"):
             simulation.check_run(load_scene(path, {f"limits.{key}": "10 kB"}), tmp_path)
     with pytest.raises(InputError, match=r"expected a size such as '4 GB'"):
         load_scene(path, {"limits.memory": "4 stones"})
@@ -82,7 +82,7 @@ def test_limits_are_no_facts_and_reach_the_stage(tmp_path: Path, monkeypatch: py
     limited = load_scene(written(tmp_path, SCENE + JOINT + '[limits]\nmemory = "10 kB"\n'))
     assert simulation.params(plain) == simulation.params(limited)
     task = Graph(limited).simulate
-    with pytest.raises(ResourceError, match="more than 10 kB"):
+    with pytest.raises(ResourceError, match="more than the 10 kB allowed"):
         simulation.run({**task.params, **task.context}, {}, lambda fraction, text: None)
 
 

@@ -56,7 +56,7 @@ def listed(package: str, name: str, *, where: str) -> tuple[str, str]:
 
 
 def module_of(package: str, name: str, *, where: str = "") -> str:
-    """Return the full module name of the part that a family lists as `name`, without importing it; see `listed`."""
+    """Return the full module name of the part that a family lists as `name`; raise InputError as `listed` does."""
     return listed(package, name, where=where)[0]
 
 

@@ -47,7 +47,7 @@ class ModalStart(Part):
     coordinate: tuple[Number, ...] = ()
     """modal coordinates [m]"""
     velocity: tuple[Number, ...] | None = None
-    """modal velocities [m/s]; default: as the joints require"""
+    """modal velocities [m/s]; default: zero, if joints, drives and given velocities allow it, else the least ones"""
 
 
 _ONE_OR_SEVERAL = BeforeValidator(_coordinates, json_schema_input_type=JointStart | dict[str, JointStart])

@@ -37,7 +37,7 @@ class FlexclearError(Exception):
     exit_code = 1
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Processes hand errors to each other as they are: what `__init__` was given is no longer known."""
+        """Return how to restore the error without `__init__`, whose arguments are not stored."""
         return _as_it_was, (type(self), self.args), self.__dict__
 
 

@@ -31,7 +31,9 @@ def require_memory(need: float, what: str, remedy: str, limit: float | None = No
     """Raise ResourceError when `what` needs more memory than `limit` [bytes]; default: a fraction of what is left."""
     allowed = ALLOWED_FRACTION * memory() if limit is None else limit
     if need > allowed:
-        raise ResourceError(f"{what} takes about {size(need)} of memory, more than {size(allowed)}; {remedy}")
+        raise ResourceError(
+            f"{what} takes about {size(need)} of memory, more than the {size(allowed)} allowed; {remedy}"
+        )
 
 
 def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float | None = None) -> None:
@@ -39,7 +41,8 @@ def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float
     allowed = ALLOWED_FRACTION * disk(folder) if limit is None else limit
     if need > allowed:
         raise ResourceError(
-            f"{what} takes about {size(need)} of disk space in {folder}, more than {size(allowed)}; {remedy}"
+            f"{what} takes about {size(need)} of disk space in {folder}, more than the {size(allowed)} allowed; "
+            f"{remedy}"
         )
 
 

@@ -130,7 +130,7 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
         if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -OVERSHOOT * power:
             return new
         fraction *= 0.5
-    raise SolverError(f"at t = {bench.time:.6g} s: no step from this pose reduces the unbalanced forces")
+    raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium is possible from this pose")
 
 
 def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:

@@ -65,14 +65,17 @@ def assemblies(
             distinct.append(made)
         if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR_HINTS:
             break  # a mechanism that can move: its first assembly near the hints counts
-    return sorted(
-        distinct,
-        key=lambda one: (
-            # as near to the hints as another one but for rounding: that of the first guess decides
-            round(_distance(mechanism, joints, one.coordinates, hints) / SAME_ASSEMBLY),
-            _distance(mechanism, joints, one.coordinates, aim),
+    from_hints = [_distance(mechanism, joints, one.coordinates, hints) for one in distinct]
+    nearest = min(from_hints, default=0.0)
+    # of assemblies that are nearest to the hints but for rounding, the one of the first guess comes first
+    order = sorted(
+        range(len(distinct)),
+        key=lambda k: (
+            from_hints[k] if from_hints[k] - nearest > SAME_ASSEMBLY else nearest,
+            _distance(mechanism, joints, distinct[k].coordinates, aim),
         ),
     )
+    return [distinct[k] for k in order]
 
 
 def ambiguity(

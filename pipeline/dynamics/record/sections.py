@@ -112,7 +112,7 @@ def section_period(scene: Scene) -> float:
         raise InputError(
             "[sections.phase]",
             f"{requested.phase:.6g} s is not within the period of {period:.6g} s",
-            "give a time from 0 to the period",
+            "give a time from 0 to less than the period",
         )
     return period
 
