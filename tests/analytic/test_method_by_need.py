@@ -319,5 +319,5 @@ def test_a_run_that_none_can_be_compared_with_is_delivered_with_an_unknown_error
     delivered = refused_below(1e-5, run)
     assert delivered.attrs["accuracy_verdict"].startswith("not verified: ")
     assert delivered.position.identical(run.position)
-    with pytest.raises(SolverError, match="used up"):
+    with pytest.raises(SolverError, match="is reached"):
         refused_below(1.0, run)
