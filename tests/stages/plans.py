@@ -21,7 +21,7 @@ from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
 
-#: of the leg's rod [m, Pa, kg/m^3], and what stands on it [kg]
+#: of the leg's rod [m, Pa, kg/m^3], and the mass of its platform [kg]
 LENGTH, RADIUS, MODULUS, DENSITY, PLATFORM = 0.24, 0.01, 71.7e9, 2740.0, 3.0
 GRAVITY = 9.81
 #: acceleration with which a base starts under a rod [m/s^2]

@@ -170,7 +170,7 @@ def _tight(scene: Scene) -> Scene:
 
 
 def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(standing: Pilot):
-    """Beside the pseudoinverse of the joints' rates, which has no closed form but another computation."""
+    """Compared with the pseudoinverse of the joints' rates, which another computation gives."""
     found = standing.ideal
     poses = [Placement(frame["origin"], frame["axes"]) for frame in found.observed.links[0]]
     lever = opening_map(found.model, constraints(found.model.mechanism), poses)

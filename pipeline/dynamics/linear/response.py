@@ -15,8 +15,8 @@ changes with the square of the bending. So these squares count as well for posit
 itself, with the links' motions that close the joints at second order. The forces of joints do work on these openings,
 which changes the frequencies: where it does by much, as near a buckling load, the response is unknown.
 
-Each evaluation holds the pose fixed, so several poses of the motion are examined. The result sums all amplitudes,
-which bounds the effect of the vibrations from above.
+Each evaluation holds the pose fixed, so several poses of the motion are examined. The result sums all amplitudes. It is
+an estimate, no bound: docs/plan.md compares it with runs.
 
 Source: Craig and Kurdila, *Fundamentals of Structural Dynamics*, ch. 5 and 11.
 """
@@ -63,7 +63,7 @@ class Response:
 
     excited: lowest frequency of a vibration that the motion's loads excite [Hz], NaN where they excite none.
     amplification: largest ratio of this vibration's coordinate to its quasi-static value.
-    influence: upper bound of the effect on each quantity [SI]; infinite where unknown.
+    influence: estimated largest effect on each quantity [SI]; infinite where unknown.
     """
 
     first: float
