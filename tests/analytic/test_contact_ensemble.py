@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
@@ -64,6 +64,16 @@ def test_members_record_their_impacts_and_the_fraction_of_time_in_contact() -> N
     fraction = (known.end - known.start) / END
     assert members().contact_time_share.values == pytest.approx(np.full((MEMBERS, 1), fraction), rel=1e-5)
     assert np.ptp(members().peak_force.values) > 0.0
+
+
+def test_a_contact_that_is_closed_at_the_end_counts_until_then() -> None:
+    """Half of the impact's duration is left out of the run, so the contact lasts for the other half."""
+    (known,) = (b for b in exact.bounces(1.0, 1e8, 0.7, 9.81, 0.1, END))
+    end = 0.5 * (known.start + known.end)
+    cut = analyses.ensemble(edited(scene(2), {"time.end": end}), {}, silent)
+    # a micrometre more or less to fall moves the start by 0.7 us, of some 100 us
+    assert cut.contact_time_share.values == pytest.approx(np.full((2, 1), (end - known.start) / end), rel=0.05)
+    assert cut.impact_count.values.tolist() == [[1]] * 2
 
 
 @pytest.mark.parametrize("threads", [1, 3])

@@ -7,7 +7,7 @@ from scipy.special import ellipj, ellipk
 
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_vector_to_matrix, skew
 from tests.analytic.mechanism_runs import run
-from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate
+from tests.properties.mechanisms import body, frame, ground, joint, rigid, scene, simulate
 
 
 def test_pendulum_follows_jacobis_functions() -> None:
@@ -53,6 +53,44 @@ def test_thrown_body_flies_a_parabola_and_keeps_its_angular_momentum() -> None:
     known = R0 @ np.diag([0.02, 0.03, 0.04]) @ R0.T @ [0.2, 10.0, -0.1]
     # the instability multiplies early errors by some hundred before the first flip ends
     assert momentum == pytest.approx(np.tile(known, (len(time), 1)), abs=1e-8)
+
+
+# Welds ----------------------------------------------------------------------------------------------------------------
+
+#: a force at (1, 0, 0) m [N] and its moment about the origin [N m]
+FORCE, MOMENT = np.array([-30.0, 70.0, 20.0]), np.array([0.0, -20.0, 70.0])
+
+
+@pytest.mark.parametrize("held", ["first", "second"])
+@pytest.mark.parametrize("loaded", ["first", "second", "both"])
+@pytest.mark.parametrize("by", ["load", "joint"])
+def test_a_weld_carries_force_and_moment_from_one_side_to_the_other(held: str, loaded: str, by: str) -> None:
+    """Two bodies welded at the origin; one is on a rail across the force at (1, 0, 0) m that acts on one or both.
+
+    What the weld gives its second body balances all that acts beyond it: on the second body where the first is held,
+    and what acts on the first where the second is held. The force is a load, or a joint's with a third body.
+    """
+    place, rail = {"position": [1.0, 0.0, 0.0]}, {"axes": {"z": [0.0, -2.0, 7.0], "x": [1.0, 0.0, 0.0]}}
+    frames = {"O": {}, "rail": rail, "end": place}
+    bodies = {"ground": {"type": "ground", "frames": frames}}
+    bodies |= {name: rigid(1.0, 1.0, frames, pose={}) for name in ("first", "second")}
+    joints = {"base": joint("prismatic", "ground.rail", f"{held}.rail"), "weld": joint("fixed", "first.O", "second.O")}
+    loads = {}
+    for name in ("first", "second"):
+        if loaded not in (name, "both"):
+            continue
+        frame_of_load = f"{name}.end"
+        if by == "joint":
+            bodies[f"hook_{name}"] = rigid(1.0, 1.0, {"c": {}}, pose=place)
+            joints[f"hinge_{name}"] = joint("spherical", f"{name}.end", f"hook_{name}.c")
+            frame_of_load = f"hook_{name}.c"
+        loads[name] = {"type": "point-force", "frame": frame_of_load, "force": FORCE.tolist()}
+    found = simulate(scene(bodies, joints, end=0.01, load=loads)).sel(joint="weld")
+    beyond, sign = ("second", -1.0) if held == "first" else ("first", 1.0)
+    sign *= loaded in (beyond, "both")
+    # exact at rest, to rounding of some hundred newtons; a body on a ball joint at its centre of mass stays where it is
+    assert found.joint_force.values == pytest.approx(np.tile(sign * FORCE, (found.sizes["time"], 1)), abs=1e-9)
+    assert found.joint_moment.values == pytest.approx(np.tile(sign * MOMENT, (found.sizes["time"], 1)), abs=1e-9)
 
 
 # Springs, dampers, drives --------------------------------------------------------------------------------------------

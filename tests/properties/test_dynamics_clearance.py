@@ -1,14 +1,17 @@
 """Forces of a clearance joint on the two bodies that it joins, at any relative motion, for every pair of laws."""
 
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
+from flexclear.pipeline.core.scene.clearance import CONTACTS
+from flexclear.pipeline.core.scene.parts import Joint
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
@@ -24,12 +27,14 @@ FRICTION: dict[str, dict[str, Any]] = {
     "ambrosio": {"dynamic": 0.15, "v0": 1e-7, "v1": 1e-3},
     "lugre": {"static": 0.15, "dynamic": 0.1, "v_stribeck": 1e-3, "bristle_stiffness": 1e5, "bristle_damping": 20.0},
 }
+CLEARANCE = 5e-4
 SURFACES: dict[str, dict[str, Any]] = {
-    "clearance-spherical": {"ball_radius": 0.02},
-    "clearance-revolute": {"pin_radius": 0.02, "length": 0.03},
+    "clearance-spherical": {"clearance": CLEARANCE, "ball_radius": 0.02},
+    "clearance-revolute": {"clearance": CLEARANCE, "pin_radius": 0.02, "length": 0.03},
+    "clearance-slot": {"clearance": CLEARANCE, "pin_radius": 0.02, "length": 0.03, "travel": 0.1},
+    "ball-on-plane": {"ball_radius": 0.02},
 }
 BODY = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "pose": {}, "frames": {"centre": {}}}
-CLEARANCE = 5e-4
 #: one law of each form that is compiled
 FORMS = {"hertz": {}, "flores": {"restitution": 0.8, "exponent": 1.5}, "kelvin-voigt": {"damping": 100.0}}
 LAWS = [(n, f, "clearance-spherical") for n in FORMS for f in (None, *friction.NAMES)]
@@ -44,7 +49,6 @@ def tables_of(laws: Laws) -> Model:
     contact: dict[str, Any] = {
         "type": laws[2],
         "between": ["socket.centre", "ball.centre"],
-        "clearance": CLEARANCE,
         **SURFACES[laws[2]],
         "normal": {"law": laws[0], "stiffness": 1e10 if laws[0] != "kelvin-voigt" else 1e7, **FORMS[laws[0]]},
     }
@@ -207,3 +211,90 @@ def test_rolling_is_no_sliding(laws: Laws, seed: int) -> None:
     # bristles bear up to mu_s of the force at any speed. The speed is a sum of some products of 10 m/s: ten times that
     bearing = 0.15 * touch.touch[m.TOUCH.normal_force] if laws[1] == "lugre" else 1e-3
     assert -touch.touch[m.TOUCH.friction_power] <= 1e-14 * bearing
+
+
+# Every kind of surfaces ----------------------------------------------------------------------------------------------
+
+every_kind = pytest.mark.parametrize("kind", SURFACES)
+#: both surfaces of a contact, and 1/E* of them [1/Pa]
+SOFT, HARD = {"youngs_modulus": 7e10, "poisson": 0.33}, {"youngs_modulus": 2.1e11, "poisson": 0.3}
+FLEXIBILITY = sum((1.0 - one["poisson"] ** 2) / one["youngs_modulus"] for one in (SOFT, HARD))
+#: radius of the equivalent sphere or cylinder on a plane [m]: 1/R = 1/R_inner - 1/R_outer
+OF_CURVES = 0.02 * (0.02 + CLEARANCE) / CLEARANCE
+#: a penetration [m], a force [N], and half the width that they have: of spheres sqrt(R d), of cylinders sqrt(4 F R/(pi
+#: E* L)) (Johnson 1985, Contact Mechanics, eqs. 4.22 and 4.43)
+DEPTH, FORCE = 1e-5, 2000.0
+HALF_WIDTHS = {
+    "clearance-spherical": np.sqrt(OF_CURVES * DEPTH),
+    "clearance-revolute": np.sqrt(4.0 * FORCE * OF_CURVES * FLEXIBILITY / (np.pi * 0.03)),
+    "clearance-slot": np.sqrt(4.0 * FORCE * 0.02 * FLEXIBILITY / (np.pi * 0.03)),
+    "ball-on-plane": np.sqrt(0.02 * DEPTH),
+}
+#: the stiffness of that force [N/m^1.5]: 4/3 E* sqrt(R) for each
+STIFFNESSES = {
+    kind: 4.0 / (3.0 * FLEXIBILITY) * np.sqrt(OF_CURVES if kind.endswith(("spherical", "revolute")) else 0.02)
+    for kind in SURFACES
+}
+
+
+class Sizes(NamedTuple):
+    """The fields of CONTACT_NUMBERS that surfaces read."""
+
+    clearance: float
+    radius: float
+    shape: tuple[float, float]
+
+
+def test_every_kind_of_surfaces_is_tried_here() -> None:
+    assert set(SURFACES) == set(surfaces_of_joints.NAMES) == set(HALF_WIDTHS)
+
+
+def joint_of(kind: str, **more: Any) -> Any:
+    between = {"type": kind, "between": ["a.f", "b.f"], "normal": {"law": "hertz"}}
+    return TypeAdapter(Joint).validate_python({**between, **SURFACES[kind], **more})
+
+
+@every_kind
+def test_stiffness_and_half_width_are_those_of_hertz(kind: str) -> None:
+    module, (outer, inner) = lookup(surfaces_of_joints.__name__, kind, where="test"), joint_of_names(kind)
+    joint = joint_of(kind, **{f"{outer}_material": SOFT, f"{inner}_material": HARD})
+    assert module.contact_size(joint, DEPTH, FORCE) == pytest.approx(HALF_WIDTHS[kind], rel=1e-13)
+    assert module.stiffness(joint, 1.5) == pytest.approx(STIFFNESSES[kind], rel=1e-13)
+
+
+def joint_of_names(kind: str) -> tuple[str, str]:
+    """Names of outer and inner surface in keys."""
+    names: tuple[str, str] = next(
+        model.surfaces for model in CONTACTS if kind in get_args(model.model_fields["type"].annotation)
+    )
+    return names
+
+
+@every_kind
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_the_normal_is_the_gradient_of_the_gap_and_the_rates_are_those_of_motion(kind: str, seed: int) -> None:
+    """At random places, in and next to a slot's round ends as well; the outer surface at rest in any axes."""
+    random = np.random.default_rng(seed)
+    joint = joint_of(kind, normal={"law": "hertz", "stiffness": 1e9})
+    sizes = Sizes(joint.clearance, joint.radius, joint.shape)
+    R = rotation_vector_to_matrix(random.normal(size=3))
+    separation = from_python(lookup(surfaces_of_joints.__name__, kind, where="test").separation)
+    v = R @ random.normal(size=3)
+    p = R @ (random.choice([-1.0, 1.0], 3) * random.uniform(0.01, 0.06, 3))
+
+    def at(place: np.ndarray, speed: np.ndarray) -> tuple[float, float, np.ndarray, np.ndarray, np.ndarray]:
+        gap, rate, normal, turning, offset = separation(tuple(R.ravel()), sizes, tuple(place), tuple(speed))
+        return gap, rate, np.array(normal), np.array(turning), np.array(offset)
+
+    gap, rate, normal, turning, offset = at(p, v)
+    step = 1e-6
+    (after, _, normal_after, *_), (before, _, normal_before, *_) = at(p + step * v, v), at(p - step * v, v)
+    # central differences: curvatures of 1/10 mm, times squares of 1 um steps, and rounding over the step
+    assert (after - before) / (2.0 * step) == pytest.approx(-rate, abs=1e-6)
+    assert (normal_after - normal_before) / (2.0 * step) == pytest.approx(turning, abs=1e-4)
+    assert [at(p, axis)[1] for axis in np.eye(3)] == pytest.approx(normal, abs=1e-14)
+    assert np.linalg.norm(normal) == pytest.approx(1.0, rel=1e-14)
+    outwards = float(offset @ normal)
+    known = -outwards - joint.radius if kind == "ball-on-plane" else CLEARANCE - outwards
+    assert gap == pytest.approx(known, abs=1e-15)

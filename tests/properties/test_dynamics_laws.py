@@ -13,7 +13,7 @@ from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics.contact import form as forms
 from flexclear.pipeline.dynamics.contact import normal
-from flexclear.pipeline.dynamics.contact.law import Resolved
+from flexclear.pipeline.dynamics.contact.law import Numbers, Resolved
 from tests.properties.kernels import from_python
 
 Parameters = tuple[float, float, float, float]
@@ -91,6 +91,18 @@ def law(name: str, choice: int, stiffness: float, exponent: float) -> Law:
 
 def test_every_normal_law_is_tried_here() -> None:
     assert set(NORMAL) == set(normal.NAMES)
+
+
+@pytest.mark.parametrize("form", forms.NAMES)
+@given(stiffness=STIFF, exponent=EXPONENT, depth=st.floats(1e-9, 1e-3))
+def test_every_form_has_the_inverse_of_its_elastic_force(
+    form: str, stiffness: float, exponent: float, depth: float
+) -> None:
+    numbers = Numbers(stiffness, 1.0 if form == "linear-damper" else exponent, 0.3)
+    elastic, _ = from_python(lookup(forms.__name__, form, where="test").force)(depth, 0.0, 1.0, numbers)
+    found = Resolved(form, numbers, None, 1.0).depth(elastic)
+    assert found == pytest.approx(depth, rel=1e-13)  # two powers, of logarithms up to 21 with rounding
+    assert Resolved(form, numbers, None, 1.0).depth(0.0) == 0.0
 
 
 @every_law

@@ -109,6 +109,14 @@ def test_free_impact_rebounds_and_penetrates_as_the_closed_form_says(
     assert found.depth == pytest.approx(known_depth(law, speed), rel=1e-8)
 
 
+@given(e=st.floats(1e-4, 0.06))
+def test_a_nearly_plastic_impact_has_the_factor_of_its_closed_form(e: float) -> None:
+    """1 - a e = exp(-a e - a) (1 + a), which is ln[(1 + a)/(1 - a e)] = a (1 + e): below e = 0.03 it is rounding."""
+    a = restitution.factor(e)
+    assert 1.0 - a * e == pytest.approx(math.exp(-a * e - a) * (1.0 + a), abs=1e-15)
+    assert restitution.delivered(a) == pytest.approx(e, rel=1e-15)
+
+
 @pytest.mark.parametrize("name", HYSTERETIC)
 @given(asked=st.floats(0.7, 1.0))
 @settings(max_examples=10)

@@ -43,6 +43,17 @@ def test_held_shapes_move_no_frame_and_are_vibrations_between_held_frames() -> N
     assert np.abs(still - np.diag(np.diag(still))).max() < 1e-13 * stiffness.max()
 
 
+@pytest.mark.parametrize("size, motions_used", [(1e-9, 2), (1e-14, 1)])
+def test_a_small_motion_of_a_frame_is_a_motion_and_rounding_is_none(size: float, motions_used: int) -> None:
+    """Next to motions of the size of one, whose rounding is some 1e-16: what moves a frame by 1e-9 of that is no
+    vibration between held frames."""
+    random = np.random.default_rng(1)
+    motions = np.array([random.normal(size=6), size * random.normal(size=6)])
+    found = basis(motions, np.arange(1.0, 7.0))
+    assert found.held == 6 - motions_used
+    assert np.abs(motions @ found.matrix[:, : found.held]).max(axis=1)[0] < 1e-13
+
+
 def test_modes_that_move_frames_in_different_ways_are_not_mixed() -> None:
     found = basis(*families())
     of_first = np.any(found.matrix[[0, 2, 4, 6]] != 0.0, axis=0)

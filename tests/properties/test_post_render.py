@@ -12,6 +12,8 @@ from flexclear.pipeline.post.render.forms import equivalent
 from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.pictures import Shown, make
+from flexclear.pipeline.post.render.player import _camera
+from flexclear.pipeline.post.render.view import ANGLE, eye
 from flexclear.pipeline.post.shapes import body_shape
 from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scale_to
 from flexclear.pipeline.post.shapes.body_shape import rod_surface as surface
@@ -99,8 +101,6 @@ def test_a_drawn_part_of_a_joint_is_where_its_frame_is():
 
 
 def test_all_that_is_drawn_is_in_the_picture():
-    from flexclear.pipeline.post.render.view import ANGLE, eye
-
     drawn = mechanism(synthetic.run("sps4/far_cb", modes=7), {"rod1": synthetic.bundle()})
     place, focus = eye(drawn.view, drawn.cloud, 1.5)
     near = (place - focus) / np.linalg.norm(place - focus)
@@ -111,6 +111,17 @@ def test_all_that_is_drawn_is_in_the_picture():
     assert np.abs(seen[:, 1] / seen[:, 2]).max() < slope
     assert np.abs(seen[:, 0] / seen[:, 2]).max() < 1.5 * slope
     assert max(np.abs(seen[:, 1] / seen[:, 2]).max(), np.abs(seen[:, 0] / seen[:, 2]).max() / 1.5) > 0.7 * slope
+
+
+def test_zoom_enlarges_stills_and_the_page_alike():
+    """Twice as large: the eye of a still is half as far from its focus, the page's camera has half the opening."""
+    drawn = mechanism(synthetic.run("sps4/far_cb", modes=7), {"rod1": synthetic.bundle()})
+    (far, focus), (near, same) = (eye(drawn.view, drawn.cloud, 1.5, zoom) for zoom in (1.0, 2.0))
+    np.testing.assert_array_equal(focus, same)
+    np.testing.assert_allclose(near - focus, 0.5 * (far - focus), rtol=1e-13)
+    (whole, part) = (_camera(drawn.view, drawn.cloud, zoom) for zoom in (1.0, 2.0))
+    assert [whole[name] for name in ("eye", "focus", "up")] == [part[name] for name in ("eye", "focus", "up")]
+    assert part["reach"] == pytest.approx([0.5 * one for one in whole["reach"]], rel=1e-14)
 
 
 def test_drawn_rod_lies_at_its_body_in_the_world():

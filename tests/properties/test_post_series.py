@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation, velocity_at_events
 from flexclear.papers.wang_wang_2019.figures.phase import at_times
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.core.numerics.rotations import (
     angle_about_y,
@@ -16,6 +17,7 @@ from flexclear.pipeline.core.numerics.rotations import (
     rotation_vector_to_quaternion,
     turning,
 )
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.single_run.series import derive, horizon, spread
 from tests.paper import synthetic
 
@@ -214,11 +216,15 @@ def test_impacts_are_closings_paired_with_their_openings():
     assert float(post.clearance[0]) == pytest.approx(0.5e-3, rel=1e-12)
 
 
-def test_slow_closings_are_no_impacts(run: xr.Dataset):
+@pytest.mark.parametrize("slow, impacts", [(0.99e-4, 0), (1.01e-4, 1)])
+def test_slow_closings_are_no_impacts(run: xr.Dataset, slow: float, impacts: int):
+    """Just below and just above the threshold of 1e-4 m/s that the pages name, wherever impacts are selected."""
     speed = run.event_approach_speed.values.copy()
-    speed[0] = 0.9e-4  # just below the threshold of 1e-4 m/s
-    post = derive(run.assign(event_approach_speed=("event", speed)))
-    assert post.sizes["impact"] == synthetic.BURSTS.size - 1
+    speed[0] = slow
+    run = run.assign(event_approach_speed=("event", speed))
+    expected = synthetic.BURSTS.size - 1 + impacts
+    assert derive(run).sizes["impact"] == expected
+    assert quantities.events(run, Quantity("A1", "impact_times")).size == expected
 
 
 def test_an_impact_that_has_not_ended_is_counted_and_listed_without_its_end(run: xr.Dataset):
@@ -241,6 +247,16 @@ def test_time_in_contact_is_that_of_the_located_events(run: xr.Dataset):
     for rows in (run, run.isel(time=slice(None, None, 7))):
         ends = rows.time.values[-1] - rows.time.values[0]
         assert float(derive(rows).contact_time_share[0]) == pytest.approx(expected * synthetic.END / ends, rel=1e-9)
+
+
+def test_a_contact_that_is_closed_at_the_end_counts_until_then(run: xr.Dataset):
+    """Without its opening it lasts until the end of the run instead of for 0.2 ms."""
+    duration = run.event_duration.values.copy()
+    last = np.flatnonzero(np.isfinite(duration))[-1]
+    duration[last] = np.nan
+    found = derive(run.assign(event_duration=("event", duration)).isel(event=slice(0, -1)))
+    seconds = (synthetic.BURSTS.size - 1) * synthetic.BURST_LENGTH + synthetic.END - run.event_time.values[last]
+    assert float(found.contact_time_share[0]) == pytest.approx(seconds / synthetic.END, rel=1e-9)
 
 
 @pytest.mark.parametrize("nudge", [-1.0, 1.0])

@@ -68,6 +68,26 @@ def test_the_recommended_elements_give_the_requested_error(tmp_path: Path):
     assert mesh(2, one, one, {"x": 1e-3}, {"x": 1e-5}, 1.0).called_for == 1
 
 
+def test_elements_follow_from_the_change_of_the_compliance_alone_where_frequencies_are_exact():
+    """One frame and two modes of unit stiffness: the shapes' squares are the compliance, which the finer mesh changes
+    from 1 to 1/(1 + x) in one of two directions; of order 4, the rest is x/15 of it, and n grows as its fourth root."""
+
+    def reduced(compliance: float) -> Any:
+        shape = np.zeros((1, 3, 2))
+        shape[0, 0, 0], shape[0, 1, 1] = np.sqrt(compliance), 1.0
+        values = {"frequency": np.array([10.0, 20.0]), "frame_translation_shape": shape}
+        values |= {"frame_rotation_shape": np.zeros_like(shape), "modal_stiffness": np.eye(2)}
+        return {name: SimpleNamespace(values=value) for name, value in values.items()}
+
+    change, bending, requested = 0.02, 1e-3, 1e-6
+    found = mesh(4, reduced(1.0 + change), reduced(1.0), {"x": bending}, {"x": requested}, 1.0)
+    assert found.frequency == 0.0
+    assert found.compliance == pytest.approx(change * 16.0 / 15.0, rel=1e-12)
+    assert found.error["x"] == pytest.approx(bending * change * 16.0 / 15.0, rel=1e-12)
+    # a tenth of the requested accuracy is for the mesh
+    assert found.called_for == np.ceil(4.0 * (bending * change * 16.0 / 15.0 / (0.1 * requested)) ** 0.25)
+
+
 def test_fewer_modes_to_choose_from_are_the_static_ones_and_half_of_the_others(tmp_path: Path):
     leg = load_scene(write("leg", tmp_path)[0])
     assert leg.body["rod"].modes.count == 13

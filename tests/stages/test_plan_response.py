@@ -18,6 +18,8 @@ from flexclear.pipeline.dynamics.linear.response import first_excited, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.plan.search import summed
+from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from tests.properties.mechanisms import rigid
 from tests.stages.plans import DENSITY, GRAVITY, LENGTH, MODULUS, PLATFORM, RADIUS, START, Pilot, pilot, standing_leg
 
@@ -155,6 +157,24 @@ def test_the_bound_of_a_loose_crank_pin_is_that_of_the_slider_crank(tmp_path: Pa
     ratio = 1.0 / np.sqrt(1.0 - 0.25**2)
     # the depth to which the pin is pressed comes on top, some percent; the steepest angle lies between the poses seen
     assert 0.995 * ratio * 1e-4 < reach["pin"]["slider.position"] < 1.1 * ratio * 1e-4
+
+
+def test_a_bound_includes_the_depth_to_which_ten_times_the_joints_force_presses_it(tmp_path: Path):
+    """As docs/plan.md says: with F = K d^1.5 a bound is proportional to c + (10 F/K)^(2/3), here with softer pins."""
+    scene = load_scene(write("slider-crank", tmp_path)[0])
+    stiffnesses = (1e12, 1e9)
+    found = [pilot(edited(scene, {"joint.pin.normal.stiffness": K})) for K in stiffnesses]
+    force, clearance = np.linalg.norm(_force(found[0], "pin"), axis=1).max(), scene.joint["pin"].clearance
+    separations = [clearance + (10.0 * force / K) ** (2.0 / 3.0) for K in stiffnesses]
+    one, other = (p.bounds(Quantity("slider", "position"))["pin"]["slider.position"] for p in found)
+    assert separations[1] > 1.5 * separations[0]  # the depth is no detail
+    # both from the same ideal run
+    assert other / one == pytest.approx(separations[1] / separations[0], rel=1e-12)
+
+
+def _force(pilot: Pilot, joint: str) -> np.ndarray:
+    """Force of a joint of the ideal mechanism, (time, 3) [N]."""
+    return joint_wrenches(Motions(pilot.ideal.model, pilot.ideal.observed), [joint])[joint][1]
 
 
 def test_where_joints_leave_a_freedom_there_is_no_bound(tmp_path: Path):

@@ -167,6 +167,8 @@ class _Contact(Part):
 
     #: names of the outer and the inner surface in keys
     surfaces: ClassVar[tuple[str, str]]
+    #: the ideal joint that constrains the two frames in addition to the contact; None for the contact alone
+    held: ClassVar[str | None] = None
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> Self:
@@ -217,7 +219,7 @@ class ClearanceSpherical(_Clearance):
 class ClearanceRevolute(_Clearance):
     """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
 
-    surfaces = ("journal", "pin")
+    surfaces, held = ("journal", "pin"), "planar"
     type: Literal["clearance-revolute"]
     pin_radius: Annotated[Length, Positive]
     """radius of the pin"""
@@ -237,7 +239,7 @@ class ClearanceSlot(_Clearance):
     The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
     """
 
-    surfaces = ("slot", "pin")
+    surfaces, held = ("slot", "pin"), "planar"
     type: Literal["clearance-slot"]
     clearance: Annotated[Length, Positive]
     """half the slot's width minus the pin's radius"""

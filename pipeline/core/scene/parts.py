@@ -7,15 +7,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from flexclear.pipeline.core.scene.clearance import (
-    BallOnPlane,
-    ClearanceRevolute,
-    ClearanceSlot,
-    ClearanceSpherical,
-    JointFriction,
-    NormalLaw,
-    require_fitting,
-)
+from flexclear.pipeline.core.scene.clearance import Clearance, JointFriction, NormalLaw, require_fitting
 from flexclear.pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
@@ -287,9 +279,7 @@ class IdealJoint(Part):
 
 #: types of ideal joints
 IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
-Joint = Annotated[
-    IdealJoint | ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane, Field(discriminator="type")
-]
+Joint = Annotated[IdealJoint | Clearance, Field(discriminator="type")]
 
 
 class Stop(OnCoordinate):

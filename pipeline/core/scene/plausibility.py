@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.laws import Constant, Harmonic, Piecewise, Repeated, Spline, Step, Sum
 from flexclear.pipeline.core.scene.loads import Pid, SampledPid
@@ -39,10 +38,10 @@ def implausible(scene: Scene) -> list[InputError]:
 
 
 def _clearances(scene: Scene) -> Iterator[InputError]:
-    for name, joint in scene.joint.items():
-        if isinstance(joint, (ClearanceRevolute, ClearanceSlot, ClearanceSpherical)) and joint.clearance > joint.radius:
-            inner = "ball" if isinstance(joint, ClearanceSpherical) else "pin"
-            text = f"{1e3 * joint.clearance:g} mm is more than the {inner}'s radius, {1e3 * joint.radius:g} mm"
+    for name, joint in scene.contacts().items():
+        if joint.clearance > joint.radius:
+            inner, sizes = joint.surfaces[1], (1e3 * joint.clearance, 1e3 * joint.radius)
+            text = f"{sizes[0]:g} mm is more than the {inner}'s radius, {sizes[1]:g} mm"
             yield warning(scene, f"joint.{name}.clearance", text, UNITS)
 
 

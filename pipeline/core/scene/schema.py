@@ -6,13 +6,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from flexclear.pipeline.core.scene import provenance
-from flexclear.pipeline.core.scene.clearance import (
-    CONTACTS,
-    BallOnPlane,
-    Clearance,
-    ClearanceRevolute,
-    ClearanceSpherical,
-)
+from flexclear.pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.events import Event, require_possible
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Positive, Time
@@ -415,10 +409,9 @@ class Scene(Part):
         """Return the joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
 
-    def worn(self) -> dict[str, ClearanceRevolute | ClearanceSpherical]:
+    def worn(self) -> dict[str, Clearance]:
         """Return the joints with clearance whose wear is computed, by name."""
-        wearing = (ClearanceRevolute, ClearanceSpherical)
-        return {n: j for n, j in self.joint.items() if isinstance(j, wearing) and j.wear is not None}
+        return {n: j for n, j in self.contacts().items() if getattr(j, "wear", None) is not None}
 
     def stop_ends(self) -> list[str]:
         """Return the names of all ends of stops, as in records."""

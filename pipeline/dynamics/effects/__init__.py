@@ -96,8 +96,8 @@ def scheme_of(solver: Any) -> Scheme:
 def most_parts(scene: Scene) -> Parts:
     """Return all parts that the machine code of a scene may have, as far as the scene alone decides."""
     contacts, joints = scene.contacts(), import_module(JOINTS)
-    ideal = {joint.type for name, joint in scene.joint.items() if name not in contacts}
-    ideal |= {joints.HELD[joint.type] for joint in contacts.values() if joint.type in joints.HELD}
+    ideal: set[str] = {joint.type for name, joint in scene.joint.items() if name not in contacts}
+    ideal |= {joint.held for joint in contacts.values() if joint.held is not None}
     paths = any(not hasattr(drive, "joint") for drive in scene.drive.values())
     kinds = {effect.name: effect.kinds(scene) for effect in EFFECTS}
     chained = set(joints.CHAIN) if paths or ideal - set(joints.WHOLE) else set()

@@ -59,8 +59,9 @@ def apply_impulses(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str
     rates = np.array([series[name][1] for name in targets]).reshape(len(targets), -1)
     C = (rates[:, 1:] - rates[:, :1]) * scale
     missing = np.array(list(targets.values())) - rates[:, 0]
-    impulses = np.linalg.lstsq(C @ C.T, missing, rcond=IMPULSE_RANK)[0]
-    after, s = y.copy(), C.T @ impulses
+    s = np.linalg.lstsq(C, missing, rcond=IMPULSE_RANK)[0]
+    impulses = np.linalg.lstsq(C.T, s, rcond=IMPULSE_RANK)[0]
+    after = y.copy()
     after[model.speeds] += Z @ s
     work = float(np.array(list(targets.values())) @ impulses)
     return Impulses(after, dict(zip(targets, impulses.tolist(), strict=True)), work, 0.5 * float(s @ s))

@@ -25,5 +25,3 @@ NAMES |= {n: f"turn_and_slide:{n.upper()}" for n in ("fixed", "revolute", "prism
 #: joints that are always one link; others may become chains of joints in CHAIN (see `model.chain`)
 WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
 CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
-#: the ideal joint that a clearance joint keeps in addition to its contact
-HELD = {"clearance-revolute": "planar", "clearance-slot": "planar"}

@@ -31,11 +31,10 @@ from flexclear.pipeline.core.numerics.rotations import cross, rotation_vector_to
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.effects import NORMAL_LAWS, SURFACES
 from flexclear.pipeline.dynamics.model.closing import displaced, misfit
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
+from flexclear.pipeline.dynamics.model.contacts import resolved
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
@@ -102,10 +101,8 @@ def knows_all_joints(model: Model) -> bool:
 
 def _separation(joint: Clearance, force: float) -> float:
     """Return how far the points may separate [m]: the clearance, and the penetration under a force."""
-    law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
-    exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
-    stiffness = lookup(SURFACES, joint.type, where="[joint]").stiffness(joint, exponent)
-    return float(joint.clearance + (KNOCK * force / stiffness) ** (1.0 / exponent))
+    law = resolved(joint, 1.0, "[normal]")  # the depth at rest does not depend on the mass
+    return joint.clearance + law.depth(KNOCK * force)
 
 
 @dataclass(frozen=True)

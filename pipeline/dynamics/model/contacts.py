@@ -100,15 +100,21 @@ def bristle(name: str, joint: Any) -> float | None:
 
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
-    joint, path = contact.joint, f"[{contact.place}.normal]"
-    normal = lookup(NORMAL_LAWS, joint.normal.law, where=path)
-    surfaces = None if isinstance(joint, End) else lookup(SURFACES, joint.type, where=path)
-    stiffness, mass = joint.normal.stiffness, None
+    ends = () if isinstance(contact.joint, End) else (contact.outer, contact.inner)
+    mass = _reduced_mass([mechanism.links[site.link].mass for site in ends])
+    return resolved(contact.joint, mass, f"[{contact.place}.normal]")
+
+
+def resolved(joint: Clearance | End, mass: float | None, path: str) -> Resolved:
+    """Return the normal law of a contact; raise InputError, placed at `path`, for a law with impossible values.
+
+    mass: that rebounds [kg], for laws whose damping depends on it.
+    """
+    normal, stiffness = lookup(NORMAL_LAWS, joint.normal.law, where=path), joint.normal.stiffness
     try:
-        if surfaces is not None:
+        if not isinstance(joint, End):
             exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
-            stiffness = surfaces.stiffness(joint, exponent)
-            mass = _reduced_mass([mechanism.links[site.link].mass for site in (contact.outer, contact.inner)])
+            stiffness = lookup(SURFACES, joint.type, where=path).stiffness(joint, exponent)
         law: Resolved = normal.resolve(joint.normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None

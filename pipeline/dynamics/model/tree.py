@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.joints import HELD
 from flexclear.pipeline.dynamics.model.driving import joint_drives, joint_type
 from flexclear.pipeline.dynamics.model.merge import Frame, Group, find_frame
 
@@ -61,7 +60,7 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
         a, b = (find_frame(frames, f, f"[joint.{name}.between]") for f in joint.between)
         if a.body == b.body:
             raise InputError(f"[joint.{name}.between]", f"joins '{a.body}' to itself", "name frames of two bodies")
-        kind = HELD.get(joint.type) if name in contacts else joint.type
+        kind = contacts[name].held if name in contacts else joint.type
         if kind is None:
             continue
         ga, gb = group_of[a.body], group_of[b.body]

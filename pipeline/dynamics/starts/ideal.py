@@ -154,8 +154,8 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
                 axis = outer["axes"][:, 2]
                 force, offset = force - axis * (axis @ force), offset - axis * (axis @ offset)
             size = float(np.linalg.norm(force))
-            depth = (size / law.numbers.stiffness) ** (1.0 / law.numbers.exponent)
-            target = -force / size * (contact.joint.clearance + depth) if size > NO_FORCE * weight else 0.0 * force
+            pressed = contact.joint.clearance + law.depth(size)
+            target = -force / size * pressed if size > NO_FORCE * weight else 0.0 * force
             missing.append(target - offset)
         least = min(joint.clearance for joint in loose(model.scene).values())
         if np.max(np.abs(missing)) <= REACHED * least:

@@ -1,7 +1,8 @@
 """Compiled forms of normal forces; laws that share a form differ in numbers only.
 
 Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, damping)``, with a sum >= 0, and
-``stored(depth, law)``; law has the fields of `contact.law.Numbers`.
+``stored(depth, law)``, and the function ``depth(force, law)``, the inverse of the elastic force; law has the fields of
+`contact.law.Numbers`.
 """
 
 KIND = "form of a normal law"

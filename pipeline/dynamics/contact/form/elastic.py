@@ -2,9 +2,14 @@ r"""Normal force without loss: :math:`F_N = K\,\delta^n`."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from flexclear.pipeline.dynamics.kernels import kernel
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.contact.law import Numbers
 
 
 @kernel
@@ -25,3 +30,8 @@ def force(depth, rate, impact_rate, law):
 def stored(depth, law):
     """Return the energy [J] that the elastic part of the force stores."""
     return law.stiffness * depth * power(depth, law.exponent) / (law.exponent + 1.0)
+
+
+def depth(force: float, law: Numbers) -> float:
+    """Return the depth [m] at which the elastic force is `force` [N], >= 0."""
+    return float((force / law.stiffness) ** (1.0 / law.exponent))

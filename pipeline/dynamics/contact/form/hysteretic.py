@@ -6,10 +6,10 @@ Source: Hunt & Crossley (1975), J. Applied Mechanics 42, 440-445.
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics.contact.form.elastic import power, stored
+from flexclear.pipeline.dynamics.contact.form.elastic import depth, power, stored
 from flexclear.pipeline.dynamics.kernels import kernel
 
-__all__ = ["force", "stored"]
+__all__ = ["depth", "force", "stored"]
 
 
 @kernel

@@ -6,7 +6,12 @@ would begin to pull, while the surfaces still overlap; the energy then left in t
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from flexclear.pipeline.dynamics.kernels import kernel
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.contact.law import Numbers
 
 
 @kernel
@@ -20,3 +25,8 @@ def force(depth, rate, impact_rate, law):
 def stored(depth, law):
     """Return the energy [J] that the spring stores."""
     return 0.5 * law.stiffness * depth * depth
+
+
+def depth(force: float, law: Numbers) -> float:
+    """Return the depth [m] at which the spring's force is `force` [N]."""
+    return force / law.stiffness

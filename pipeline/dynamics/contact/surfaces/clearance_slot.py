@@ -1,7 +1,7 @@
 """Pin in a straight slot with clearance: two walls along x of the slot's frame, and a half circle at each end.
 
 The straight part of the slot's centre line guides the pin's centre. Between its ends the gap is measured across it,
-beyond them from the end. Axial motion and tilt are constrained as by a planar joint (`joints.HELD`).
+beyond them from the end. Axial motion and tilt are constrained as by a planar joint (`held` in core/scene/clearance).
 
 The walls are planes; the round ends have the same stiffness. Exponent 1.5: K of a sphere on a plane, as is usual for
 revolute joints (see `clearance_revolute`). Exponent 1: a cylinder on a plane.
