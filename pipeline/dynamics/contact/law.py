@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.dynamics.contact import form as forms
 from flexclear.pipeline.dynamics.contact import restitution as closed_form
 
 #: largest deviation of the delivered from the requested restitution within a law's range
@@ -43,7 +42,9 @@ class Resolved:
 
     def depth(self, force: float) -> float:
         """Return the penetration [m or rad] whose elastic force is `force` [N or N m], >= 0."""
-        depth: float = lookup(forms.__name__, self.form, where="[normal]").depth(force, self.numbers)
+        depth: float = lookup("flexclear.pipeline.dynamics.contact.form", self.form, where="[normal]").depth(
+            force, self.numbers
+        )
         return depth
 
 
