@@ -93,6 +93,20 @@ def test_a_weld_carries_force_and_moment_from_one_side_to_the_other(held: str, l
     assert found.joint_moment.values == pytest.approx(np.tile(sign * MOMENT, (found.sizes["time"], 1)), abs=1e-9)
 
 
+@pytest.mark.parametrize("ground_first", [True, False])
+def test_a_weld_to_the_ground_carries_what_hangs_on_its_bracket(ground_first: bool) -> None:
+    """A body on a ball joint at the bracket's end, with a force at its centre: on the ground it is the same one."""
+    place = {"position": [1.0, 0.0, 0.0]}
+    bodies = {"ground": ground(O=(0.0, 0.0, 0.0)), "bracket": rigid(1.0, 1.0, {"O": {}, "end": place}, pose={})}
+    bodies["hook"] = rigid(1.0, 1.0, {"c": {}}, pose=place)
+    ends = ["ground.O", "bracket.O"] if ground_first else ["bracket.O", "ground.O"]
+    joints = {"weld": joint("fixed", *ends), "hinge": joint("spherical", "bracket.end", "hook.c")}
+    load = {"pull": {"type": "point-force", "frame": "hook.c", "force": FORCE.tolist()}}
+    found, sign = simulate(scene(bodies, joints, end=0.01, load=load)).sel(joint="weld"), -1.0 if ground_first else 1.0
+    assert found.joint_force.values == pytest.approx(np.tile(sign * FORCE, (found.sizes["time"], 1)), abs=1e-9)
+    assert found.joint_moment.values == pytest.approx(np.tile(sign * MOMENT, (found.sizes["time"], 1)), abs=1e-9)
+
+
 # Springs, dampers, drives --------------------------------------------------------------------------------------------
 
 

@@ -43,6 +43,7 @@ def hidden(self):
 #: another release, and this one with something that `lowering` needs hidden or of another shape
 HIDDEN = (
     "import numba; numba.__version__ = '0.99.0'",
+    "os.environ['FLEXCLEAR_PLAIN_NUMBA'] = '1'",
     "from numba.core import codegen; del codegen.JITCodeLibrary",
     *(f"{HERE}lowering.Part.{name} = hidden" for name in ("_codegen", "_linking_libraries", "_raise_if_finalized")),
     f"{HERE}lowering._function_passes = lambda: 0",

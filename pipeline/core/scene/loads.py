@@ -25,7 +25,7 @@ from flexclear.pipeline.core.scene.units import quantity
 
 Components = tuple[Bare, Bare, Bare]
 
-#: a symmetric 6x6 matrix between three displacements and three rotations
+#: a 6x6 matrix between three displacements and three rotations
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 NOTHING: Matrix = ((0.0,) * 6,) * 6
 #: relative rounding errors, of symmetry and of a zero eigenvalue, in a matrix that was computed elsewhere
@@ -33,7 +33,7 @@ _ROUNDING = 1e-9
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
-def _matrix(value: Any, what: str, dimensions: tuple[str, str, str]) -> Matrix:
+def _matrix(value: Any, what: str, dimensions: tuple[str, str, str], symmetric: bool) -> Matrix:
     """Return the matrix in SI; dimensions: of displacement rows and columns, mixed ones, rotation rows and columns."""
     given = list(value) if isinstance(value, (list, tuple)) else []
     if len(given) == 6 and not any(isinstance(row, (list, tuple)) for row in given):
@@ -41,7 +41,7 @@ def _matrix(value: Any, what: str, dimensions: tuple[str, str, str]) -> Matrix:
     if [len(row) if isinstance(row, (list, tuple)) else 0 for row in given] != [6] * 6:
         raise ValueError(f"a {what} is [x, y, z, rx, ry, rz] or a 6x6 matrix in that order")
     rows = [[_entry(given[i][j], dimensions[(i > 2) + (j > 2)]) for j in range(6)] for i in range(6)]
-    return _checked(rows, what)
+    return _checked(rows, what) if symmetric else tuple(map(tuple, rows))
 
 
 def _entry(value: Any, dimension: str) -> float:
@@ -66,7 +66,7 @@ def _checked(rows: list[list[float]], what: str) -> Matrix:
         if asymmetry > _ROUNDING * max(abs(rows[i][j]), abs(rows[j][i]), sizes[i] * sizes[j]):
             raise ValueError(
                 f"a {what} matrix must be symmetric; the entries between {_DIRECTIONS[i]} and {_DIRECTIONS[j]} are "
-                f"{rows[i][j]:g} and {rows[j][i]:g}"
+                f"{rows[i][j]:g} and {rows[j][i]:g}; symmetric = false allows this, for cross-coupled bearings"
             )
     mended = tuple(tuple(0.5 * (rows[i][j] + rows[j][i]) for j in range(6)) for i in range(6))
     for k in range(6):
@@ -100,7 +100,7 @@ def _field(what: str, *dimensions: str) -> Any:
     three = (dimensions[0], dimensions[1], dimensions[2])
     return Annotated[
         tuple[tuple[float, ...], ...],
-        BeforeValidator(lambda value: _matrix(value, what, three)),
+        BeforeValidator(lambda value, info: _matrix(value, what, three, info.data.get("symmetric", True))),
         WithJsonSchema(
             {"type": "array", "minItems": 6, "maxItems": 6, "description": f"{what}: [x, y, z, rx, ry, rz] or 6x6"}
         ),
@@ -274,10 +274,13 @@ class Bushing(Part):
     type: Literal["bushing"]
     between: tuple[FrameName, FrameName]
     """the frame of the mount, and the frame that it carries"""
+    symmetric: bool = True
+    """false allows any 6x6 matrices, as cross-coupled bearings and seals have them: the skew-symmetric part of the
+    stiffness then supplies or takes energy on closed paths, which is booked as work of the load"""
     stiffness: BushingStiffness = NOTHING
-    """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix"""
+    """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix; any with `symmetric = false`"""
     damping: BushingDamping = NOTHING
-    """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix"""
+    """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix; any with `symmetric = false`"""
 
     @model_validator(mode="after")
     def _acts(self) -> Self:

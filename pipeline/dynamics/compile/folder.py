@@ -17,6 +17,7 @@ from flexclear.pipeline.core.artifacts.disk import sweep
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.platforms import others_can_write
 from flexclear.pipeline.dynamics.compile.files import CODE, file_lock, remove_code
+from flexclear.pipeline.dynamics.kernels import PLAIN
 
 #: kernels unused for this time [s] are removed, and the least recently used ones beyond this many bytes
 UNUSED, LARGEST = 90 * 86400.0, 2 << 30
@@ -57,7 +58,7 @@ def processor() -> str:
     import llvmlite.binding as llvm
 
     settings = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
-    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings)
+    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings, *["plain"][: int(PLAIN)])
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
 
 

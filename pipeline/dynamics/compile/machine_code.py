@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from flexclear.pipeline.dynamics.kernels import PLAIN
+
 #: names that only the exits of functions refer to which raise Python exceptions; no kernel does, and reaching one ends
 #: the process
 NEVER_REACHED = {
@@ -46,6 +48,8 @@ NOTHING = b"{}\n"
 
 def image(function: Any) -> bytes:
     """Return the code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
+    if PLAIN:
+        return stored(function.native_name, *assembled(function.inspect_llvm()))
     try:  # private attributes of Numba, which another release may not have
         module, binary = function._library._final_module, bytes(function._library._get_compiled_object())
     except (AttributeError, TypeError, ValueError, RuntimeError):

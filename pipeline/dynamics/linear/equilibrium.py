@@ -31,7 +31,7 @@ from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, close, hold, in_strides, set_drives
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, magnitude, stiffness, tangent
-from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, vibrations
+from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, is_symmetric, vibrations
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import row_units
 
@@ -105,7 +105,7 @@ def residual(bench: Bench, at: Tangent) -> float:
 
 def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     """Return the displacement along the free motions, towards balance."""
-    K, _ = stiffness(bench, at, at.Z)
+    K, error = stiffness(bench, at, at.Z)
     k, axes = np.linalg.eigh(0.5 * (K + K.T))
     force = axes.T @ at.unbalanced
     floor = max(NO_STIFFNESS * float(np.max(np.abs(k))), 1e-30)
@@ -114,6 +114,9 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     reach = np.max(np.abs(at.Z @ axes) / size, axis=0)
     along = np.clip(along, -LONGEST_MOVE / reach, LONGEST_MOVE / reach)
     step = axes @ along
+    if not is_symmetric(K, error):  # forces across the displacement, which may exceed those along it
+        whole = -np.linalg.lstsq(K, at.unbalanced, rcond=NO_STIFFNESS)[0]
+        step = whole if whole @ at.unbalanced < 0.0 else step
     return step * min(1.0, LONGEST_MOVE / max(float(np.max(np.abs(at.Z @ step) / size[:, 0])), 1e-300))
 
 

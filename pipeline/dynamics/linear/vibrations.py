@@ -67,7 +67,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
     least = RELATIVE_ZERO * max(float(np.abs(D).max()), float(np.sqrt(np.abs(np.diag(K)).max())))
     D[np.abs(D) <= np.maximum(ZERO_EIGENVALUE * rate_error[None, :], least)] = 0.0
     K[:, free], K[free, :] = 0.0, 0.0
-    if _is_symmetric(K, error) and not np.any(D):
+    if is_symmetric(K, error) and not np.any(D):
         k, axes = _principal(_symmetric(K, error), free)
         # a falling motion, of negative stiffness, grows as exp(+sqrt(-k) t)
         value, shape, value_error = np.sqrt((-k).astype(complex)), axes.astype(complex), np.zeros(len(k))
@@ -78,17 +78,17 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
 
 
 def _without_stiffness(K: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Return True for motions without stiffness, within rounding."""
-    own = np.abs(np.diag(K))
+    """Return True for motions without stiffness, within rounding; cross-coupling alone is stiffness as well."""
+    own = np.abs(K).max(axis=0)
     return own <= np.maximum(ZERO_EIGENVALUE * error, RELATIVE_ZERO**2 * own.max())
 
 
 def _scale(K: np.ndarray) -> np.ndarray:
-    own = np.sqrt(np.abs(np.diag(K)))
+    own = np.sqrt(np.abs(K).max(axis=0))
     return np.maximum(own, LEAST_SCALE * own.max() or 1.0)
 
 
-def _is_symmetric(K: np.ndarray, error: np.ndarray) -> bool:
+def is_symmetric(K: np.ndarray, error: np.ndarray) -> bool:
     """Return True when K is symmetric within the errors of its columns: then the forces have a potential."""
     value_error = ZERO_EIGENVALUE * (error[:, None] + error[None, :]) + ASYMMETRY * np.outer(_scale(K), _scale(K))
     return bool(np.all(np.abs(K - K.T) <= value_error))

@@ -3,6 +3,9 @@ r"""Elastic mount between two frames F and G: stiffness and damping for six disp
 .. math:: s = (x, \theta), \quad x = R_{WF}^T(p_G - p_F), \quad R_{FG} = \exp\tilde\theta, \quad
           U = \tfrac12 s^TKs, \quad P_{lost} = \dot s^TC\dot s
 
+The skew-symmetric part of an unsymmetric K has no potential; its power :math:`\tfrac12\dot s^T(K^T-K)s` is work of the
+load. With :math:`K_{xy} = k_c = -K_{yx}` that work is 2 k_c times the area of a closed path, counter-clockwise.
+
 The force on G is -(K s + C ds/dt) along x; the torque along theta becomes one about the axes of F by the inverse
 tangent, :math:`T^{-T} = 1 + \tfrac12\tilde\theta + e\,\tilde\theta\tilde\theta`,
 :math:`e = (1 - \tfrac\theta2\cot\tfrac\theta2)/\theta^2`, so that power and energy agree for finite rotations. They act
@@ -41,8 +44,9 @@ from flexclear.pipeline.dynamics.vectors import (
 SERIES_BELOW = 1e-3
 #: square of the angle [rad] from which on the torque is undefined; 6.2 of 2 pi
 FULL = 6.2**2
-#: offset of the damping matrix among the numbers, and offsets of the blocks of a 6x6 matrix
-DAMPING, MIXED, SECOND = 36, 3, 18
+#: offsets of the damping matrix and of the circulatory one, (K^T - K)/2, among the numbers, and of the blocks of a 6x6
+#: matrix
+DAMPING, CIRCULATION, MIXED, SECOND = 36, 72, 3, 18
 
 
 @kernel
@@ -116,17 +120,21 @@ def apply(d, k):
     pull, twist = product6(d, k, 0, x, v)
     damped_pull, damped_twist = product6(d, k, DAMPING, x_rate, v_rate)
     stored, lost = 0.5 * (dot(pull, x) + dot(twist, v)), dot(damped_pull, x_rate) + dot(damped_twist, v_rate)
+    circling, swirling = product6(d, k, CIRCULATION, x, v)
+    power = dot(circling, x_rate) + dot(swirling, v_rate)
     force = turn(F, scale(-1.0, add(pull, damped_pull)))
     along = scale(-1.0, add(twist, damped_twist))
     swung = cross(v, along)
     torque = turn(F, add(along, add(scale(0.5, swung), scale(e, cross(v, swung)))))
     length = np.sqrt(dot(r, r))
     rate = dot(r, slide) / length if length > 0.0 else 0.0
-    act(d, k, add(torque, cross(p, force)), force, length, rate, stored, 0.0, lost)
+    act(d, k, add(torque, cross(p, force)), force, length, rate, stored, power, lost)
 
 
 def row(load: Bushing, path: str) -> Row:
-    """Return the load's row: stiffness, then damping, row by row [SI]; three states where it resists rotation."""
-    numbers = [entry for matrix in (load.stiffness, load.damping) for row in matrix for entry in row]
-    resists = any(entry for matrix in (load.stiffness, load.damping) for row in matrix[3:] for entry in row)
-    return Row(frames=load.between, numbers=tuple(numbers), states=3 if resists else 0)
+    """Return the load's row: stiffness, damping, circulatory matrix, row by row [SI]; three states where it feels
+    rotation."""
+    K, C = np.array(load.stiffness), np.array(load.damping)
+    numbers = np.concatenate([K, C, 0.5 * (K.T - K)]).ravel()
+    turning = any(np.any(matrix[3:]) or np.any(matrix[:, 3:]) for matrix in (K, C))
+    return Row(frames=load.between, numbers=tuple(numbers.tolist()), states=3 if turning else 0)
