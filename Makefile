@@ -37,7 +37,11 @@ test-slow: $(TOOLS) ## The tests marked slow
 # other Pythons that this machine may have; each gets an environment of its own and runs what `doctor` computes
 OTHERS := python3.12 python3.13 python3.14 $(wildcard $(HOME)/.pyenv/versions/3.1[2-9]*/bin/python)
 
-interpreters: $(READY) ## A short run under every other Python, and with the lowest and newest versions of libraries
+# tests of steps, contacts, joints, loads and derivatives that run with what Numba documents alone, too
+CORE := $(addprefix tests/,analytic/test_mechanism_checks.py analytic/test_contact_surfaces.py analytic/test_effects.py \
+	properties/test_dynamics_loads.py)
+
+interpreters: $(TOOLS) ## A short run under every other Python, with the lowest and newest libraries; tests with plain Numba
 	@try() { there=$(VENV)/others/$$1; echo "-- $$1"; p=$$2; extra=$$3; days=$$4; shift 4; \
 		test $$there/.ready -nt constraints.txt && test $$there/.ready -nt pyproject.toml && \
 		test $$there/.ready -nt .ci/lowest.txt && test -n "$$(find $$there/.ready -mtime -$$days)" || { \
@@ -50,6 +54,7 @@ interpreters: $(READY) ## A short run under every other Python, and with the low
 		try $$v $$p "" 365 -c constraints.txt || exit 1; \
 	done; test "$$ran" != " " || echo "skipped: there is no other Python here"; \
 	try lowest $(RUN) "[render]" 365 -c .ci/lowest.txt && try newest $(RUN) "[render]" 7 --upgrade --upgrade-strategy eager
+	@echo "-- plain numba"; FLEXCLEAR_PLAIN_NUMBA=1 FLEXCLEAR_KERNELS=$(VENV)/others/plain $(RUN) -m pytest -q $(CORE)
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation peers runs commands cold growth ensembles exudyn

@@ -121,6 +121,26 @@ def test_no_motion_of_an_undamped_rotor_grows_by_rounding(speed: float, unbalanc
     assert frequencies.__wrapped__("checks/overhung_rotor", overrides, moving=True).attrs["growth"] == 0.0
 
 
+@pytest.mark.parametrize("across", [0.0, 0.5 * SIDE])
+def test_a_seal_with_cross_coupling_drives_a_forward_whirl(across: float) -> None:
+    """Between ground and disc: m l^2 + c l + k = i kc of z = x + iy in fixed axes; in turning ones l - i Omega."""
+    speed, damping = 70.0, 30.0
+    seal: Table = {"type": "bushing", "between": ["ground.seal", "disc.o"], "symmetric": False}
+    matrix = np.zeros((6, 6))
+    matrix[0, 1], matrix[1, 0] = across, -across
+    seal |= {"stiffness": matrix.tolist(), "damping": [damping, damping, 0.0, 0.0, 0.0, 0.0]}
+    place = {"position": [0.0, 0.0, ARM]}
+    found = steady(edited(damped(rotor(speed), 0.0), {"body.ground.frames.seal": place, "load.seal": seal}))
+    value = -found.decay_rate.values + 2j * np.pi * found.frequency.values
+    for root in np.roots([MASS, damping, SIDE - 1j * across]):
+        turning = root - 1j * speed
+        known = turning if turning.imag > 0.0 else turning.conjugate()
+        assert np.abs(value - known).min() < 1e-9 * abs(root)
+    growth = max(0.0, *np.roots([MASS, damping, SIDE - 1j * across]).real)
+    assert found.attrs["growth"] == pytest.approx(growth, rel=1e-9)
+    assert (growth > 0.0) == (across > 0.0)
+
+
 def test_a_rotor_on_a_bushing_alone_is_refused_with_its_remedy() -> None:
     alone = edited(rotor(20.0, 1e-6), {"joint.float": None})
     with pytest.raises(SolverError, match=r'disc has no joint.*type `free`.*between = \["hub.s", "disc.o"\]'):

@@ -23,10 +23,12 @@ PLACES = {
     "kutta3": "pipeline/dynamics/integrate",
     "pin_in_slot": "pipeline/dynamics/joints",
     "safaeifar_farshidianfar": "pipeline/dynamics/contact/normal",
+    "ball_in_tube": "pipeline/dynamics/contact/surfaces",
     "smooth_coulomb": "pipeline/dynamics/contact/friction",
     "quadratic_drag": "pipeline/dynamics/loads",
     "cycloidal": "pipeline/dynamics/drives",
     "momentum": "pipeline/dynamics/record",
+    "turns": "pipeline/post/single_run",
     "mass": "flexclear/commands",
 }
 
@@ -50,11 +52,12 @@ def tree(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = copied(tmp_path_factory.mktemp("project"))
     for name, place in PLACES.items():
         shutil.copy(examples(root) / f"{name}.py", folder / place)
-        head, *hunks = (examples(root) / f"{name}.diff").read_text().split("@@\n")
-        other = folder / head.removeprefix("--- ").strip()
-        for hunk in hunks:
-            other.write_text(edited(other.read_text(), hunk))
-    flexclear(folder, "run", *map(str, examples(root).glob("*.toml")), "--to", "simulate", "--jobs", "1", "-q")
+        for file in (examples(root) / f"{name}.diff").read_text().split("--- ")[1:]:
+            head, *hunks = file.split("@@\n")
+            other = folder / head.strip()
+            for hunk in hunks:
+                other.write_text(edited(other.read_text(), hunk))
+    flexclear(folder, "run", *map(str, examples(root).glob("*.toml")), "--to", "post", "--jobs", "1", "-q")
     return folder
 
 
@@ -68,9 +71,9 @@ def flexclear(tree: Path, *arguments: str) -> str:
     return interpreted(tree, "-m", "flexclear", *arguments)
 
 
-def ran(tree: Path, name: str) -> xr.Dataset:
-    """The run of the example's scene."""
-    with xr.open_dataset(tree / "results" / "runs" / name / "run.nc") as found:
+def ran(tree: Path, name: str, what: str = "run") -> xr.Dataset:
+    """The run of the example's scene, or what follows from it."""
+    with xr.open_dataset(tree / "results" / "runs" / name / f"{what}.nc") as found:
         return found.load()
 
 
@@ -107,6 +110,30 @@ def test_a_normal_law(tree: Path) -> None:
     rebound = brentq(lambda e: a * (1.0 + e) + np.log((1.0 - a * e) / (1.0 + a)), 0.1, 0.99, xtol=1e-15)
     # the integrator's tolerance is 1e-10: it leaves 8e-11
     assert run["velocity"].values[-1, 0, 2] == pytest.approx(rebound, rel=1e-8)
+
+
+def test_surfaces(tree: Path) -> None:
+    """Between contacts of pi sqrt(m/K), half a vibration, it flies 2 c across; along the tube nothing acts."""
+    run = ran(tree, "ball_in_tube")
+    contact, clearance, t = np.pi * np.sqrt(0.5 / 2e6), 0.002, run["time"].values
+    beat = 2.0 * clearance + contact  # at 1 m/s
+    phase = (t + clearance) % (2.0 * beat)
+    back = phase > beat  # at the wall on the other side, and back from there
+    within, sign = np.where(back, phase - beat, phase), np.where(back, -1.0, 1.0)
+    wall = clearance + np.sin(np.pi * np.maximum(within - 2.0 * clearance, 0.0) / contact) * contact / np.pi
+    across = sign * np.where(within < 2.0 * clearance, within - clearance, wall)
+    # the integrator's tolerance is 1e-10, of millimetres; four contacts
+    np.testing.assert_allclose(run["position"].values[:, 0, 0], across, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(run["position"].values[:, 0, 2], 3.0 * t, rtol=0.0, atol=1e-12)
+
+
+def test_a_derived_result(tree: Path) -> None:
+    """Of a rotor that only slows down: the integral of its speed, which the friction law's test knows."""
+    found, run = ran(tree, "smooth_coulomb", "post"), ran(tree, "smooth_coulomb")
+    spin = run["angular_velocity"].sel(body="ball").values[:, 1]
+    angle = np.trapezoid(np.abs(spin), run["time"].values)
+    assert float(found["turns"].sel(body="ball")) == pytest.approx(angle / (2.0 * np.pi), rel=1e-12)
+    assert found["turns"].attrs["units"] == "1"
 
 
 def test_a_friction_law(tree: Path) -> None:
