@@ -33,11 +33,11 @@ ELSEWHERE = {
     ("pipeline/dynamics/model/given_start.py", "turned"): {"rad", "deg"},
     ("pipeline/dynamics/model/closing.py", "turned"): {"deg"},
     ("pipeline/post/answers/plan.py", "frequency"): {"%"},
+    ("papers/wang_wang_2019/figures/errors.py", "interval"): {"ms"},
 }
 EXPECTED = {name: {unit} for unit, names in NAMES.items() for name in names.split()}
-UNIT = re.compile(
-    r" ((?:kg|g|m|s|N|J|W|rad|deg|mm|cm|um|ms|min|kN|kJ|Hz|kHz|rpm|Pa|%)(?: m| s)?(?:\^\d)?(?:/(?:s|m|kg|rad)(?:\^\d)?)?)(?![\w^/])"
-)
+_BASE = "kg|g|m|s|N|J|W|rad|deg|mm|cm|um|ms|min|kN|kJ|Hz|kHz|rpm|Pa|%"
+UNIT = re.compile(rf" ((?:{_BASE})(?: m| s)?(?:\^\d)?(?:/(?:s|m|kg|rad)(?:\^\d)?)?)(?![\w^/])")
 
 
 def name_of(number: ast.expr) -> str:

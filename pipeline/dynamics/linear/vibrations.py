@@ -78,14 +78,24 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
 
 
 def _without_stiffness(K: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Return True for motions without stiffness, within rounding; cross-coupling alone is stiffness as well."""
-    own = np.abs(K).max(axis=0)
+    """Return True for motions without stiffness, within rounding."""
+    own = _sizes(K)
     return own <= np.maximum(ZERO_EIGENVALUE * error, RELATIVE_ZERO**2 * own.max())
 
 
 def _scale(K: np.ndarray) -> np.ndarray:
-    own = np.sqrt(np.abs(K).max(axis=0))
+    own = np.sqrt(_sizes(K))
     return np.maximum(own, LEAST_SCALE * own.max() or 1.0)
+
+
+def _sizes(K: np.ndarray) -> np.ndarray:
+    """Return the size of each motion's stiffness: its own, or what cross-coupling with another one amounts to.
+
+    Of a symmetric stiffness without negative eigenvalues that is the diagonal.
+    """
+    size, own = np.abs(K), np.abs(np.diag(K))
+    both = np.maximum(np.maximum(size, size.T), own)
+    return np.asarray((size * size.T / np.where(both > 0.0, both, 1.0)).max(axis=1))
 
 
 def is_symmetric(K: np.ndarray, error: np.ndarray) -> bool:
