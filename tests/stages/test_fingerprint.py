@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.workflow.fingerprint import WORDING, library_version
+from flexclear.pipeline.core.workflow.fingerprint import WORDING, Sources, library_version
+from flexclear.pipeline.core.workflow.task import Task, facts
 from tests.processes import printed
 
 #: runs the tasks up to a post, and an equilibrium, in a fresh process, and prints the own modules that each has loaded
@@ -61,3 +63,15 @@ def test_the_version_is_known_in_a_checkout_on_the_path(tmp_path: Path, monkeypa
     )
     monkeypatch.syspath_prepend(tmp_path)
     assert library_version("some_library") == "1.2"
+
+
+@pytest.mark.parametrize("name", ["simulation", "reduction", "derived_series", "analyses"])
+def test_every_library_that_the_code_imports_is_a_fact(name: str, root: Path):
+    """Also where functions import it: SciPy solves the eigenproblems of modes, for instance. Locks, folders and the
+    machine's resources change no result."""
+    stage, sources = f"flexclear.stages.{name}", Sources(root)
+    used = {library for module in sources.closure([stage]).values() for library in module.libraries}
+    found = facts(Task("s", "scene", f"{stage}:run", {}, ""), {}, sources)
+    assert {f"library {one}" for one in used - {"filelock", "platformdirs", "psutil"}} <= found.keys()
+    assert found["library scipy"] == version("scipy")
+    assert found["library numpy"] == version("numpy")

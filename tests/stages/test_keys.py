@@ -7,7 +7,6 @@ import datetime
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -363,18 +362,6 @@ def test_library_versions_count(sources: Sources):
     assert {"library numpy", "library skfem", "library xarray"} <= found.keys()
     assert re.match(r"\d+\.\d+", found["library skfem"])
     assert key(found) != key({**found, "library skfem": "0.0"})
-
-
-@pytest.mark.parametrize("name", ["simulation", "reduction", "derived_series", "analyses"])
-def test_every_library_that_the_code_imports_is_a_fact(name: str, sources: Sources):
-    """Also where functions import it: SciPy solves the eigenproblems of modes, for instance. Locks, folders and the
-    machine's resources change no result."""
-    root = f"flexclear.stages.{name}"
-    used = {library for module in sources.closure([root]).values() for library in module.libraries}
-    found = facts(Task("s", "scene", f"{root}:run", {}, ""), {}, sources)
-    assert {f"library {one}" for one in used - {"filelock", "platformdirs", "psutil"}} <= found.keys()
-    assert found["library scipy"] == version("scipy")
-    assert found["library numpy"] == version("numpy")
 
 
 def test_a_scene_survives_the_way_through_its_parameters(root: Path):
