@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import eigen, normal, reference
+from flexclear.pipeline.structure.modes.condition import Condition, check
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 from tests.processes import printed
@@ -206,3 +209,34 @@ def test_craig_bampton_frequencies_fall_to_the_clamped_rod(paper_rod: xr.Dataset
     assert np.all(np.diff(errors, axis=0) <= 1e-10)
     assert np.min(errors) > -1e-10
     assert errors[2][:4].max() < 2e-3
+
+
+def held_by(*rows: list[float]) -> tuple[Any, Condition]:
+    """A body of one point with three rotations, of a size of 1 m, and a condition that holds these motions of it."""
+    model = SimpleNamespace(position=np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), rigid=np.eye(6))
+    nothing = sp.csr_array((0, 6))
+    return model, Condition(sp.csr_array(np.array(rows)), "", np.zeros(0, dtype=int), nothing)
+
+
+@pytest.mark.parametrize("angle, independent", [(1e-6, True), (1e-12, False)])
+def test_held_motions_are_independent_down_to_rounding(angle: float, independent: bool) -> None:
+    """Six motions, of which two are at an angle of 1e-6 to each other, hold a body; at 1e-12 they are one."""
+    rows = np.eye(6)
+    rows[1] = np.cos(angle) * rows[0] + np.sin(angle) * rows[1]
+    if independent:
+        check(*held_by(*rows.tolist()))
+        return
+    with pytest.raises(InputError, match="not independent of each other"):
+        check(*held_by(*rows.tolist()))
+
+
+@pytest.mark.parametrize("lever, left", [(1e-6, 0), (1e-12, 1)])
+def test_a_short_lever_holds_a_rotation_down_to_rounding(lever: float, left: int) -> None:
+    """Held at two places of a body of 1 m that are a micrometre apart, it cannot turn; at 1e-12 m it can."""
+    model, condition = held_by(*np.eye(6).tolist())
+    model.rigid = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, lever])
+    if not left:
+        check(model, condition)
+        return
+    with pytest.raises(InputError, match=f"leave {left} rigid-body motions"):
+        check(model, condition)
