@@ -251,6 +251,19 @@ def test_a_lock_stops_what_has_much_and_what_has_little_inertia() -> None:
     assert float(event_of(run, "grip").event_energy_loss) == pytest.approx(energy, rel=1e-12)
 
 
+def test_a_lock_of_coordinates_that_depend_on_each_other_stops_them_all() -> None:
+    """A plate on a hinge that also slides on a plane: its displacements there are those of its one rotation."""
+    far = {"position": [0.6, 0.3, 0.0]}
+    plate = rigid(2.0, 0.4, {"O": {}, "far": far}, pose={}, angular_velocity=[0.0, 0.0, 3.0])
+    joints = {"hinge": joint("revolute", "ground.O", "plate.O"), "table": joint("planar", "ground.far", "plate.far")}
+    bodies = {"ground": {"type": "ground", "frames": {"O": {}, "far": far}}, "plate": plate}
+    run = simulated({"grip": {"at": 0.2, "lock": "joint.table"}}, 0.5, body=bodies, joint=joints)
+    k = run["time"].values.tolist().index(0.2)
+    assert run["angular_velocity"].values[k - 1, 0, 2] == pytest.approx(3.0, rel=1e-12)
+    assert np.abs(run["angular_velocity"].values[k + 1 :]).max() < 1e-12
+    assert float(event_of(run, "grip").event_energy_loss) == pytest.approx(0.5 * 0.4 * 9.0, rel=1e-12)
+
+
 def slider_crank(event: dict[str, Any], guide: str = "prismatic", **more: Any) -> xr.Dataset:
     """A crank of 1 m at 5 rad/s, a rod of 2 m and a slider, from the pose with the crank upright."""
     lean = float(np.arcsin(0.5))

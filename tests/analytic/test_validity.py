@@ -233,7 +233,7 @@ WRONG: dict[tuple[str, str], list[tuple[dict[str, Any], tuple[str, ...]]]] = {
         (mount([-1.0, 0, 0, 0, 0, 0]), ("must not be negative", "along x is -1")),
         (
             mount([[1.0, 2.0, *NONE[2:]], [1.0, 1.0, *NONE[2:]], *[NONE] * 4]),
-            ("must be symmetric", "between y and x are 1 and 2"),
+            ("must be symmetric", "between y and x are 1 and 2", "symmetric = false allows this"),
         ),
         (
             mount([[1.0, 2.0, *NONE[2:]], [2.0, 1.0, *NONE[2:]], *[NONE] * 4]),
