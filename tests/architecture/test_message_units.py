@@ -30,6 +30,8 @@ ELSEWHERE = {
     ("pipeline/structure", "start"): {"m"},
     ("pipeline/structure", "end"): {"m"},
     ("pipeline/dynamics/run/refusals/validity.py", "first"): {"rad/s"},
+    ("pipeline/dynamics/run/refusals/validity.py", "speeds"): {"rad/s"},
+    ("pipeline/dynamics/run/ledger.py", "speeds"): {"m/s"},
     ("pipeline/dynamics/model/given_start.py", "turned"): {"rad", "deg"},
     ("pipeline/dynamics/model/closing.py", "turned"): {"deg"},
     ("pipeline/post/answers/plan.py", "frequency"): {"%"},
@@ -45,7 +47,8 @@ def name_of(number: ast.expr) -> str:
     if isinstance(number, ast.Subscript):
         return name_of(number.value)
     if isinstance(number, ast.Call):
-        return name_of(number.args[0] if number.args else number.func)
+        of = name_of(number.func)
+        return of if of in EXPECTED or not number.args else name_of(number.args[0])
     if isinstance(number, ast.Attribute):
         return number.attr
     return number.id if isinstance(number, ast.Name) else ""
