@@ -55,6 +55,33 @@ def test_a_four_bar_follows_from_its_lengths_on_the_branch_that_is_hinted(
     assert mechanism.choice == ""
 
 
+def hanging(**start: Any) -> Mechanism:
+    """A driven four-bar without poses, on the branch near a hint, with a body that swings at the coupler's end."""
+    table = loose(0.9, joint={"j3": {"near": angles(0.9)[2] + 0.1}, **start})
+    table["body"]["bucket"] = rigid(1.0, 1e-3, {"pin": {}})
+    table["joint"]["swing"] = joint("revolute", "coupler.far", "bucket.pin")
+    return start_of(table)
+
+
+def test_where_a_free_coordinate_starts_is_reported_unless_the_scene_says_it() -> None:
+    """Closing the loop turns coupler and bucket by unequal angles, so that the coordinate leaves zero."""
+    mechanism = hanging()
+    found = turned(mechanism)
+    value = (found["bucket"] - found["coupler"] + np.pi) % (2.0 * np.pi) - np.pi
+    assert f"free coordinates start: swing is at {value:.4g} rad; " in mechanism.choice
+    assert "[start.joint.swing] position = ..." in mechanism.choice
+    assert hanging(swing={"position": 0.3}).choice == ""
+    assert hanging(swing={"position": 0.0}).choice == ""
+
+
+def test_a_chain_without_poses_starts_at_zero_without_a_word() -> None:
+    table = loose(0.9)
+    del table["body"]["rocker"], table["joint"]["j2"], table["joint"]["j3"], table["drive"]
+    mechanism = start_of(table)
+    assert turned(mechanism) == {"crank": 0.0, "coupler": 0.0}
+    assert mechanism.choice == ""
+
+
 def test_of_two_assemblies_one_is_taken_and_both_are_reported() -> None:
     mechanism = start_of(loose(0.9))
     values = [angles(0.9)[2], other_branch(0.9)[2]]
