@@ -9,8 +9,10 @@ import pytest
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
+from flexclear.pipeline.dynamics.model.assembly import assembled
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.starts import equilibrium
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, body, frame, joint, matrix, rigid, scene
 from tests.properties.test_dynamics_start import angles, driven, start_of
@@ -72,6 +74,11 @@ def test_where_a_free_coordinate_starts_is_reported_unless_the_scene_says_it() -
     assert "[start.joint.swing] position = ..." in mechanism.choice
     assert hanging(swing={"position": 0.3}).choice == ""
     assert hanging(swing={"position": 0.0}).choice == ""
+    whole = mechanism.scene
+    sought = equilibrium.placed(
+        whole.model_copy(update={"start": whole.start.model_copy(update={"at": "equilibrium"})})
+    )
+    assert assembled(build(sought, {})).choice == ""
 
 
 def test_a_chain_without_poses_starts_at_zero_without_a_word() -> None:

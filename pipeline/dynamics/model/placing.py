@@ -117,7 +117,7 @@ def _anywhere(
     mechanism: Mechanism, joints: Sequence[Constraint], at: Assembly, starts: Sequence[Given], placed: set[int]
 ) -> str:
     """Return a sentence that lists free coordinates which start neither where the scene says nor at 0."""
-    if mechanism.scene.start is not None and mechanism.scene.start.at == "equilibrium":
+    if mechanism.scene.start is not None and mechanism.scene.start._sought:
         return ""
     held, open_ones, said = list[Constraint](), dict[str, str](), {(start.joint, start.number) for start in starts}
     known = {key for key, value in at.coordinates.items() if abs(value) <= SAME_ASSEMBLY}

@@ -36,4 +36,5 @@ def placed(scene: Scene) -> Scene:
         return one.model_copy(update={"velocity": None}) if given else None
 
     hinted = Start(joint=joint_starts(scene.start, hint))
+    hinted._sought = True
     return scene.model_copy(update={"drive": holds, "start": hinted})
