@@ -12,6 +12,8 @@ from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.pipeline.dynamics.starts import ideal, snapshot
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import simulated
@@ -231,6 +233,12 @@ def test_pressing_pins_into_their_places_leaves_exact_joint_positions_as_they_ar
     assert np.arctan2(y, x) == pytest.approx(np.radians(30.0), rel=0, abs=1e-12)  # rounding
     assert crank.angular_velocity == pytest.approx([0.0, 0.0, 2.0], rel=0, abs=1e-12)
     assert begun.drive == {}
+    # with the rocker given as well, the coupler alone cannot bring its pin to the wall
+    engine, y = ideal._started(ideal.placed(scene), bundles(scene), lambda fraction, text: None)
+    rocker = joint_coordinates(engine.model, observe(engine, rows_of(engine, y[None], engine.start)))["D"][0][0]
+    both = edited(scene, {"start.joint.D": {"position": f"{rocker} rad"}})
+    begun, choice = ideal.begin(both, bundles(both), lambda fraction, text: None)
+    assert choice == "the pins are not pressed into their sockets without moving given joint positions"
 
 
 def test_a_start_as_without_clearance_needs_a_joint_that_has_an_ideal_counterpart() -> None:

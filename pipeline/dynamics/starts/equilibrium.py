@@ -29,7 +29,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 def placed(scene: Scene) -> Scene:
     """Return the scene with given joint positions held by drives; of its start only position hints remain."""
     assert scene.start is not None
-    holds = held(scene, given_coordinates(scene), lambda start: Constant(type="constant", value=start.position))
+    holds = held(scene, given_coordinates(scene), lambda _, value: Constant(type="constant", value=value))
 
     def hint(one: JointStart) -> JointStart | None:
         given = one.position is not None or one.near is not None

@@ -78,10 +78,9 @@ def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndar
     """
     rates = joint_coordinates(engine.model, observe(engine, rows_of(engine, y[None], engine.start)))
 
-    def law(start: Given) -> Polynomial:
+    def law(start: Given, value: float) -> Polynomial:
         name = label(start.joint, scene.joint[start.joint].type, start.number)
-        rate = float(rates[name][1][0])
-        return Polynomial(type="polynomial", coefficients=(start.position, rate), origin=engine.start)
+        return Polynomial(type="polynomial", coefficients=(value, float(rates[name][1][0])), origin=engine.start)
 
     return held(scene, [start for start in given_coordinates(scene) if start.joint not in pins], law)
 

@@ -94,14 +94,16 @@ def _start_without_poses(scene: Scene, modal: dict[str, ModalStart]) -> Start:
     return old.model_copy(update={"at": None, "joint": rates, "modal": modal})
 
 
-def held(scene: Scene, starts: Iterable[Given], law: Callable[[Given], Constant | Polynomial]) -> dict[str, Any]:
+def held(scene: Scene, starts: Iterable[Given], law: Callable[[Given, float], Constant | Polynomial]) -> dict[str, Any]:
     """Return the scene's drives, and drives of those coordinates whose given position nothing else drives."""
     driven, drives = joint_drives(scene), dict[str, Any](scene.drive)
     for start in starts:
         own = driven.get(start.joint, ())
         if start.position is not None and not (own and own[start.number]):
             name = f"hold-{start.joint}-{start.coordinate.name}"
-            drives[name] = JointDrive(joint=start.joint, coordinate=start.coordinate.name, law=law(start))
+            drives[name] = JointDrive(
+                joint=start.joint, coordinate=start.coordinate.name, law=law(start, start.position)
+            )
     return drives
 
 
