@@ -111,15 +111,16 @@ def row(scene: Scene) -> int:
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[str]:
-    """Return warnings on flexible bodies whose modes lack static compliance between the frames that joints use."""
+    """Return warnings on flexible bodies whose modes lack static compliance between frames of joints and loads."""
     if not reduced:
         return []
     from flexclear.pipeline.core.artifacts import deficits
 
-    messages = []
+    messages, loads = [], scene.load.values()
+    named = [end for part in (*scene.joint.values(), *loads) for end in getattr(part, "between", ())]
+    named += [load.frame for load in loads if hasattr(load, "frame")]
     for body, bundle in reduced.items():
-        ends = (end.partition(".") for joint in scene.joint.values() for end in joint.between)
-        used = [frame for owner, _, frame in ends if owner == body]
+        used = [frame for owner, _, frame in (end.partition(".") for end in named) if owner == body]
         if used and "compliance_share" in bundle:
             messages += deficits.warnings(bundle, used, body)
     return messages

@@ -207,7 +207,9 @@ class Study:
         """Compute the scene's ensemble, if it has one, at several tolerances, as far as the budget goes."""
         names, ensemble = [q.name for q in self._chosen], self.scene.ensemble
         for rtol in ENSEMBLES if ensemble is not None else ():
-            change = edited(self.scene, {"solver.rtol": rtol, "accuracy": None})
+            change = edited(
+                self.scene, {"solver.rtol": rtol, "solver.integrator": self.scene.solver.integrator, "accuracy": None}
+            )
             design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
             if self.spent + self.own * self.seconds_each * (ensemble.members if ensemble else 1) > self.seconds:
                 self.undone.append(design)

@@ -31,8 +31,8 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
     bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called regularly.
     A scene with `[accuracy]` is run until the estimated error of its time integration is below the request; where it
-    names no integrator, the cheapest is chosen.  With neither `[accuracy]` nor method or tolerance in `[solver]` it is
-    run at the default tolerance, or, where that is expensive, by `accuracy.by_default`.
+    names no integrator, the cheapest is chosen.  With neither `[accuracy]` nor method in `[solver]` it is run by the
+    default one, or, where that is expensive, by `accuracy.at_tolerance` or, without a tolerance, `accuracy.by_default`.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError, with the
     partial run marked as incomplete, when it is stopped.
     """
@@ -78,4 +78,6 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     method_costs = way(scene, "method selection")
     if requested:
         return of(accuracy.deliver(scene, compared, progress, method_costs(scene, bundles)))
+    if scene.solver.by_need == "integrator":
+        return of(accuracy.at_tolerance(scene, compared, method_costs(scene, bundles)))
     return of(accuracy.by_default(scene, compared, progress, lambda edited: method_costs(edited, bundles)))

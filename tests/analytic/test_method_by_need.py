@@ -103,6 +103,19 @@ def test_where_that_is_dear_it_is_as_exact_as_a_thousandth_of_each_range() -> No
 
 
 @pytest.mark.usefixtures("dear")
+def test_a_given_tolerance_stays_where_the_method_is_chosen() -> None:
+    said: list[str] = []
+    scene = load_scene(RINGING, {**SHORT, "solver.by_need": True, "solver.rtol": 1e-6})
+    run = simulated(scene, said)
+    assert any("dop853 would take some" in text and "tolerance of 1e-06" in text for text in said)
+    assert run.attrs["method"] == "exponential"
+    assert run.attrs["method_reason"]
+    assert "accuracy_rtol" not in run.attrs
+    by_hand = simulated(edited(scene, {"solver.integrator": "exponential"}))
+    xr.testing.assert_identical(run.drop_attrs(), by_hand.drop_attrs())
+
+
+@pytest.mark.usefixtures("dear")
 def test_dear_points_and_members_have_the_tolerance_of_runs_that_none_is_compared_with() -> None:
     scene = load_scene(RIGID, {**SHORT, "solver.by_need": True})
     given = load_scene(RIGID, {**SHORT, "solver.integrator": "radau", "solver.rtol": progress_rate.UNVERIFIED})
@@ -123,7 +136,8 @@ def test_an_edit_of_the_method_closes_the_choice_and_no_other_edit_does() -> Non
     assert scene.by_need()
     assert edited(scene, {"solver.evaluations": 1000}).by_need()
     assert edited(scene, {"accuracy": {"bob.position": "1 um"}}).by_need()
-    assert not edited(scene, {"solver.rtol": 1e-6}).by_need()
+    assert edited(scene, {"solver.rtol": 1e-6}).solver.by_need == "integrator"
+    assert with_numbers(scene, {"solver.rtol": 1e-6}).solver.by_need == "integrator"
     assert not with_numbers(scene, {"solver.integrator": "radau"}).by_need()
 
 

@@ -132,6 +132,32 @@ def test_a_deep_contact_is_reported_and_a_ball_that_leaves_through_its_socket_re
         simulated(dropped(4.5e-2))
 
 
+def door(kind: str, hinges: int) -> xr.Dataset:
+    """A door of 30 kg whose mass centre is 0.45 m from its hinges, 1.5 m apart."""
+    radius = {"ball_radius": 5e-3} if kind == "clearance-spherical" else {"pin_radius": 5e-3, "length": 0.03}
+    heights = {f"h{k}": {"position": [0.0, 0.0, 1.5 * k]} for k in range(hinges)}
+    contact = {"clearance": 5e-4, "normal": {"law": "flores", "restitution": 0.2, "stiffness": 1e9}, **radius}
+    joints = {name: joint(kind, f"ground.{name}", f"door.{name}", **contact) for name in heights}
+    leaf = rigid(30.0, [8.0, 10.0, 2.0], heights, pose={}, com=[0.45, 0.0, 0.75])
+    return simulate(scene({"ground": {"type": "ground", "frames": heights}, "door": leaf}, joints, 2e-3, load=GRAVITY))
+
+
+@pytest.mark.parametrize("hinges", [1, 2])
+def test_pins_that_hold_a_door_upright_are_reported_with_their_moment(hinges: int) -> None:
+    """The moment is that of the weight, 30 kg 9.81 m/s^2 0.45 m = 132.4 N m; no contact carries any of it."""
+    (text,) = (text for text in reported(door("clearance-revolute", hinges)) if "parallel" in text)
+    assert "joint h0: it holds its pin parallel to the axis by 132 N m" in text
+    assert "by up to 0.033 rad" in text  # 2 c / L
+    assert "clearance-spherical" in text
+
+
+def test_balls_and_pins_in_a_plane_hold_no_tilt() -> None:
+    assert not any("parallel" in text for text in reported(door("clearance-spherical", 2)))
+    for name in ("clearance_pendulum", "scotch_yoke"):
+        short = load_scene(TREE / "scenes" / "checks" / f"{name}.toml", {"time.end": 0.05})
+        assert not any("parallel" in text for text in reported(simulated(short)))
+
+
 def test_an_ensemble_whose_balls_leave_through_their_sockets_is_refused() -> None:
     with pytest.raises(SolverError, match=r"joint j: the penetration reached 0\.0451 m"):
         analyses.ensemble(edited(dropped(4.5e-2), {"ensemble": {"members": 2}}), {}, silent)

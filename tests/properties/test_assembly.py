@@ -9,8 +9,10 @@ import pytest
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
+from flexclear.pipeline.dynamics.model.assembly import assembled
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.starts import equilibrium
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, body, frame, joint, matrix, rigid, scene
 from tests.properties.test_dynamics_start import angles, driven, start_of
@@ -52,6 +54,38 @@ def test_a_four_bar_follows_from_its_lengths_on_the_branch_that_is_hinted(
     for body_name, angle in zip(("crank", "coupler", "rocker"), (crank, coupler, rocker), strict=True):
         # loops are closed to 1e-11 of the mechanism's size
         assert np.exp(1j * found[body_name]) == pytest.approx(np.exp(1j * angle), abs=1e-10)
+    assert mechanism.choice == ""
+
+
+def hanging(**start: Any) -> Mechanism:
+    """A driven four-bar without poses, on the branch near a hint, with a body that swings at the coupler's end."""
+    table = loose(0.9, joint={"j3": {"near": angles(0.9)[2] + 0.1}, **start})
+    table["body"]["bucket"] = rigid(1.0, 1e-3, {"pin": {}})
+    table["joint"]["swing"] = joint("revolute", "coupler.far", "bucket.pin")
+    return start_of(table)
+
+
+def test_where_a_free_coordinate_starts_is_reported_unless_the_scene_says_it() -> None:
+    """Closing the loop turns coupler and bucket by unequal angles, so that the coordinate leaves zero."""
+    mechanism = hanging()
+    found = turned(mechanism)
+    value = (found["bucket"] - found["coupler"] + np.pi) % (2.0 * np.pi) - np.pi
+    assert f"free coordinates start: swing is at {value:.4g} rad; " in mechanism.choice
+    assert "[start.joint.swing] position = ..." in mechanism.choice
+    assert hanging(swing={"position": 0.3}).choice == ""
+    assert hanging(swing={"position": 0.0}).choice == ""
+    whole = mechanism.scene
+    sought = equilibrium.placed(
+        whole.model_copy(update={"start": whole.start.model_copy(update={"at": "equilibrium"})})
+    )
+    assert assembled(build(sought, {})).choice == ""
+
+
+def test_a_chain_without_poses_starts_at_zero_without_a_word() -> None:
+    table = loose(0.9)
+    del table["body"]["rocker"], table["joint"]["j2"], table["joint"]["j3"], table["drive"]
+    mechanism = start_of(table)
+    assert turned(mechanism) == {"crank": 0.0, "coupler": 0.0}
     assert mechanism.choice == ""
 
 

@@ -89,6 +89,41 @@ def test_velocity_and_spin_of_a_hinged_flexible_rod_agree_about_its_hinge() -> N
     assert float(rod.kinetic[0]) == pytest.approx(0.5 * about_end * omega @ omega, rel=1e-9)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_bodies_without_a_given_velocity_start_at_rest_where_joints_allow_it(turned: bool) -> None:
+    """Of a row of equal sliders, each guided by the one before, the one that is given a velocity moves alone.
+
+    The joints may be written in either order, so that another slider is the root of the chain.
+    """
+    bodies: dict[str, Any] = {"world": ground(rail=(0.0, 0.0, 0.0))}
+    joints, names = {}, ["world", "a", "b", "c"]
+    for k, name in enumerate(names[1:]):
+        bodies[name] = rigid(1.0, 1e-3, {"rail": {}}, pose={"position": [0.0, 0.0, 0.1 * k]})
+        joints[f"g{k}"] = joint("prismatic", f"{names[k]}.rail", f"{name}.rail")
+    joints["g0"] = joint("prismatic", "world.rail", "c.rail" if turned else "a.rail")
+    bodies["b"]["velocity"] = [0.0, 0.0, 1.0]
+    found = simulate(scene(bodies, joints, end=1e-3, rtol=1e-8)).isel(time=0)
+    speeds = found.velocity.sel(body=["a", "b", "c"], axis="z").values
+    assert speeds == pytest.approx([0.0, 1.0, 0.0], rel=0, abs=1e-12)  # rounding of a linear system of full rank
+
+
+def test_a_push_at_one_bar_sets_the_next_in_motion_as_an_impulse_does() -> None:
+    """Two bars of mass m and length l hang in line; the centre of the upper one is given a speed.
+
+    Its angular velocity is w = 2 v/l. An impulse there leaves the lower bar's angular momentum about the pin at zero:
+    m l w l/2 + m l^2/3 w' = 0, so that w' = -3 w/2.
+    """
+    length, speed, thin = 0.4, 0.1, 0.4**2 / 12.0
+    ends = {"top": frame((0.0, 0.5 * length, 0.0)), "foot": frame((0.0, -0.5 * length, 0.0))}
+    bars = {name: rigid(1.0, thin, ends, pose=frame((0.0, y * length, 0.0))) for name, y in (("a", -0.5), ("b", -1.5))}
+    bars["a"]["velocity"] = [speed, 0.0, 0.0]
+    joints = {"pin": joint("revolute", "world.pin", "a.top"), "knee": joint("revolute", "a.foot", "b.top")}
+    found = simulate(scene({"world": ground(pin=(0.0, 0.0, 0.0)), **bars}, joints, end=1e-3, rtol=1e-8)).isel(time=0)
+    w = 2.0 * speed / length
+    turns = found.angular_velocity.sel(body=["a", "b"], axis="z").values
+    assert turns == pytest.approx([w, -1.5 * w], rel=1e-12)  # rounding, as above
+
+
 GROUND, CRANK, COUPLER, ROCKER = 0.5, 0.2, 0.4, 0.3
 
 

@@ -59,6 +59,16 @@ def test_each_check_fails_where_its_value_exceeds_its_limit(changed: dict[str, f
         assert next(c for c in found if c.name == name).advice in text
 
 
+def test_remedies_name_what_the_scene_has_and_none_is_given_at_rounding():
+    stiff = run(stiff=0.5, energy_error=1e-2)
+    texts = [check.advice for check in stability.checks(stiff, None) if not check.good]
+    assert texts == ["a tighter tolerance: [solver] rtol", 'an implicit integrator: [solver] integrator = "radau"']
+    stepped = stiff.assign_attrs(parameters='{"solver": {"integrator": "rk4", "step": 1e-4}}')
+    assert stability.checks(stepped, None)[0].advice == "shorter steps: [solver] step"
+    still = run().assign(kinetic=(("time",), np.full(11, 2.0)), energy_error=(("time",), np.full(11, 4e-16)))
+    assert failing(stability.checks(still, None)) == []
+
+
 def test_the_figure_needs_no_loops_and_no_contacts():
     bare = run().drop_vars(["constraint_error", "condition", "horizon"])
     assert set(stability.figure(bare)) == {"stability.png", "stability.svg"}

@@ -283,7 +283,7 @@ def test_check_warns_of_a_crank_behind_a_gear_that_starts_anywhere(at: str, tmp_
     path.write_text(f'{text}{more}{start}joint.D.near = "80 deg"\n')
     said = command("check", path).err
     assert "[start]" in said
-    assert "does not say where coordinates that gears couple start: A is at" in said
+    assert "does not say where free coordinates start: A is at" in said
     assert "[start.joint.A] position" in said
     path.write_text(f'{text}{more}{start}joint.D.near = "80 deg"\njoint.A.position = "10 deg"\n')
     assert "does not say" not in command("check", path).err

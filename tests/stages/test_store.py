@@ -263,7 +263,7 @@ def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Stor
 
 
 @pytest.mark.parametrize("shown", [False, True])
-def test_a_flipped_bit_in_a_record_makes_the_artifact_absent(store: Store, shown: bool):
+def test_a_flipped_bit_in_a_record_makes_the_artifact_absent(store: Store, said: list[str], shown: bool):
     """Also one that leaves it readable: another fact, another digest. The same holds of the facts that are shown."""
     record = put(store)
     store.show(record, "runs/tiny", {}, "simulate")
@@ -274,8 +274,20 @@ def test_a_flipped_bit_in_a_record_makes_the_artifact_absent(store: Store, shown
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
         found = store.last("runs/tiny", "simulate") if shown else store.find("simulate", KEY)
         assert found is None or found == record  # white space says nothing
+        line = f"results/cache/simulate/{KEY}.json is damaged or is not a record; it will be computed again"
+        assert said == ([] if shown or found else [line])
+        said.clear()
     path.write_bytes(whole)
     assert store.last("runs/tiny", "simulate") == record
+
+
+def test_a_folder_in_the_place_of_a_file_is_renamed_with_a_word(store: Store, capsys: pytest.CaptureFixture[str]):
+    store.path("simulate", KEY, "nc").mkdir(parents=True)
+    record = put(store)
+    assert store.find("simulate", KEY) == record
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{KEY}.nc was a folder" in line
+    assert f"the folder is now {KEY}.nc.folder1" in line
 
 
 def test_what_the_dead_left_is_swept_and_what_is_held_stays(store: Store):

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 ENOUGH_COMPLIANCE = 0.9
 #: reference conditions whose shapes represent static loads at the interfaces exactly
 STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")
+#: motions of frames in the shapes below this fraction of the largest are rounding
+VANISHING = 1e-9
 WIDTH = 9
 
 
@@ -61,11 +63,14 @@ def _row(frame: str, held: str, values: Sequence[object]) -> str:
 def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body") -> list[str]:
     """Return sentences about static compliance that the modes lack between the frames at which forces act.
 
-    frames_used: named frames of the bundle. A single frame is judged with nothing held.
+    frames_used: named frames of the bundle. A single frame is judged with nothing held, except the only one at which
+    the body is clamped: there all shapes vanish, and its support bends nothing.
     """
-    used = list(dict.fromkeys(frames_used))
-    pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]] or [(i, i) for i in used]
-    messages, names = [], [str(name) for name in bundle["frame"].values]
+    used, names = list(dict.fromkeys(frames_used)), [str(name) for name in bundle["frame"].values]
+    pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]]
+    if len(used) == 1 and used != _clamped(bundle):
+        pairs = [(used[0], used[0])]
+    messages = []
     directions = bundle["direction"].values
     for name, held in pairs:
         i, j = names.index(name), names.index(held)
@@ -80,6 +85,13 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
             f"({amounts} of the full model's): the body is too stiff at joints of these frames. {_remedy(bundle, used)}"
         )
     return messages
+
+
+def _clamped(bundle: Labelled) -> list[str]:
+    """Return the frames at which all shapes vanish."""
+    moved = [np.abs(bundle[f"frame_{name}_shape"].values).max(axis=(1, 2)) for name in ("translation", "rotation")]
+    still = np.all([size <= VANISHING * size.max() for size in moved], axis=0)
+    return [str(name) for name in bundle["frame"].values[still]]
 
 
 def _remedy(bundle: Labelled, used: Sequence[str]) -> str:

@@ -95,10 +95,11 @@ class Store:
 
     def find(self, stage: str, key: str) -> Record | None:
         """Return the record of an artifact after checking all its files; None when it is absent or damaged."""
-        record = read_record(self.path(stage, key, "json"))
-        if record is None:
+        path = self.path(stage, key, "json")
+        record = read_record(path)
+        if record is None and not path.exists():
             return None
-        fault = self.fault(record)
+        fault = f"{self.below(path)} is damaged or is not a record" if record is None else self.fault(record)
         if fault is not None:
             self.say(f"{fault}; it will be computed again")
         return record if fault is None else None

@@ -19,7 +19,7 @@ from flexclear.pipeline.core.scene.limits import check_parts
 from flexclear.pipeline.core.scene.lines import not_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.solver import NAMING
+from flexclear.pipeline.core.scene.solver import close_choice
 from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.system import file_names
@@ -150,8 +150,8 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
         try:
             for key, value in values.items():
                 _put(table, key, value, "")
-            if family == "solver" and values.keys() & set(NAMING):
-                table["by_need"] = False
+            if family == "solver":
+                close_choice(table, values)
             read = _reader(family).validate_python({name: table} if name else table)
             whole = {**getattr(result, family), **read} if name else read
             result = result.model_copy(update={family: whole})
@@ -409,8 +409,8 @@ def _put(table: dict[str, Any], path: str, value: object, where: str) -> None:
         owner[last] = value
     elif isinstance(owner, dict):
         owner[key] = value
-        if parent == "solver" and key in NAMING:
-            owner["by_need"] = False
+        if parent == "solver":
+            close_choice(owner, [key])
     else:
         raise InputError(where, f"'{parent}' is a value, not a table")
 

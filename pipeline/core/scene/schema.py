@@ -270,7 +270,8 @@ class Scene(Part):
             return table
         given = set(solver or ())
         if "by_need" not in given:
-            table = {**table, "solver": {**(solver or {}), "by_need": not set(NAMING) & given}}
+            left_open = not {"integrator", "step"} & given and ("integrator" if "rtol" in given else True)
+            table = {**table, "solver": {**(solver or {}), "by_need": left_open}}
         elif (solver or {})["by_need"]:
             given -= set(NAMING)  # a scene that is edited is written out with its defaults
         if not isinstance(accuracy, dict) or "by_need" in accuracy:

@@ -1,6 +1,6 @@
 """The integration settings of a scene: an integrator, and only the parameters that it has."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, WithJsonSchema, model_validator
@@ -32,9 +32,10 @@ class Solver(Part):
     """length of fixed steps; default: the integrator chooses steps"""
     events: Literal["located", "at step ends"] = "located"
     """where contacts begin and end: at located times, or, for fixed steps only, ``at step ends``"""
-    by_need: bool | None = None
-    """whether an expensive run gets another integrator and tolerance, where the scene has no `[accuracy]`; default: if
-    `[solver]` gives neither of them and no step"""
+    by_need: bool | Literal["integrator"] | None = None
+    """whether an expensive run gets another integrator and tolerance, or the integrator only, where the scene has no
+    `[accuracy]`; default: true if `[solver]` gives none of integrator, step and rtol, "integrator" if it gives rtol
+    only"""
     rho_inf: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
     """spectral radius at infinite frequency, for generalized-alpha only; 1 damps nothing; default 0.8"""
 
@@ -74,3 +75,11 @@ def of_run(solver: Solver, by_need: bool, attributes: Mapping[str, Any]) -> tupl
     rtol = float(attributes.get("accuracy_rtol", solver.rtol))
     named = "switched" in attributes and not by_need
     return solver.integrator if named else str(attributes["method"]), rtol
+
+
+def close_choice(solver: dict[str, Any], keys: Iterable[str]) -> None:
+    """Note in a table `solver` that an edit gives these keys: a tolerance leaves the integrator open."""
+    if {"integrator", "step"} & set(keys):
+        solver["by_need"] = False
+    elif "rtol" in keys and solver.get("by_need"):
+        solver["by_need"] = "integrator"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from flexclear.pipeline.core.scene.fields import Number, OnCoordinate, Part, PartName, given
 
@@ -84,6 +84,9 @@ class Start(Part):
     ] = ()
     """in a change point, the branch that the motion takes among those that cross there; with several loops a list, each
     entry chooses among the branches that remain after those before it"""
+
+    #: True where an equilibrium is searched for from here, so that free coordinates need no start of their own
+    _sought: bool = PrivateAttr(default=False)
 
     @model_validator(mode="after")
     def _no_two_deformations(self) -> Self:

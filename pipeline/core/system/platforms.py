@@ -15,6 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from flexclear.pipeline.core.system.log import LOG
+
 #: ioctl request by which a file shares the blocks of another until one of them is written (linux/fs.h)
 FICLONE = 0x40049409
 #: time to wait for a file that another program has open, and time between two attempts [s]
@@ -78,12 +80,13 @@ def replace(scratch: Path, path: Path) -> None:
 
 
 def set_aside(path: Path) -> None:
-    """Rename a folder at the path of a file: this program creates no such folder, so its content is the user's."""
+    """Rename a folder at the path of a file, and say so: this program creates no such folder, it is the user's."""
     if path.is_dir() and not path.is_symlink():
         number = itertools.count(1)
         while (other := path.with_name(f"{path.name}.folder{next(number)}")).exists():
             pass
         os.replace(path, other)
+        LOG.warning(f"{path} was a folder in the place of a file of results; the folder is now {other.name}")
 
 
 def remove(path: Path) -> None:

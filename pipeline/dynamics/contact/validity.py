@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 SMALL_CONTACT = 0.3
 #: penetration, as a fraction of the inner radius, above which no contact law holds
 SHALLOW = 0.1
+#: moments below this fraction of the weight times the size of a mechanism tilt no pin
+NO_MOMENT = 1e-6
 
 
 def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -> list[str]:
@@ -42,6 +44,22 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
             "choose a stiffer contact, a slower impact or smaller loads"
         )
     return found
+
+
+def tilting(name: str, joint: Any, moment: float, force: float) -> str:
+    """Return a warning about a pin that its joint's constraint keeps from tilting; empty where its contact could.
+
+    name: of the contact, in words.  moment: mean of the constraint's moment across the axis [N m].  force: mean normal
+    force [N], which could act at either end of the pin.
+    """
+    if moment <= 0.5 * joint.length * force:
+        return ""
+    return (
+        f"{name}: it holds its pin parallel to the axis by {moment:.3g} N m on average, more than its contact, with "
+        f"{force:.3g} N on a pin of {1e3 * joint.length:.4g} mm, can carry. With its clearance the pin would tilt, by "
+        f"up to {2.0 * joint.clearance / joint.length:.2g} rad; clearance-spherical joints, at both ends of a pin or "
+        "one for each of several hinges on an axis, let it"
+    )
 
 
 def deepest(events: np.ndarray, touch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

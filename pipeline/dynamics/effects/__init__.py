@@ -169,6 +169,7 @@ def named(scene: Scene) -> set[str]:
     parts += [(LOADS, load.type, f"[load.{name}]") for name, load in scene.load.items()]
     if scene.start is not None and scene.start.at is not None:
         parts.append((STARTS, scene.start.at, "[start.at]"))
+        laws += ["constant", "polynomial"] if scene.start.joint else []  # which hold given positions
         parts += [(JOINTS, WITHOUT_CLEARANCE[one.type], f"[joint.{name}]") for name, one in loose(scene).items()]
     parts += [(RECORDS, name, "[output]") for name in scene.output.requests()]
     if scene.event:

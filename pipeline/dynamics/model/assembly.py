@@ -77,7 +77,8 @@ def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], 
         if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
             raise _out_of_reach(mechanism, joints)
         raise _impossible(mechanism, joints, guess(mechanism, joints, placed, targets(joints, starts)[1]))
-    return replace(with_starts(mechanism, candidates[0].poses), choice=ambiguity(mechanism, joints, candidates, starts))
+    choice = ambiguity(mechanism, joints, candidates, starts, placed)
+    return replace(with_starts(mechanism, candidates[0].poses), choice=choice)
 
 
 def with_starts(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:

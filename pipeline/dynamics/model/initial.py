@@ -170,10 +170,11 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
 
 
 def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: float = WRONG) -> np.ndarray:
-    """Return y with the least speeds that give bodies, joints and modes their velocities and keep the loops closed.
+    """Return y with speeds that give bodies, joints and modes their velocities and keep the loops closed.
 
     A body's velocity is that of its centre of mass, for flexible and rigid bodies.  Flexible bodies start without modal
-    speeds if joints, drives and given velocities allow that.
+    speeds if joints, drives and given velocities allow that.  Speeds that these leave open are the least; next to given
+    velocities of bodies, those of the least kinetic energy, as impulses on these bodies cause (Kelvin's theorem).
     fraction: largest error of the nearest speeds that joints and drives allow, relative to the largest given velocity.
     Raises InputError when the error is larger.
     """
@@ -198,9 +199,47 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
             "largest one is corrected)",
             "give consistent velocities, or fewer of them",
         )
+    if with_velocities(model):
+        rigid = np.flatnonzero(~elastic)
+        left = _open(equations.matrix[:, rigid])
+        drives, roots = _energy_roots(model, motion, y, rigid)
+        moving = drives + roots @ speeds[rigid]
+        change = _least(roots @ left, moving)[0]
+        if np.linalg.norm(roots @ left @ change) > RIGID * np.linalg.norm(moving):
+            speeds[rigid] -= left @ change
     y = y.copy()
     y[model.speeds] = model.speed_scales * speeds
     return y
+
+
+def _open(matrix: np.ndarray) -> np.ndarray:
+    """Return the speeds that equations with this matrix leave open, as orthonormal columns."""
+    _, values, ways = np.linalg.svd(matrix)
+    return np.asarray(ways[int(np.sum(values > REDUNDANT * values.max(initial=0.0))) :].T)
+
+
+def _energy_roots(model: Model, motion: Motions, y: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return numbers whose squares add up to twice the kinetic energy: by the drives, and per natural unit of speeds.
+
+    speeds: indices of the free coordinates.  Links count as undeformed.  Shapes (6 links,), (6 links, speeds).
+    """
+    inertias = [(i, link.undeformed) for i, link in enumerate(model.links) if link.undeformed is not None]
+    principal = [np.linalg.eigh(inertia.moments) for _, inertia in inertias]
+
+    def roots(speed: int | None) -> np.ndarray:
+        state, parts = y.copy(), list[np.ndarray]()
+        state[model.speeds] = 0.0
+        if speed is not None:
+            state[model.nq + speed] = model.speed_scales[speed]
+        frames, *_ = motion(state)
+        for (i, inertia), (moments, axes) in zip(inertias, principal, strict=True):
+            velocity, spin = (frames[i]["axes"].T @ frames[i][name] for name in ("velocity", "omega"))
+            parts.append(inertia.mass**0.5 * (velocity + np.cross(spin, inertia.com)))
+            parts.append(np.sqrt(np.maximum(moments, 0.0)) * (axes.T @ spin))
+        return np.concatenate(parts)
+
+    drives = roots(None)
+    return drives, np.array([roots(k) - drives for k in speeds]).T
 
 
 def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:

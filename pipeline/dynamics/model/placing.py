@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.dynamics.model.closing import close, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint
-from flexclear.pipeline.dynamics.model.driving import joint_type, label, named_coordinate
+from flexclear.pipeline.dynamics.model.driving import joint_type, label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
@@ -28,6 +28,8 @@ SLIDE = 0.3
 SAME_ASSEMBLY = 1e-4
 #: the search ends at an assembly that can move and is closer than this to all hints
 NEAR_HINTS = 0.5
+#: a coordinate closer to its hint than this, in radians or fractions of the mechanism's size, starts where it is said
+AT_HINT = 0.01
 #: singular values of naturally sized rows below this fraction of the largest count as zero: a motion is free
 LOOSE = 1e-6
 
@@ -79,13 +81,20 @@ def assemblies(
 
 
 def ambiguity(
-    mechanism: Mechanism, joints: Sequence[Constraint], candidates: Sequence[Assembly], starts: Sequence[Given]
+    mechanism: Mechanism,
+    joints: Sequence[Constraint],
+    candidates: Sequence[Assembly],
+    starts: Sequence[Given],
+    placed: set[int],
 ) -> str:
-    """Return a sentence on a start that the scene does not choose: one of several assemblies, or where coordinates that
-    gears couple start; else an empty text."""
+    """Return a sentence on a start that the scene does not choose: one of several assemblies, or where free coordinates
+    start; else an empty text.
+
+    placed: links that have a given pose.
+    """
     first = candidates[0]
     if _freedoms(mechanism, joints, first.poses):
-        return _geared(mechanism, joints, first, starts)
+        return _anywhere(mechanism, joints, first, starts, placed)
     if len(candidates) < 2:
         return ""
     hints, _ = targets(joints, starts)
@@ -104,30 +113,42 @@ def ambiguity(
     )
 
 
-def _geared(mechanism: Mechanism, joints: Sequence[Constraint], at: Assembly, starts: Sequence[Given]) -> str:
-    """Return a sentence that lists free coordinates which gears couple, and which start neither as given nor at 0."""
-    scene, given, left = mechanism.scene, {(start.joint, start.number) for start in starts}, dict[str, str]()
-    by_name, freedoms = {joint.name: joint for joint in joints}, _freedoms(mechanism, joints, at.poses)
-    for name, gear in scene.gear.items():
-        for side, text in (("first", gear.first), ("second", gear.second)):
-            joint, coordinate = named_coordinate(scene, text, f"[gear.{name}.{side}]")
-            if joint not in by_name:
-                continue  # its bodies move as one, which is refused
-            one, kind = by_name[joint], by_name[joint].edge.kind
-            k = joint_type(kind).COORDINATES.index(coordinate)
-            value = at.coordinates[joint, k]
-            if (joint, k) in given or k in one.values or abs(value) <= SAME_ASSEMBLY:
+def _anywhere(
+    mechanism: Mechanism, joints: Sequence[Constraint], at: Assembly, starts: Sequence[Given], placed: set[int]
+) -> str:
+    """Return a sentence that lists free coordinates which start neither where the scene says nor at 0."""
+    if mechanism.scene.start is not None and mechanism.scene.start._sought:
+        return ""
+    held, open_ones, said = list[Constraint](), dict[str, str](), {(start.joint, start.number) for start in starts}
+    known = {key for key, value in at.coordinates.items() if abs(value) <= SAME_ASSEMBLY}
+    for key, near in targets(joints, starts)[0].items():
+        known |= {key} if _distance(mechanism, joints, at.coordinates, {key: near}) <= AT_HINT else set()
+    for joint in joints:
+        numbers = range(len(joint_type(joint.edge.kind).COORDINATES))
+        chosen = [k for k in numbers if {joint.link_a, joint.link_b} <= placed or (joint.name, k) in known]
+        held.append(_held(joint, at, [k for k in chosen if k not in joint.values]))
+    freedoms = _freedoms(mechanism, held, at.poses)
+    for i, joint in enumerate(joints):
+        for k, coordinate in enumerate(joint_type(joint.edge.kind).COORDINATES):
+            if not freedoms or k in held[i].values or (joint.name, k) in said:
                 continue
-            held = [replace(other, values={**other.values, k: value}) if other is one else other for other in joints]
-            if _freedoms(mechanism, held, at.poses) < freedoms:
-                left[label(joint, kind, k)] = f"{value:.4g} {coordinate.unit}"
-    if not left:
+            more = [*held[:i], _held(held[i], at, [k]), *held[i + 1 :]]
+            if (fewer := _freedoms(mechanism, more, at.poses)) < freedoms:
+                held, freedoms = more, fewer
+                value = f"{at.coordinates[joint.name, k]:.4g} {coordinate.unit}"
+                open_ones[label(joint.name, joint.edge.kind, k)] = value
+    if not open_ones:
         return ""
     return (
-        "the scene does not say where coordinates that gears couple start: "
-        f"{', '.join(f'{called} is at {value}' for called, value in left.items())}; "
-        f"[start.joint.{next(iter(left))}] position = ... sets one"
+        "the scene does not say where free coordinates start: "
+        f"{', '.join(f'{called} is at {value}' for called, value in open_ones.items())}; "
+        f"[start.joint.{next(iter(open_ones))}] position = ... sets one"
     )
+
+
+def _held(joint: Constraint, at: Assembly, numbers: Sequence[int]) -> Constraint:
+    """Return a joint with some coordinates prescribed where an assembly has them."""
+    return replace(joint, values={**joint.values, **{k: at.coordinates[joint.name, k] for k in numbers}})
 
 
 def targets(joints: Sequence[Constraint], starts: Sequence[Given]) -> tuple[Hints, Hints]:

@@ -12,6 +12,7 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.effect_size import Influence, influence, recorded, same_starts
 from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.integrators import DEFAULT
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
@@ -110,9 +111,11 @@ class ScreeningRuns:
     def _made(self, bare: Scene) -> Scene:
         contacts = bool(bare.contacts() or bare.stop)
         smooth = bool(bare.flexible()) and not contacts
-        usual: dict[str, object] = {"integrator": SMOOTH, "rtol": SMOOTH_RTOL} if smooth else {"rtol": RTOL}
+        usual: dict[str, object] = (
+            {"integrator": SMOOTH, "rtol": SMOOTH_RTOL} if smooth else {"integrator": DEFAULT, "rtol": RTOL}
+        )
         if contacts:
-            usual = {"rtol": self.loose(bare), "evaluations": self.extent.most}
+            usual = {"integrator": DEFAULT, "rtol": self.loose(bare), "evaluations": self.extent.most}
         return self.filled(edited(bare, {"solver": usual}))
 
     def loose(self, variant: Scene) -> float:

@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.plan.screening_runs import (
     TAKES_LONG,
     ScreeningRuns,
 )
-from flexclear.pipeline.dynamics.run.progress_rate import AFFORDABLE, UNVERIFIED
+from flexclear.pipeline.dynamics.run.progress_rate import AFFORDABLE, unverified
 
 #: fraction of the requested accuracy that the integration error may take
 FRACTION = 0.15
@@ -109,7 +109,9 @@ def scene_is_cheaper(search: Search, chosen: Chosen) -> bool:
     full = runs.point((), fraction=fraction, members=0, integrator=integrator, rtol=rtol, evaluations=limit)
     taken = limit if TAKES_LONG in full.refused else full.evaluations
     if scene.by_need() and taken > fraction * AFFORDABLE:
-        full = runs.point((), fraction=fraction, members=0, integrator=STIFF, rtol=UNVERIFIED, evaluations=limit)
+        full = runs.point(
+            (), fraction=fraction, members=0, integrator=STIFF, rtol=unverified(scene).solver.rtol, evaluations=limit
+        )
         taken = limit if TAKES_LONG in full.refused else full.evaluations
     if planned.refused or not taken:
         return bool(planned.refused)

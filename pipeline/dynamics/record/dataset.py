@@ -28,7 +28,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import missing_joints
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.pipeline.dynamics.record.topology import topology
-from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench
+from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench, held_moments
 from flexclear.pipeline.dynamics.run import ledger
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.run import Run
@@ -183,7 +183,20 @@ def _contact_warnings(run: Run) -> list[str]:
     sentences = list[str]()
     for contact, law, depth, force in zip(run.model.contacts, run.model.laws, depths, forces, strict=True):
         sentences += validity.warnings(contact.words, contact.joint, law, float(depth), float(force))
-    return sentences
+    return sentences + [text for text in _tilts(run) if text]
+
+
+def _tilts(run: Run) -> Iterator[str]:
+    """Yield a sentence about each pin that its joint keeps from tilting, else an empty one."""
+    from flexclear.pipeline.dynamics.contact import validity
+
+    model, time = run.model, run.trajectory.time
+    weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
+    for c, held in held_moments(Motions(model, run.observed)).items():
+        contact, impulse = model.contacts[c], ledger.series(model, run.observed)["contact_impulse"][1][:, c]
+        moment, force = (float(x / np.ptp(time)) for x in (np.trapezoid(held, time), np.ptp(impulse)))
+        if moment > validity.NO_MOMENT * weight * model.length:
+            yield validity.tilting(contact.words, contact.joint, moment, force)
 
 
 def _flexible_warnings(run: Run) -> list[str]:

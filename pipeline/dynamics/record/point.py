@@ -81,7 +81,8 @@ class Runner:
             values, deviation = _statistics(rows)
             if not self.error:
                 return Point(values, {}, deviation, count, members=rows)
-            tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
+            finer = {"solver.rtol": TIGHTER * scene.solver.rtol, "solver.integrator": scene.solver.integrator}
+            tight = with_numbers(scene, finer)
             others, more = self._rows(tight, place, alive)
             better, _ = _statistics(others)
         except (SolverError, InputError) as error:

@@ -47,6 +47,19 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     return moments, forces
 
 
+def held_moments(motions: Motions) -> dict[int, np.ndarray]:
+    """Return the moments that keep pins parallel to their journals: sizes [N m], (rows,), by index of the contact."""
+    model, seen = motions.model, motions.seen
+    known, held = _tree(model, seen) | _closures(model, seen), dict[int, np.ndarray]()
+    for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
+        if contact.name in known:
+            (moment, force), outer = known[contact.name], contact.outer
+            moment = moment - cross(motions.positions([contact.joint.between[1]])[:, 0], force)
+            axis = motions.link(outer.link).R @ outer.placement.R[:, 2]
+            held[c] = np.linalg.norm(cross(axis, moment), axis=1)
+    return held
+
+
 def path_wrenches(model: Model, seen: Observed) -> list[FrameWrench]:
     """Return for each frame that a drive moves along a path: its name, moment about the kernels' origin, force."""
     tree, drives = _tree(model, seen), model.scene.drive

@@ -17,15 +17,15 @@ from flexclear.pipeline.dynamics.run.refusals import refusal
 
 #: an explicit method ends when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
-#: a scene without method and tolerance runs at the default tolerance if that takes at most so many evaluations, some
-#: seconds; the prediction starts after so many
+#: a scene without method runs by the default one if that takes at most so many evaluations, some seconds; the
+#: prediction starts after so many
 AFFORDABLE, EARLIEST = 1_500_000, 100_000
 #: tolerance of expensive runs that are compared with no other: members' starts differ by a hundredth of a micrometre
 UNVERIFIED = 1e-7
 
 
 class DearError(SolverError):
-    """A run at the default tolerance is predicted to take more than AFFORDABLE evaluations."""
+    """A run by the default method is predicted to take more than AFFORDABLE evaluations."""
 
 
 class Look(NamedTuple):
@@ -101,9 +101,9 @@ def crawls(engine: Engine, looks: Sequence[Look]) -> str:
 
 
 def affordable(scene: Scene) -> Judges | None:
-    """Return judges that raise DearError when a run at the default tolerance is predicted to be expensive.
+    """Return judges that raise DearError when a run by the default method is predicted to be expensive.
 
-    Return None for a scene that gives its method, tolerance or accuracy.
+    Return None for a scene that gives its method or accuracy.
     """
     if scene.accuracy is not None or not scene.solver.by_need:
         return None
@@ -111,8 +111,12 @@ def affordable(scene: Scene) -> Judges | None:
 
 
 def unverified(scene: Scene) -> Scene:
-    """Return the scene of an expensive run with method and tolerance of runs without comparison: members, points."""
-    return with_numbers(scene, {"solver.integrator": STIFF, "solver.rtol": UNVERIFIED})
+    """Return the scene of an expensive run without comparison, of a member or point, by method and tolerance of these.
+
+    A tolerance that the scene gives stays.
+    """
+    rtol = scene.solver.rtol if scene.solver.by_need == "integrator" else UNVERIFIED
+    return with_numbers(scene, {"solver.integrator": STIFF, "solver.rtol": rtol})
 
 
 def _dear(engine: Engine, looks: Sequence[Look]) -> str:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled
-from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.laws import Constant
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, Start
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import state
 from flexclear.pipeline.dynamics.linear.equilibrium import balanced
-from flexclear.pipeline.dynamics.model.driving import joint_drives
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates
-from flexclear.pipeline.dynamics.starts.snapshot import joint_starts, posed, resting
+from flexclear.pipeline.dynamics.starts.snapshot import held, joint_starts, posed, resting
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
@@ -32,17 +29,12 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 def placed(scene: Scene) -> Scene:
     """Return the scene with given joint positions held by drives; of its start only position hints remain."""
     assert scene.start is not None
-    driven, holds = joint_drives(scene), dict[str, Any](scene.drive)
-    for start in given_coordinates(scene):
-        drives = driven.get(start.joint, ())
-        if start.position is not None and not (drives and drives[start.number]):
-            law = Constant(type="constant", value=start.position)
-            name = f"hold-{start.joint}-{start.coordinate.name}"
-            holds[name] = JointDrive(joint=start.joint, coordinate=start.coordinate.name, law=law)
+    holds = held(scene, given_coordinates(scene), lambda _, value: Constant(type="constant", value=value))
 
     def hint(one: JointStart) -> JointStart | None:
         given = one.position is not None or one.near is not None
         return one.model_copy(update={"velocity": None}) if given else None
 
     hinted = Start(joint=joint_starts(scene.start, hint))
+    hinted._sought = True
     return scene.model_copy(update={"drive": holds, "start": hinted})

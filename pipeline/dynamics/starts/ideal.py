@@ -8,11 +8,13 @@ have no ideal counterpart: they, and the bodies that touch them, stay where the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
+from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled
+from flexclear.pipeline.core.scene.laws import Polynomial
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import Start
@@ -20,15 +22,18 @@ from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.driving import label
+from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.run import maker
-from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
+from flexclear.pipeline.dynamics.starts.snapshot import held, moving, resting
 
 #: a pin has reached its position within this fraction of the clearance; largest number of passes for that
 REACHED, PIN_PASSES = 1e-9, 20
@@ -55,9 +60,36 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
     if not scene.contacts():
         return concentric, choice
-    engine, y = _started(concentric, bundles, progress)
-    y = _press_pins(engine, y, forces)
+    exact = concentric.model_copy(update={"drive": _exact_drives(ideal_scene, loose(scene), engine, y)})
+    try:
+        engine, y = _pressed(exact, bundles, progress, forces)
+    except (InputError, SolverError):
+        if exact == concentric:
+            raise
+        choice = f"{choice}\nthe pins are not pressed into their sockets without moving given joint positions".strip()
+        engine, y = _pressed(concentric, bundles, progress, forces)
     return resting(moving(concentric, engine, y, t), loose(scene)), choice
+
+
+def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndarray) -> dict[str, Any]:
+    """Return the drives of an ideal scene, and drives that hold given positions of joints that are not loose.
+
+    engine, y: of this scene at its start, whose rates the drives have.
+    """
+    rates = joint_coordinates(engine.model, observe(engine, rows_of(engine, y[None], engine.start)))
+
+    def law(start: Given, value: float) -> Polynomial:
+        name = label(start.joint, scene.joint[start.joint].type, start.number)
+        return Polynomial(type="polynomial", coefficients=(value, float(rates[name][1][0])), origin=engine.start)
+
+    return held(scene, [start for start in given_coordinates(scene) if start.joint not in pins], law)
+
+
+def _pressed(
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, forces: Mapping[str, np.ndarray]
+) -> tuple[Engine, np.ndarray]:
+    engine, y = _started(scene, bundles, progress)
+    return engine, _press_pins(engine, y, forces)
 
 
 def placed(scene: Scene) -> Scene:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.core.scene.laws import Constant, Polynomial
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
 from flexclear.pipeline.core.scene.units import LARGEST_NUMBER
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.driving import joint_drives
 from flexclear.pipeline.dynamics.model.initial import centre_of
+from flexclear.pipeline.dynamics.model.start_table import Given
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
@@ -88,6 +92,19 @@ def _start_without_poses(scene: Scene, modal: dict[str, ModalStart]) -> Start:
     old = scene.start if scene.start is not None else Start()
     rates = joint_starts(old, lambda one: None if one.velocity is None else JointStart(velocity=one.velocity))
     return old.model_copy(update={"at": None, "joint": rates, "modal": modal})
+
+
+def held(scene: Scene, starts: Iterable[Given], law: Callable[[Given, float], Constant | Polynomial]) -> dict[str, Any]:
+    """Return the scene's drives, and drives of those coordinates whose given position nothing else drives."""
+    driven, drives = joint_drives(scene), dict[str, Any](scene.drive)
+    for start in starts:
+        own = driven.get(start.joint, ())
+        if start.position is not None and not (own and own[start.number]):
+            name = f"hold-{start.joint}-{start.coordinate.name}"
+            drives[name] = JointDrive(
+                joint=start.joint, coordinate=start.coordinate.name, law=law(start, start.position)
+            )
+    return drives
 
 
 def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.quantities import SEPARATED
+from flexclear.pipeline.core.scene import integrators
 from flexclear.pipeline.post.cost.study import methods
 from flexclear.pipeline.post.overview.curves import size_of
 from flexclear.pipeline.post.plotting import style
@@ -17,8 +19,8 @@ from flexclear.pipeline.post.single_run.series import sentence
 ENERGY = 1e-3
 #: largest opening of loops, as a fraction of the mechanism's extent
 LOOPS = 1e-6
-#: values below this are rounding
-ROUNDING = 1e-15
+#: values below this are rounding; changes of an energy below this fraction of it may be
+ROUNDING, UNCHANGED = 1e-15, 1e-9
 #: largest disagreement with runs at other tolerances and by other methods, as a fraction of each quantity's size
 AGREEMENT = 0.01
 #: largest fractions of rejected steps, and of steps limited by stability
@@ -56,14 +58,18 @@ def checks(
 
     members: horizon of the scene's ensemble [s], or None.  by_need: True when the program chose the integrator.
     """
-    agreement = [] if study is None else _agreement(study)
+    agreement = [] if study is None else _agreement(study, _finer(run))
     result = [_energy(run), *_loops(run), *agreement, _rejected(run), _stiff(run, by_need)]
     return [*result, *_condition(run), *_predictable(run, members)]
 
 
 def lost_energy(run: xr.Dataset) -> np.ndarray:
-    """Return the error of the energy balance, as a fraction of the largest change of any energy, shape (time,)."""
-    changes = [np.abs(run[n].values - run[n].values[0]).max() for n in ENERGIES if n in run]
+    """Return the error of the energy balance, as a fraction of the largest change of any energy, shape (time,).
+
+    Changes below a fraction of the energies themselves count as that fraction: at rest all changes are rounding.
+    """
+    energies = [run[name].values for name in ENERGIES if name in run]
+    changes = [max(np.abs(energy - energy[0]).max(), UNCHANGED * np.abs(energy).max()) for energy in energies]
     largest, missed = max(map(float, changes), default=0.0), np.abs(run["energy_error"].values)
     return np.asarray(missed / largest) if largest > 0.0 else np.zeros_like(missed)
 
@@ -78,8 +84,14 @@ def _drift(run: xr.Dataset) -> np.ndarray | None:
 
 def _energy(run: xr.Dataset) -> Check:
     fraction = float(lost_energy(run).max())
-    remedy = "a tighter tolerance: [solver] rtol" if "step" not in run.attrs else "shorter steps: [solver] step"
-    return Check("energy balance", f"{fraction:.1e} of the largest energy", f"{ENERGY:g}", fraction < ENERGY, remedy)
+    value = f"{fraction:.1e} of the largest energy"
+    return Check("energy balance", value, f"{ENERGY:g}", fraction < ENERGY, _finer(run))
+
+
+def _finer(run: xr.Dataset) -> str:
+    """Return what makes the steps of a run more exact, and its key."""
+    step = json.loads(run.attrs.get("parameters", "{}")).get("solver", {}).get("step")
+    return "a tighter tolerance: [solver] rtol" if step is None else "shorter steps: [solver] step"
 
 
 def _loops(run: xr.Dataset) -> list[Check]:
@@ -91,7 +103,7 @@ def _loops(run: xr.Dataset) -> list[Check]:
     return [Check("drift of closed loops", value, f"{LOOPS:g}", fraction < LOOPS, "a tighter tolerance")]
 
 
-def _agreement(study: xr.Dataset) -> list[Check]:
+def _agreement(study: xr.Dataset, remedy: str) -> list[Check]:
     """Check agreement with half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
     result = []
     for group, method, setting, one in methods(study):
@@ -108,7 +120,7 @@ def _agreement(study: xr.Dataset) -> list[Check]:
             value, unit, which = (float(values[worst]), *(str(study[n].values[worst]) for n in ("unit", "quantity")))
             name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
             text = f"{value:.1e} of the {size_of(unit)} of {which}"
-            result.append(Check(name, text, f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance"))
+            result.append(Check(name, text, f"{AGREEMENT:g}", value < AGREEMENT, remedy))
     return result
 
 
@@ -122,7 +134,7 @@ def _rejected(run: xr.Dataset) -> Check:
 def _stiff(run: xr.Dataset, by_need: bool) -> Check:
     fraction, chosen = float(run.attrs.get("stiff_share", 0.0)), by_need or "method_reason" in run.attrs
     limit = "none: the integrator was chosen by its cost" if chosen else f"{100.0 * STIFF:g} %"
-    remedy = "remove [solver] integrator, or choose an implicit one"
+    remedy = f'an implicit integrator: [solver] integrator = "{integrators.STIFF}"'
     name = "steps limited by stability"
     return Check(name, f"{100.0 * fraction:.2g} %", limit, chosen or fraction < STIFF, remedy)
 

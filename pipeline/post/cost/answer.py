@@ -80,8 +80,14 @@ def _cause(study: xr.Dataset) -> str:
     rest = f"; {others}" if others else ""
     missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
     unseen = f" Not examined: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
-    helps = ", which the root finder bounds" if first == "event location" else f"; remedy: {CAUSES[first]}"
+    helps = ", which the root finder bounds" if first == "event location" else f"; remedy: {_remedy(study, first)}"
+    helps = ", which is rounding" if known[first] < ROUNDING else helps
     return f"The largest cause of error is {first} ({size}{rest}){helps}.{unseen}"
+
+
+def _remedy(study: xr.Dataset, cause: str) -> str:
+    """Return what makes the error by a cause smaller, with the settings that the scene has."""
+    return "shorter steps" if cause == "time integration" and "own_step" in study.attrs else CAUSES[cause]
 
 
 def undone(study: xr.Dataset) -> list[str]:
@@ -208,15 +214,17 @@ def _limits(study: xr.Dataset) -> str:
         return ""
     by_cause: dict[str, list[str]] = {}
     for name in study["quantity"].values:
-        cause = dominant(
-            dict(zip(study["cause"].values, study["error_by_cause"].sel(quantity=name).values, strict=True))
-        )
-        by_cause.setdefault(cause, []).append(str(name))
-    parts = [f"{CAUSES[c]} ({c} limits {', '.join(q)})" for c, q in by_cause.items() if c in CAUSES]
+        errors = study["error_by_cause"].sel(quantity=name).values
+        cause = dominant(dict(zip(study["cause"].values, errors, strict=True)))
+        if not np.nanmax(errors, initial=0.0) < ROUNDING:
+            by_cause.setdefault(cause, []).append(str(name))
+    parts = [f"{_remedy(study, c)} ({c} limits {', '.join(q)})" for c, q in by_cause.items() if c in CAUSES]
     return f"To refine the scene as it is: {'; '.join(parts)}." if parts else ""
 
 
 TARGETS = (1e-3, 1e-6, 1e-9)
+#: errors below this fraction of a quantity's size are rounding
+ROUNDING = 1e-12
 #: a best error within this multiple of the reference's uncertainty, which it contains, is rounding
 ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")

@@ -183,6 +183,11 @@ def deliver(
     return _delivered(Search(scene, make, costs), progress)
 
 
+def at_tolerance(scene: Scene, make: Callable[[Scene, Judges | None], xr.Dataset], costs: Costs) -> xr.Dataset:
+    """Return the run of a scene at its own tolerance, by the method that is predicted to be cheapest."""
+    return Search(scene, make, costs).run(scene.solver.rtol)
+
+
 def by_default(
     scene: Scene,
     make: Callable[[Scene, Judges | None], xr.Dataset],
