@@ -1,7 +1,8 @@
 """A whole scene as one frozen model; all towers receive a `Scene`."""
 
+import html
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -182,8 +183,18 @@ def _requested(name: str, value: Any) -> Any:
     return {"absolute": float(number), "unit": unit}
 
 
+def _in_words(name: str, part: Any) -> str:
+    """Return a part's name, type and the frames, joints or body that it acts on, as in a table."""
+    kind = getattr(part, "type", None) or getattr(getattr(part, "law", None), "type", "")
+    on = [getattr(part, key, None) for key in ("joint", "frame", "first", "second")]
+    sites = " – ".join([*getattr(part, "between", ()), *(str(one) for one in on if one)])
+    return ": ".join(filter(None, [f"{name} ({kind})" if kind else name, sites]))
+
+
 class Scene(Part):
     """The content of a scene file after composition. Names of parts are keys."""
+
+    _owner: ClassVar[str] = ""
 
     title: str
     """description in one line"""
@@ -376,6 +387,18 @@ class Scene(Part):
         return f"<Scene {self.name}: {self.summary()}; {self.time.start:g} to {self.time.end:g} s>"
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """Return the title, the times and a table of the parts by kind, for a notebook."""
+        families = ("body", "joint", "drive", "load", "stop", "gear", "event")
+        parts = {family: getattr(self, family) for family in families}
+        rows = "".join(
+            f"<tr><th>{family}</th><td>{'<br>'.join(html.escape(_in_words(*part)) for part in parts[family].items())}"
+            for family in families
+            if parts[family]
+        )
+        head = f"<b>{html.escape(self.title)}</b><br>{self.name}: {self.time.start:g} to {self.time.end:g} s"
+        return f"<p>{head}</p><table>{rows}</table>"
 
     def summary(self) -> str:
         """Return the numbers of parts by kind, in words."""

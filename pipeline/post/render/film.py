@@ -197,5 +197,6 @@ def shading(bundle: xr.Dataset) -> dict[str, Any]:
 
 def image(scene: pv.Plotter) -> np.ndarray:
     """Return the current picture as bytes, shape (height, width, 3)."""
+    scene.reset_camera_clipping_range()  # the parts have moved
     scene.render()  # else a second screenshot would show the first one again
     return np.asarray(scene.screenshot(return_img=True))
