@@ -8,7 +8,8 @@ import flexclear as fc
 from flexclear.pipeline.post.overview import sweep_figures
 from flexclear.pipeline.post.overview.curves import NOISE, impacts, noise, without_noise
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render.mechanism import CLEARANCE_COLOR, SOCKET
+from flexclear.pipeline.post.render.layout import CLEARANCE_COLOR
+from flexclear.pipeline.post.render.mechanism import SOCKET
 from flexclear.pipeline.post.render.ruler import exaggeration
 from flexclear.pipeline.post.render.view import plane, view
 

@@ -12,7 +12,8 @@ from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.render import gl, gltf, player
 from flexclear.pipeline.post.render.forms import equivalent
-from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed
+from flexclear.pipeline.post.render.layout import part_pose
+from flexclear.pipeline.post.render.mechanism import Looks, mechanism, placed
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.shapes import body_shape

@@ -10,7 +10,7 @@ import pytest
 import flexclear as fc
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.render import gl, surfaces
-from flexclear.pipeline.post.render.mechanism import CLEARANCE_COLOR, LOAD_COLOR, part_pose
+from flexclear.pipeline.post.render.layout import CLEARANCE_COLOR, LOAD_COLOR, part_pose
 from flexclear.pipeline.post.render.ruler import pixels_per_metre, project, round_length
 from flexclear.pipeline.post.render.start_view import AXIS, columns, heights, page_view
 from tests.processes import printed
@@ -119,7 +119,7 @@ def test_loads_along_joints_stops_and_gears_have_names(root: Path):
         forces = {n for n, load in scene.load.items() if load.type != "gravity"}
         assert {text for text, _ in marks} >= forces | set(scene.stop) | set(scene.gear)
         details |= {detail for _, detail in marks}
-    assert {"gear -3: wheel – pinion", "joint-spring: rail"} <= details
+    assert {"gear -3.0: wheel – pinion", "joint-spring: rail"} <= details
     assert any(text.startswith("stop of ") and "°" in text for text in details)
 
 

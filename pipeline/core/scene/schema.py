@@ -1,6 +1,5 @@
 """A whole scene as one frozen model; all towers receive a `Scene`."""
 
-import html
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -20,6 +19,7 @@ from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part
 from flexclear.pipeline.core.scene.formulas import check_formulas
 from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
+from flexclear.pipeline.core.scene.notebook import as_html
 from flexclear.pipeline.core.scene.output import Output
 from flexclear.pipeline.core.scene.owners import owners
 from flexclear.pipeline.core.scene.parts import (
@@ -181,14 +181,6 @@ def _requested(name: str, value: Any) -> Any:
         return {"absolute": read}
     number, _, unit = read.partition(" ")  # the scene, which has the quantity, checks the unit
     return {"absolute": float(number), "unit": unit}
-
-
-def _in_words(name: str, part: Any) -> str:
-    """Return a part's name, type and the frames, joints or body that it acts on, as in a table."""
-    kind = getattr(part, "type", None) or getattr(getattr(part, "law", None), "type", "")
-    on = [getattr(part, key, None) for key in ("joint", "frame", "first", "second")]
-    sites = " – ".join([*getattr(part, "between", ()), *(str(one) for one in on if one)])
-    return ": ".join(filter(None, [f"{name} ({kind})" if kind else name, sites]))
 
 
 class Scene(Part):
@@ -390,15 +382,7 @@ class Scene(Part):
 
     def _repr_html_(self) -> str:
         """Return the title, the times and a table of the parts by kind, for a notebook."""
-        families = ("body", "joint", "drive", "load", "stop", "gear", "event")
-        parts = {family: getattr(self, family) for family in families}
-        rows = "".join(
-            f"<tr><th>{family}</th><td>{'<br>'.join(html.escape(_in_words(*part)) for part in parts[family].items())}"
-            for family in families
-            if parts[family]
-        )
-        head = f"<b>{html.escape(self.title)}</b><br>{self.name}: {self.time.start:g} to {self.time.end:g} s"
-        return f"<p>{head}</p><table>{rows}</table>"
+        return as_html(self)
 
     def summary(self) -> str:
         """Return the numbers of parts by kind, in words."""

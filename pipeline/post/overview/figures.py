@@ -156,7 +156,7 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
     force = _without_noise(run, post["reaction"].values, "N")
     drives = [str(name) for name in run["drive"].values] if "drive_force" in run else []
     chosen = _chosen(names, first, force.max(axis=0), JOINTS)
-    loaded = [k for k in chosen if force[:, k].any()] or chosen
+    loaded = [k for k in chosen if force[:, k].any()]
     panels: list[Panel] = [
         (f"{names[k]}: force (N)", {"": (force[:, k], {"color": "#0072B2", "lw": 0.9})}) for k in loaded
     ]
@@ -165,9 +165,8 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
         panels.append((title, {"": (run["drive_force"].values[:, k], {"color": "#D55E00", "lw": 0.9})}))
     unloaded = [names[k] for k in chosen if k not in loaded]
     below = "; no force: ".join(["magnitude of the joint force", *filter(None, [", ".join(unloaded)])])
-    return _sheet(
-        "reactions", run["time"].values, panels, 2, (f"Reactions and drives{_rest(len(names), JOINTS)}", below)
-    )
+    heading = f"Reactions and drives{_rest(len(names), JOINTS)}", below
+    return _sheet("reactions", run["time"].values, panels, 2, heading) if panels else {}
 
 
 def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
@@ -175,7 +174,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
     names, joints = [str(name) for name in run["contact"].values], parameters(run).get("joint", {})
     chosen = _chosen(names, first, post["peak_force"].values, CONTACTS)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
-    for row, k in zip(axes, chosen, strict=True):
+    for place, (row, k) in enumerate(zip(axes, chosen, strict=True)):
         unit = quantities.unit(run, Quantity(names[k], "peak_force"))
         gaps = run["contact_gap"].values[:, k]
         factor, small = by_unit({"": gaps}, "m" if unit == "N" else "rad")
@@ -185,9 +184,8 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
             row[0].set_title(f"{names[k]}\n{centre(run, k)}")  # a line of its own, since names may be long
         else:  # the end of a stop
             gap = f"{names[k]}\n{gap}"
-            first, cells = row[0].get_subplotspec(), row[1].get_gridspec()
             row[0].remove()
-            row[1].set_subplotspec(cells[first.rowspan.start, :2])
+            row[1].set_subplotspec(row[1].get_gridspec()[place, :2])
         _over_time(row[1], run, factor * gaps, gap)
         row[1].axhline(0.0, color=style.SOFT, lw=0.8)
         fraction = float(post["contact_time_share"].values[k])

@@ -15,7 +15,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
-from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
+from flexclear.pipeline.post.render.layout import part_pose, pose
+from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.shapes.body_shape import fields_of, hertz, linear_fields
 

@@ -10,12 +10,25 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.fields import Pose
-from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.render import forms, surfaces
 from flexclear.pipeline.post.render.forms import Seat, Solid, Wheel, equivalent, wheels
+from flexclear.pipeline.post.render.layout import (
+    CLEARANCE_COLOR,
+    GROUND_COLOR,
+    JOINT_COLOR,
+    PIN,
+    SOCKET_COLOR,
+    Layout,
+    Part,
+    centre_at_rest,
+    names,
+    part_pose,
+    pose,
+    samples,
+    travel,
+)
+from flexclear.pipeline.post.render.load_parts import loads
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
 from flexclear.pipeline.post.shapes import body_shape
@@ -24,56 +37,15 @@ from flexclear.pipeline.post.single_run.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
 COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")
-JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf", "#E69F00", "#d7191c"
-GROUND_COLOR, LOAD_COLOR = "#8d98a4", "#7a4a00"
-#: fractions of the mechanism's size: joint spheres without a known ball radius, radius of pins, thickness of rails
-BALL, PIN, RAIL = 0.022, 0.011, 0.008
+#: fractions of the mechanism's size: joint spheres without a known ball radius, thickness of rails
+BALL, RAIL = 0.022, 0.008
 #: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
 SOCKET = 1.3
-#: fractions of the mechanism's size: radius of coils, length of the springs of joints at the end of their travel;
-#: length, in radii, below which nothing is drawn between two points; least length of a part over its unstretched one
-COIL, FREE, NEAR, THIN = 0.02, 0.25, 0.1, 1e-3
 #: size of a mechanism without extent: one body that rests [m]
 LONE = 1.0
-#: outputs at which the program measures the extent of a mechanism
-SAMPLES = 24
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
 #: largest drawn deformation as a fraction of the body's length
 DEFORMATION_SHARE = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class Site:
-    """A point of a body: origin [m] about its centre of mass, or about the origin of `frame`, in the body's axes; for
-    the ground in the world."""
-
-    owner: int | None  #: index of the body in the run; None for the ground
-    origin: np.ndarray
-    frame: int | None = None  #: index of a frame whose position is recorded
-
-    def position(self, run: xr.Dataset, step: int) -> np.ndarray:
-        """Return the position of the point in the world at an output [m]."""
-        matrix = _carrier(run, self.owner, self.frame, step)
-        return matrix[:3, :3] @ self.origin + matrix[:3, 3]
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A solid that moves with a body, or between two points.
-
-    surface: about the body's centre of mass, or about the origin of `frame`, in the body's axes; for the ground in the
-    world; with `ends` about the first one, z towards the second.  contact: its column among the contacts, where it
-    shows a joint with clearance.  length: distance of the ends at which the surface is unstretched [m]; None: rigid.
-    """
-
-    owner: int | None  #: index of the body in the run; None for the ground
-    surface: Surface
-    color: str
-    opacity: float = 1.0
-    frame: int | None = None
-    contact: int | None = None
-    ends: tuple[Site, Site] | None = None
-    length: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,69 +94,6 @@ class Mechanism:
     stress: float | None = None  #: stress at the upper end of the colours [Pa], where they show stress
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """Poses of the bodies and frames of a run. given: parameters of its scene.  bundles: by name of the body."""
-
-    run: xr.Dataset
-    given: Mapping[str, Any]
-    bundles: Mapping[str, xr.Dataset]
-
-    @property
-    def bodies(self) -> list[str]:
-        """Names of the moving bodies."""
-        return _names(self.run, "body")
-
-    @property
-    def frames(self) -> list[str]:
-        """Names of the frames whose positions are recorded."""
-        return _names(self.run, "frame")
-
-    def owner(self, frame: str) -> int | None:
-        """Return the index of the body that has a frame; None for the ground."""
-        body = frame.partition(".")[0]
-        return self.bodies.index(body) if body in self.bodies else None
-
-    def local(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return origin [m] and axes (columns) of a frame in those of its body."""
-        body, _, name = frame.partition(".")
-        if body in self.bundles:
-            data = self.bundles[body].sel(frame=name)
-            return data["frame_position"].values, data["frame_rotation"].values
-        pose = Pose.model_validate(self.given.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
-        return np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())
-
-    def at_start(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return origin [m] and axes of a frame, in the world, at the first output."""
-        (origin, axes), owner = self.local(frame), self.owner(frame)
-        if owner is None:
-            return origin, axes
-        matrix = pose(self.run, owner, 0)
-        recorded = frame in self.frames
-        where = self.run.frame_position.values[0, self.frames.index(frame)] if recorded else matrix[:3, 3]
-        return where, matrix[:3, :3] @ axes
-
-    def centre(self, body: str) -> np.ndarray:
-        """Return the centre of mass of a moving body at rest, in its axes [m]."""
-        if body in self.bundles:
-            return centre_at_rest(self.bundles[body])
-        return np.array(self.given["body"][body].get("com", (0.0, 0.0, 0.0)))
-
-    def site(self, frame: str, offset: float = 0.0) -> Site:
-        """Return the origin of a frame, or a point so far along its z axis [m]."""
-        (origin, axes), owner = self.local(frame), self.owner(frame)
-        if owner is None:
-            return Site(None, origin + offset * axes[:, 2])
-        if frame in self.frames:
-            return Site(owner, offset * axes[:, 2], self.frames.index(frame))
-        return Site(owner, origin - self.centre(frame.partition(".")[0]) + offset * axes[:, 2])
-
-    def seated(self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
-        """Return a part at a frame, given in the frame's axes."""
-        site, axes = self.site(frame), self.local(frame)[1]
-        return Part(site.owner, surfaces.moved(part, site.origin, axes), color, opacity, site.frame, contact)
-
-
 def mechanism(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None, *, stressed: bool = False
 ) -> Mechanism:
@@ -205,10 +114,10 @@ def mechanism(
     shown = np.concatenate([positions.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
     bodies = tuple(_bodies(at, looks, size))
-    parts = (*bodies, *_joints(at, size), *_loads(at, size, bodies))
+    parts = (*bodies, *_joints(at, size), *loads(at, size, bodies))
     chosen_view = view(run, at.given, looks.direction, looks.up)
     top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
-    shown = cloud(run, parts, flexible, _samples(run))
+    shown = cloud(run, parts, flexible, samples(run))
     return Mechanism(run, parts, flexible, chosen_view, size, shown, looks, top)
 
 
@@ -225,40 +134,6 @@ def cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible], 
     return np.concatenate(clouds) if clouds else run.position.values[0]
 
 
-def _samples(run: xr.Dataset) -> list[int]:
-    """Return the outputs at which the extent is measured."""
-    return sorted({int(step) for step in np.linspace(0, run.sizes["time"] - 1, SAMPLES)})
-
-
-def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
-    """Return the homogeneous matrix of a body, from axes through its centre of mass to the world."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = quaternion_to_matrix(run.quaternion.values[step, index])
-    matrix[:3, 3] = run.position.values[step, index]
-    return matrix
-
-
-def part_pose(run: xr.Dataset, part: Part, step: int) -> np.ndarray:
-    """Return the homogeneous matrix from the axes of a part's surface to the world; its z column may be stretched."""
-    if part.ends is None:
-        return _carrier(run, part.owner, part.frame, step)
-    matrix, (start, end) = np.eye(4), (site.position(run, step) for site in part.ends)
-    long = float(np.linalg.norm(end - start))
-    if long > 0.0:
-        matrix[:3, :3] = surfaces.along(end - start)
-    matrix[:3, 2] *= 1.0 if part.length is None else max(long / part.length, THIN)
-    matrix[:3, 3] = start
-    return matrix
-
-
-def _carrier(run: xr.Dataset, owner: int | None, frame: int | None, step: int) -> np.ndarray:
-    """Return the homogeneous matrix from a body's axes, about its centre of mass or one of its frames, to the world."""
-    matrix = np.eye(4) if owner is None else pose(run, owner, step)
-    if frame is not None:
-        matrix[:3, 3] = run.frame_position.values[step, frame]
-    return matrix
-
-
 def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
     """Return world points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
     q = run.modal_coordinate.values[step, body.columns]
@@ -271,7 +146,7 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
 def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
     """Return the coloured values at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
     if body.stressed:
-        return body_shape.stress_on_surface(run, body.bundle, _names(run, "body")[body.index], step)
+        return body_shape.stress_on_surface(run, body.bundle, names(run, "body")[body.index], step)
     return placed(run, body, step)[1]
 
 
@@ -283,20 +158,9 @@ def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surf
     return surfaces.shaded(points, surfaces.triangulated(faces(bundle)), sharp=sharp)
 
 
-def centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
-    """Return the centre of mass in the bundle's axes [m]; it is the run's position, unlike the bundle's origin."""
-    moment: np.ndarray = bundle.first_moment.values
-    return moment / float(bundle.mass)
-
-
 def rest(bundle: xr.Dataset) -> np.ndarray:
     """Return points of the skin of an undeformed body, its centre of mass at the origin [m], shape (point, 3)."""
     return surface(bundle, np.zeros(bundle.sizes["mode"]))[0] - centre_at_rest(bundle)
-
-
-def _names(run: xr.Dataset, dim: str) -> list[str]:
-    """Return the names along a dimension; none where the run lacks the dimension."""
-    return [str(name) for name in run[dim].values] if dim in run.coords else []
 
 
 def _seats(at: Layout) -> dict[str, list[Seat]]:
@@ -354,7 +218,7 @@ def _with_wheels(
 
 def _joints(at: Layout, size: float) -> Iterator[Part]:
     """Yield balls, pins, rails, crosses and planes of the joints."""
-    contacts = _names(at.run, "contact")
+    contacts = names(at.run, "contact")
     for name, joint in at.given.get("joint", {}).items():
         kind, (first, second) = joint["type"], joint["between"]
         contact = contacts.index(name) if name in contacts else None
@@ -380,7 +244,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
             elif grounded:
                 yield at.seated(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
         elif kind in forms.SLIDING:
-            low, high = _travel(at.run, name)
+            low, high = travel(at.run, name)
             rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
             middle = np.array([0.0, 0.0, 0.5 * (low + high)])
             yield at.seated(first, surfaces.moved(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
@@ -390,80 +254,6 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
                 yield at.seated(frame, surfaces.moved(arm, np.zeros(3), surfaces.along(axis)), color)
         elif kind == "planar":
             yield at.seated(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
-
-
-def _loads(at: Layout, size: float, bodies: Sequence[Part]) -> Iterator[Part]:
-    """Yield springs as coils, dampers as cylinders with pistons, bushings as rings, other tension as thin bars."""
-    for load in at.given.get("load", {}).values():
-        if load["type"] == "bushing":
-            yield from _bushing(at, load, size)
-        elif "between" in load:
-            first, second = load["between"]
-            yield from _between(at.run, (at.site(first), at.site(second)), load, COIL * size)
-        elif load["type"] == "joint-spring":
-            yield from _on_joint(at, load, size, bodies)
-
-
-def _bushing(at: Layout, load: Mapping[str, Any], size: float) -> Iterator[Part]:
-    """Yield a ring, about the axis across which its stiffnesses are most alike, and the pin that it holds."""
-    first, second = load["between"]
-    along = np.diagonal(load["stiffness"])
-    axis = min((2, 0, 1), key=lambda k: abs(along[(k + 1) % 3] - along[(k + 2) % 3]))
-    turn, pin = surfaces.along(np.eye(3)[axis]), PIN * size
-    ring = forms.ring(1.05 * pin, 2.8 * pin, 3.0 * pin)
-    yield at.seated(first, surfaces.moved(ring, np.zeros(3), turn), LOAD_COLOR)
-    yield at.seated(second, surfaces.moved(surfaces.cylinder(pin, 4.2 * pin), np.zeros(3), turn), JOINT_COLOR)
-
-
-def _on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: Sequence[Part]) -> Iterator[Part]:
-    """Yield a spring along a joint's axis, on the side where it is pressed and around the body that slides, or a coil
-    about the axis."""
-    name, joint = load["joint"], at.given["joint"][load["joint"]]
-    first, second = joint["between"]
-    if joint["type"] in forms.SLIDING and load.get("coordinate") != "rotation":
-        low, high = _travel(at.run, name)
-        side = 1.0 if 0.5 * (low + high) >= quantity(load.get("rest", 0.0), "length") else -1.0
-        (origin, axes), centre = (
-            at.local(second),
-            at.centre(second.partition(".")[0]) if at.owner(second) is not None else 0.0,
-        )
-        around = [
-            surfaces.reach(
-                (part.surface.points + centre - origin) @ axes, part.surface.triangles, side * FREE * size / 2
-            )
-            for part in bodies
-            if part.owner == at.owner(second)
-        ]
-        radius = max([COIL * size, *(1.15 * one for one in around)])
-        anchor = (high if side > 0.0 else low) + side * max(FREE * size, 3.0 * radius)
-        yield from _between(at.run, (at.site(first, anchor), at.site(second)), load, radius)
-    elif load.get("stiffness"):
-        radius, long = 2.2 * PIN * size, 3.0 * PIN * size
-        coil = surfaces.moved(forms.coil(radius, long, 0.2 * radius), np.array([0.0, 0.0, -0.5 * long]))
-        yield at.seated(second, coil, LOAD_COLOR)
-
-
-def _between(run: xr.Dataset, ends: tuple[Site, Site], load: Mapping[str, Any], radius: float) -> Iterator[Part]:
-    """Yield what acts along a line between two points: a coil of this radius [m], a cylinder with its piston, both, or
-    a thin bar."""
-    lengths = [float(np.linalg.norm(np.subtract(*(site.position(run, k) for site in ends)))) for k in _samples(run)]
-    long, owners = max(lengths), [site.owner for site in reversed(ends) if site.owner is not None]
-    if not owners or long < NEAR * radius:
-        return
-
-    def part(surface: Surface, color: str, sites: tuple[Site, Site] = ends, length: float | None = None) -> Part:
-        return Part(owners[0], surface, color, ends=sites, length=length)
-
-    if load.get("stiffness"):
-        yield part(forms.coil(radius, long, 0.2 * radius), LOAD_COLOR, length=long)
-    if load.get("damping"):
-        half = min(0.6 * long, 0.95 * min(lengths))
-        for sites, thick, color in ((ends, 0.6, GROUND_COLOR), (ends[::-1], 0.3, JOINT_COLOR)):
-            rod = surfaces.moved(surfaces.cylinder(thick * radius, half), np.array([0.0, 0.0, 0.5 * half]))
-            yield part(rod, color, (sites[0], sites[1]))
-    if not load.get("stiffness") and not load.get("damping"):
-        bar = surfaces.moved(surfaces.cylinder(0.2 * radius, long), np.array([0.0, 0.0, 0.5 * long]))
-        yield part(bar, LOAD_COLOR, length=long)
 
 
 def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
@@ -480,15 +270,6 @@ def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
     return surfaces.moved(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
 
 
-def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
-    """Return least and largest displacement along a joint's axis [m], that of the assembled start included."""
-    for name in (joint, f"{joint}.translation"):
-        if "coordinate" in run.coords and name in run.coordinate.values:
-            values = run.joint_position.sel(coordinate=name).values
-            return min(0.0, float(values.min())), max(0.0, float(values.max()))
-    return 0.0, 0.0
-
-
 def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
     columns = np.flatnonzero(run.mode_body.values == name)
     q = run.modal_coordinate.values[:, columns]
@@ -498,4 +279,4 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, s
     shown = stressed and name in body_shape.stress_recorded(run)
     if stressed:  # grey does not look like a stress
         color = None if shown else GROUND_COLOR
-    return Flexible(_names(run, "body").index(name), bundle, columns, scale, color, shown)
+    return Flexible(names(run, "body").index(name), bundle, columns, scale, color, shown)

@@ -15,7 +15,7 @@ import xarray as xr
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.post.overview.curves import in_unit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render import forms, mechanism, player, surfaces
+from flexclear.pipeline.post.render import forms, layout, mechanism, player, surfaces
 from flexclear.pipeline.post.render.mechanism import Mechanism
 from flexclear.pipeline.post.render.ruler import exaggeration, project, ruler
 from flexclear.pipeline.post.render.surfaces import Surface
@@ -23,7 +23,7 @@ from flexclear.pipeline.post.render.view import flat, gravity
 from flexclear.pipeline.post.shapes.body_shape import has_edges
 from flexclear.pipeline.post.single_run.series import parameters
 
-BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", mechanism.LOAD_COLOR
+BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", layout.LOAD_COLOR
 CLEARANCE, GAP = "#a35f00", "#c4161c"
 #: fractions of the mechanism's size: half length and thickness of a drawn axis, radius of a drive's arrow, of a gap
 AXIS, THIN, ARC, THICK = 0.055, 0.0016, 0.035, 0.004
@@ -74,7 +74,7 @@ def start_view(
 ) -> StartView:
     """Return the view of a start; gaps: of joints that do not fit."""
     text, drawn = parameters(run), mechanism.mechanism(run, bundles, looks)
-    at = mechanism.Layout(run, text, bundles)
+    at = layout.Layout(run, text, bundles)
     # world position of each joint's second frame, and the axes of its first one
     joints = {
         name: (at.at_start(second)[0], at.at_start(first)[1])
@@ -90,19 +90,17 @@ def start_view(
         *(_still(body, opacity) for body in drawn.flexible),
     ]
     drawn = replace(drawn, parts=tuple(solid), flexible=())
-    extra = [mechanism.Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
+    extra = [layout.Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
     marked = list(_marks(run, drawn, text, joints, gaps))
     cloud = np.concatenate([drawn.cloud, *(part.surface.points for part in extra), *([m.point] for m in marked)])
     drawn = replace(drawn, parts=(*drawn.parts, *extra), cloud=cloud)
     return StartView(drawn, tuple(marked), tuple(_notes(drawn, text, gaps)), tuple(gaps), gravity(text))
 
 
-def _still(body: mechanism.Flexible, opacity: float) -> mechanism.Part:
+def _still(body: mechanism.Flexible, opacity: float) -> layout.Part:
     """Return a meshed body without deformation."""
     shown = mechanism.skin(body.bundle, mechanism.rest(body.bundle), sharp=has_edges(body.bundle))
-    return mechanism.Part(
-        body.index, shown, body.color or mechanism.COLORS[body.index % len(mechanism.COLORS)], opacity
-    )
+    return layout.Part(body.index, shown, body.color or mechanism.COLORS[body.index % len(mechanism.COLORS)], opacity)
 
 
 def page_view(start: StartView) -> dict[str, Any]:
@@ -208,7 +206,7 @@ def _marks(
     for name, gear in text.get("gear", {}).items():
         pair = [gear["first"], gear["second"]]
         where = np.mean([joints[one.partition(".")[0]][0] for one in pair], axis=0)
-        yield Mark(name, f"gear {_ratio(gear['ratio'])}: {' – '.join(pair)}", where, JOINT)
+        yield Mark(name, f"gear {gear['ratio']}: {' – '.join(pair)}", where, JOINT)
     for name, where in positions.items():
         if name not in used:
             yield Mark(name, "frame", where, FRAME)
@@ -226,11 +224,6 @@ def _range(stop: Mapping[str, Any], kind: str) -> str:
     return ", ".join(f"{e} {f'{np.degrees(v):.4g}°' if turns else in_unit(v, 'm')}" for e, v in ends.items())
 
 
-def _ratio(ratio: float | str) -> str:
-    """Return the ratio of a gear as a scene writes it; bare numbers rounded."""
-    return ratio if isinstance(ratio, str) else f"{ratio:.4g}"
-
-
 def _of_body(body: Mapping[str, Any]) -> str:
     flexible = "flexible, " if body["type"] == "flexible" else ""
     return f"{flexible}{body['mass']:.4g} kg" if "mass" in body else f"{flexible}body".replace(", body", "")
@@ -240,7 +233,7 @@ def _middle(run: xr.Dataset, drawn: mechanism.Mechanism, index: int) -> np.ndarr
     """Return a point on the drawn shape of a body, close to the middle of that shape."""
     for part in drawn.parts:
         if part.owner == index and part.frame is None and part.contact is None and part.ends is None:
-            matrix = mechanism.pose(run, index, 0)
+            matrix = layout.pose(run, index, 0)
             low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
             return np.asarray(matrix[:3, :3] @ (0.5 * (low + high)) + matrix[:3, 3])
     return np.asarray(run["position"].values[0, index])

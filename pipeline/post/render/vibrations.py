@@ -10,7 +10,8 @@ import xarray as xr
 
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.render import film_speed, surfaces
-from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, Part, part_pose, pose, rest, skin
+from flexclear.pipeline.post.render.layout import Part, part_pose, pose
+from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
 from flexclear.pipeline.post.shapes.body_shape import hertz, linear_fields
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
