@@ -30,4 +30,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *import_module("flexclear.public").__all__]
+    return [*import_module("flexclear.public").__all__, "__version__"]

@@ -271,15 +271,15 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
 
 
 def plan(
-    scene: Scene | str | Path, budget: str | float | None = None, *, accuracy: str = "1 %"
+    scene: Scene | str | Path, budget: str | float | None = None, *, accuracy: str | None = None
 ) -> tuple[Scene, xr.Dataset]:
     """Plan which of a scene's effects the requested accuracy calls for: the planned scene, and the evidence.
 
     The dataset (`pipeline.post.answers.plan.dataset`) holds the estimated effect size of each effect on each quantity
     of `[accuracy]`, the decisions and their reasons.  accuracy: of all watched quantities, as a fraction of their
-    sizes, for a scene without `[accuracy]`.  budget: time in which members of the full and the planned scene are
-    compared [s], or text such as "1min"; the dataset then has the plan's true `error` where it is decided, its
-    `chance`, the `allowed` error, the `horizon` as a fraction of the run and the `scatter` of single runs. In a
+    sizes; default: the scene's `[accuracy]`, else "1 %".  budget: time in which members of the full and the planned
+    scene are compared [s], or text such as "1min"; the dataset then has the plan's true `error` where it is decided,
+    its `chance`, the `allowed` error, the `horizon` as a fraction of the run and the `scatter` of single runs. In a
     notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     return plan_command.dataset(_loaded(scene), accuracy, budget)

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.scene.units import quantity
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError
+from flexclear.pipeline.core.system.errors import InputError, error_of
 from flexclear.pipeline.core.system.log import set_level
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources, sources_of
 from flexclear.pipeline.core.workflow.progress import Monitor
-from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
+from flexclear.pipeline.core.workflow.schedule import Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ class Workplace:
         return {task: Made(task, record, self.store) for task, record in outcome.records.items()}
 
     def made(self, *tasks: Task, jobs: int | None = None) -> list[Made]:
-        """Bring tasks up to date and return their artifacts; raise FailedTasksError when a task or an input fails."""
+        """Bring tasks up to date and return their artifacts; raise as `check` does when a task or an input fails."""
         outcome = self.bring(list(tasks), jobs)
         check(outcome)
         by_task = self.artifacts(outcome)
@@ -155,14 +155,6 @@ class Workplace:
         """Return a context that stops the work inside when the command's time limit is over."""
         end, why = self.end
         return stopping.until(None if end == math.inf else end - time.monotonic(), why)
-
-
-class FailedTasksError(FlexclearError):
-    """Some tasks failed; each is reported, and the first decides the exit code."""
-
-    def __init__(self, failures: tuple[Failure, ...]) -> None:
-        super().__init__("\n".join(failure.message for failure in failures))
-        self.exit_code = failures[0].exit_code
 
 
 def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
@@ -184,6 +176,7 @@ def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
 
 
 def check(outcome: Outcome) -> None:
-    """Raise FailedTasksError when a task has failed."""
-    if outcome.failures:
-        raise FailedTasksError(outcome.failures)
+    """Raise the first failure's kind of error (InputError, SolverError, ResourceError) with the messages of all."""
+    for first in outcome.failures[:1]:
+        text = "\n".join(failure.message for failure in outcome.failures)
+        raise error_of(first.exit_code, f"{first.task.scene} {first.task.label}", text)

@@ -80,8 +80,8 @@ def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
 def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
     """Return one of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
 
-    budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study. Raises InputError
-    for a scene without effects or watched quantities.
+    budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study. Raises as
+    `answer_of`.
     """
     from flexclear.pipeline.post.answers.answered import answered
 
@@ -90,12 +90,21 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool
     if name == "cost":
         name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET, models=models)
     else:
-        answer = getattr(Answers(scene, workplace, given, questions=1), name)
-    if answer is None:
-        raise InputError(str(scene.path or scene.name), "has no effect that can be removed, or [view] watch is empty")
+        answer = answer_of(name, scene, workplace, given)
     words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
     return answered(answer.dataset(), words.text, picture, words.table)
+
+
+def answer_of(name: str, scene: Scene, workplace: Workplace, budget: float | None) -> Made:
+    """Return the answer called stability or effects, for the whole budget of processor time [s].
+
+    Raises InputError for a scene without effects or watched quantities.
+    """
+    answer: Made | None = getattr(Answers(scene, workplace, budget, questions=1), name)
+    if answer is None:
+        raise InputError(str(scene.path or scene.name), "has no effect that can be removed, or [view] watch is empty")
+    return answer
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ class Study:
     def begin(self) -> None:
         """Run the scene as it is, which predicts the time of other runs.
 
-        Raises FailedTasksError or SolverError where it fails.
+        Raises InputError, SolverError or ResourceError where it fails.
         """
         if self.points:
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from flexclear.commands.answers import answer_of, shown_answer
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import graphs, pictures, print_files, scene_arguments, tables
 from flexclear.pipeline.core.artifacts.store import publish
@@ -12,7 +13,7 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.pages import Part, page
 from flexclear.stages import effect_study, watched_quantities
-from flexclear.stages.workplace import Made, Workplace, open_workplace
+from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,29 +23,36 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
-    scene_arguments(parser, "json")
+    scene_arguments(parser, "json", "budget")
     parser.add_argument(
         "--members",
         type=int,
-        default=watched_quantities.MEMBERS,
         metavar="N",
         help=f"number of starts of each variant that has contacts (default {watched_quantities.MEMBERS}); "
-        "more of them resolve smaller differences",
+        "more of them resolve smaller differences; --budget chooses them itself",
     )
 
 
 def command(options: argparse.Namespace) -> None:
     """Bring the tables up to date, print them and where their files are."""
+    budget = None if options.budget is None else seconds(options.budget, "--budget")
+    if budget is not None and options.members is not None:
+        raise InputError("--members", "is chosen by --budget", "leave one of them out")
     workplace = open_workplace(options)
     datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
-        made = bring(graph.scene, workplace, options.members)
+        if budget is None:
+            name, made = "effects", bring(graph.scene, workplace, options.members or watched_quantities.MEMBERS)
+        else:
+            name, made = "effect_ranking", answer_of("effects", graph.scene, workplace, budget)
         if options.json:
             datasets[graph.scene.name] = made.dataset()
             continue
-        print(made.text("effects.md"))
-        files = {"index.html": "the page", "effects.nc": "all effect sizes", "effects.png": "the chart"}
-        print_files(made.folder, files)
+        if budget is not None:
+            print(f"{shown_answer('effects', made, graph.scene).text}\n")
+        print(made.text(f"{name}.md"))
+        page = {"index.html": "the page"} if budget is None else {}
+        print_files(made.folder, page | {f"{name}.nc": "all effect sizes", f"{name}.png": "the chart"})
     if options.json:
         print(as_json(datasets))
 

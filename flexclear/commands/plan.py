@@ -14,11 +14,12 @@ from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
+from flexclear.pipeline.core.scene.units import quantity as number
 from flexclear.pipeline.core.scene.variants import pruned
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.post.plotting.table import as_html, as_markdown
 from flexclear.stages import effect_plan, watched_quantities
-from flexclear.stages.workplace import FailedTasksError, Made, Workplace, open_workplace, seconds
+from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,8 @@ SUFFIX = ".planned.toml"
 MEMBERS, BUDGET = (4, 8, 16, 32, 64), 60.0
 #: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
 LEVELS = ("10 %", "1 %", "0.1 %")
+#: that of `fc.plan`
+LEVEL = LEVELS[1]
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +42,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE.toml", help="also write the planned scene here (one scene)")
     parser.add_argument(
         "--verify", action="store_true", help="also run the full scene, and report the plan's true error"
+    )
+    parser.add_argument(
+        "--accuracy",
+        metavar="FRACTION",
+        help="accuracy of all watched quantities, such as '1 %%' of their sizes, in place of [accuracy]",
     )
 
 
@@ -49,12 +57,13 @@ def command(options: argparse.Namespace) -> None:
     missed, plans = list[str](), dict[str, object]()
     budget = seconds(options.budget, "--budget")
     for graph in scenes.graphs(options.scenes, options.set):
-        if graph.scene.accuracy is None and not options.verify and options.out is None:
+        level = options.accuracy
+        if (graph.scene.accuracy or level) is None and not options.verify and options.out is None:
             plans[graph.scene.name] = table = levels(graph.scene, workplace)
             if not options.json:
                 print(table)
             continue
-        planned = bring(graph.scene, workplace)
+        planned = bring(graph.scene, workplace, level)
         plans[graph.scene.name] = planned.made.dataset() if options.json else None
         if not options.json:
             print(planned.made.text("plan.md"))
@@ -83,7 +92,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     for level in LEVELS:
         try:
             plans[level] = bring(scene, workplace, level).made.dataset()
-        except (InputError, FailedTasksError) as error:
+        except (InputError, SolverError) as error:
             if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
                 raise
             plans[level] = str(error)
@@ -92,25 +101,31 @@ def levels(scene: Scene, workplace: Workplace) -> str:
 
 def with_accuracy(scene: Scene, level: str) -> Scene:
     """Return the scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
-    chosen = {quantity.name: level for quantity in scene.watched()}
+    try:
+        fraction = number(level, "number")
+        if not 0.0 < fraction < 1.0:
+            raise ValueError("it must be above 0 and below 1")
+    except ValueError as error:
+        raise InputError(f"accuracy {level}", f"is no fraction: {error}", "write a number with %, as '1 %'") from None
+    chosen = {quantity.name: {"relative": fraction} for quantity in scene.watched()}
     if not chosen:
         raise InputError(str(scene.path or scene.name), "watches no quantity", "name quantities in [view] watch")
     asked = edited(scene, {"accuracy": chosen})
-    asked._name, asked._path = f"{scene.name} to {level.replace(' ', '')}", None
+    asked._name = f"{scene.name} to {level.replace(' ', '')}"
     return asked
 
 
-def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
+def dataset(scene: Scene, level: str | None, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
     """Return the planned scene, and the plan as a dataset that shows its answer in a notebook.
 
-    level: accuracy of all watched quantities, where the scene requests none.  budget: time for `errors_of` [s], or
-    text; None leaves the errors out.
+    level: accuracy of all watched quantities; None for that of the scene, else LEVEL.  budget: time for `errors_of`
+    [s], or text; None leaves the errors out.
     """
     from flexclear.pipeline.post.answers.answered import answered
     from flexclear.pipeline.post.answers.plan import verified, words
 
     workplace = open_workplace()
-    planned = bring(scene, workplace, level if scene.accuracy is None else None)
+    planned = bring(scene, workplace, level or (LEVEL if scene.accuracy is None else None))
     result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))

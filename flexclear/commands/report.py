@@ -119,7 +119,7 @@ def _pages(options: argparse.Namespace, workplace: Workplace) -> Iterator[tuple[
 def of_paper(workplace: Workplace, *, folder: bool = False) -> Path:
     """Bring everything on the page of the paper up to date; return the page, with `folder` one next to its files.
 
-    Parts that fail are left out of the page and raised (FailedTasksError) after the page is written.
+    Parts that fail are left out of the page and raised after the page is written.
     """
     outcome = tasks.bring(workplace)
     if gl.state().endswith("none"):
@@ -136,7 +136,7 @@ def of_scene(
 
     One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
     the page has no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: False leaves out
-    those that take further runs. Raises FailedTasksError when the run itself fails, and, after the page is written,
+    those that take further runs. Raises as `workplace.check` when the run itself fails, and, after the page is written,
     ResourceError where a limit of time, of the machine or of `[limits]` left parts out.
     """
     scene = graph.scene

@@ -100,7 +100,7 @@ def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
     bodies = {name: _body(Path(recipe)) for name, recipe in scene.recipes().items()}
     looks = rendering.params(scene, "motion", "pvd")
     filled = _filled(scene, bodies, lone := _unplaced(scene))
-    pose = start_pose(placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
+    pose = start_pose(filled, placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
     gaps = [Missing(gap.joint, gap.start, gap.end, gap.angle) for gap in pose.gaps]
     view = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
     if lone:

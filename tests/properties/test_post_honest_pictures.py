@@ -5,8 +5,11 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
+from flexclear.pipeline.post.overview import sweep_figures
 from flexclear.pipeline.post.overview.curves import NOISE, impacts, noise, without_noise
-from flexclear.pipeline.post.render.mechanism import CLEARANCE_COLOR, SOCKET
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.render.layout import CLEARANCE_COLOR
+from flexclear.pipeline.post.render.mechanism import SOCKET
 from flexclear.pipeline.post.render.ruler import exaggeration
 from flexclear.pipeline.post.render.view import plane, view
 
@@ -38,6 +41,38 @@ def test_the_factor_of_a_clearance_is_what_is_drawn(root):
     ((_, joint),) = scene.contacts().items()
     factor = (SOCKET - 1.0) * joint.pin_radius / joint.clearance
     assert f"clearances drawn {factor:.2g} times larger" in exaggeration(fc.show(scene).view.drawn)
+
+
+def test_a_zero_line_has_no_range_of_its_own():
+    with style.style():
+        figure, ((zero, small),) = style.grid(1, 2, (4.0, 2.0))
+        for axes, size in ((zero, 0.0), (small, 1e-9)):
+            axes.plot([0.0, 1.0], [0.0, size])
+            style.flatten(axes)
+        assert list(zero.get_yticks()) == [0.0]
+        assert max(small.get_ylim()) == pytest.approx(1e-9, rel=0.2)
+        style.files("x", figure)
+
+
+@pytest.mark.parametrize(
+    "values, borders",
+    [([1.0, 2.0, 5.0], [0.5, 1.5, 3.5, 6.5]), ([0.1, 1.0, 10.0], np.sqrt([0.001, 0.1, 10.0, 1000.0]))],
+    ids=["linear", "logarithmic"],
+)
+def test_cells_of_a_map_end_halfway_between_its_values(values, borders):
+    assert sweep_figures._edges(np.array(values)) == pytest.approx(np.array(borders))
+
+
+def test_labels_of_sweeps_are_words_and_units_as_written():
+    values = {"drive.motor.law.speed": ("drive.motor.law.speed", [10.0, 20.0], {"units": "rad s-1"})}
+    sweep = xr.Dataset(coords=values)
+    assert sweep_figures._axis(sweep, "drive.motor.law.speed") == "law speed of motor (rad/s)"
+    sweep["drive.motor.law.speed"].attrs["written_units"] = "rpm"
+    assert sweep_figures._axis(sweep, "drive.motor.law.speed") == "law speed of motor (rpm)"
+    assert sweep_figures._scale(sweep, "drive.motor.law.speed")[0] == pytest.approx(30.0 / np.pi)
+    assert sweep_figures._in_words("A1.peak_force") == "A1: peak force"
+    assert sweep_figures._in_words("rod.tip.position.largest x") == "rod.tip: position, largest x"
+    assert sweep_figures._in_words("force(A1) - force(A2)") == "force(A1) - force(A2)"
 
 
 def test_rounding_is_a_zero_line_and_small_motion_is_not():

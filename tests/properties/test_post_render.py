@@ -1,15 +1,19 @@
 """What is drawn has the size of what was computed."""
 
+import base64
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
 
+import flexclear as fc
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post.render import gl
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+from flexclear.pipeline.post.render import gl, gltf, player
 from flexclear.pipeline.post.render.forms import equivalent
-from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed
+from flexclear.pipeline.post.render.layout import part_pose
+from flexclear.pipeline.post.render.mechanism import Looks, mechanism, placed
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.player import _camera
@@ -122,6 +126,40 @@ def test_zoom_enlarges_stills_and_the_page_alike():
     (whole, part) = (_camera(drawn.view, drawn.cloud, zoom) for zoom in (1.0, 2.0))
     assert [whole[name] for name in ("eye", "focus", "up")] == [part[name] for name in ("eye", "focus", "up")]
     assert part["reach"] == pytest.approx([0.5 * one for one in whole["reach"]], rel=1e-14)
+
+
+def test_a_spring_reaches_from_end_to_end_at_all_times():
+    """A mass that swings on its spring: the coil is stretched to the distance of its ends, in pages and files, too."""
+    run = fc.run(fc.load_scene(TREE / "scenes/checks/oscillator.toml", override={"time.end": 0.3}))
+    drawn = mechanism(run, {})
+    coil = next(part for part in drawn.parts if part.length is not None)
+    mass = run["position"].sel(body="mass").values
+    lengths = np.linalg.norm(mass, axis=1)  # the other end is the origin
+    assert np.ptp(lengths) > 0.1 * lengths.max()
+    for step in (0, len(mass) // 2, len(mass) - 1):
+        matrix = part_pose(run, coil, step)
+        heights = (coil.surface.points @ matrix[:3, :3].T + matrix[:3, 3]) @ mass[step] / lengths[step]
+        assert [heights.min(), heights.max()] == pytest.approx([0.0, lengths[step]], abs=1e-9)
+    reported = player.motion(drawn, 5)
+    stretch = np.array([_decoded(track)[:, 7] for track in reported["tracks"]])
+    assert np.ptp(stretch, axis=1).max() > 0.1
+    assert b'"scale"' in gltf.motion(drawn, np.arange(3), 1.0)
+
+
+def _decoded(track: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(track), dtype="<f4").reshape(-1, 8)
+
+
+@needs_gl
+def test_a_body_that_moves_far_is_in_the_first_picture_of_its_film():
+    """A ball that falls by a metre from above the origin, where parts are before they are put in place."""
+    from flexclear.pipeline.post.render import film
+
+    run = fc.run(fc.load_scene(TREE / "stages/templates/empty/scene.toml"))
+    drawn = mechanism(run, {})
+    first = next(iter(film.frames(drawn, derive(run), 12)))[:, : film.VIEW]
+    # the ball is blue; background, floor and words are grey
+    assert (first[:, :, 2].astype(int) - first[:, :, 0] > 40).sum() > 100
 
 
 def test_drawn_rod_lies_at_its_body_in_the_world():

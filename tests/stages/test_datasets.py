@@ -21,7 +21,7 @@ from flexclear.commands.new import write
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, ResourceError, SolverError, error_of
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics import simulate
@@ -170,8 +170,44 @@ def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
 
 
 def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:
-    assert set(fc.__all__) == set(fc.public.__all__) <= set(dir(fc))
+    assert set(fc.__all__) == set(fc.public.__all__) == set(dir(fc)) - {"__version__"}
     assert all(getattr(fc, name) is getattr(fc.public, name) for name in fc.__all__)
+
+
+PENDULUM = "scenes/checks/pendulum.toml"
+
+
+@pytest.mark.parametrize(
+    "changes, kind",
+    [
+        ({"solver.evaluations": 20}, SolverError),
+        ({"body.bob.pose.position": [0.0, 0.5, 0.0]}, InputError),  # off its hinge
+    ],
+    ids=["solver", "input"],
+)
+def test_a_failed_run_raises_the_error_of_its_cause(root: Path, changes: dict[str, Any], kind: type[Exception]) -> None:
+    with pytest.raises(kind, match="checks/pendulum simulate: "):
+        fc.run(fc.load_scene(root / PENDULUM, override={"time.end": 0.11, **changes}))
+    assert type(error_of(ResourceError.exit_code, "here", "the disk is full")) is ResourceError
+
+
+def test_time_keeps_its_unit_in_a_quantity(root: Path) -> None:
+    run = fc.run(fc.load_scene(root / PENDULUM, override={"time.end": 0.01}))
+    for name in ("bob.position", "hinge.position"):
+        assert fc.quantity(run, name)["time"].attrs == {"units": "s", "long_name": "time"}
+
+
+def test_a_scene_shows_its_parts_and_names_the_function_that_changes_it(root: Path) -> None:
+    scene = fc.load_scene(root / "scenes/gallery/gear_shaft.toml", override={"title": "1 < 2"})
+    shown = scene._repr_html_()
+    assert "<b>1 &lt; 2</b>" in shown
+    for words in ("shaft (flexible)", "bearing (cylindrical): ground.right – disc.centre", "pair: wheel – pinion"):
+        assert words in shown
+    with pytest.raises(AttributeError, match=r'fc.edited\(scene, \{"title": \'a\'\}\)'):
+        setattr(scene, "title", "a")  # noqa: B010 - mypy refuses the statement
+    with pytest.raises(AttributeError, match=r'fc.edited\(scene, \{"PART.mass": 2\}\)'):
+        setattr(scene.body["disc"], "mass", 2)  # noqa: B010
+    assert scene.title == "1 < 2"
 
 
 def test_a_tree_leaves_out_what_is_derived_from_another_run(

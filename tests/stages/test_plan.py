@@ -19,13 +19,13 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import uncoupled
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
 from flexclear.stages import effect_plan
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import FailedTasksError, open_workplace
+from flexclear.stages.workplace import open_workplace
 from tests.properties.mechanisms import frame, joint, rigid
 from tests.stages.conftest import Command
 from tests.stages.plans import standing_leg
@@ -197,6 +197,24 @@ def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, c
     assert said.count("gravity") >= 3  # without it nothing swings
 
 
+def test_the_command_plans_for_an_accuracy_of_its_own(tmp_path: Path, command: Command):
+    path, out = write("pendulum", tmp_path)[0], tmp_path / "coarse.toml"
+    said = command("plan", path, "-q", "--jobs", "1", "--accuracy", "1 %", "--out", out).out
+    assert "gravity" in said
+    assert 'extends = "' in out.read_text()
+    assert load_scene(out).accuracy is None
+    for wrong in ("5 mm", "200 %", "all"):
+        assert "write a number with %" in command("plan", path, "--accuracy", wrong, code=2).err
+
+
+def test_the_command_ranks_effects_within_a_budget(tmp_path: Path, command: Command):
+    path = write("pendulum", tmp_path)[0]
+    said = command("effects", path, "-q", "--budget", "5s", "--set", "time.end=0.1").out
+    assert "gravity" in said
+    assert "effect_ranking.nc" in said
+    assert "chosen by --budget" in command("effects", path, "--budget", "5s", "--members", "4", code=2).err
+
+
 def test_watched_components_that_never_change_are_left_out_of_the_levels(tmp_path: Path, command: Command):
     """A pendulum does not move along its axis; an accuracy of that motion which is named in [accuracy] is refused."""
     path = write("pendulum", tmp_path)[0]
@@ -217,7 +235,7 @@ def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Pa
     scene = edited(
         _tight(standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
-    with pytest.raises((InputError, FailedTasksError), match="remove all effects") as refused:
+    with pytest.raises((InputError, SolverError), match="remove all effects") as refused:
         plan.bring(scene, open_workplace())
     assert refused.value.exit_code == 2
     assert not [*(fresh / "plan").rglob("*.toml"), *(fresh / "plan").rglob("*.nc")]
@@ -282,7 +300,7 @@ def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, fresh: 
             "accuracy": {"quantities": {"slider.position": {"absolute": 1e-3}}},
         },
     )
-    with pytest.raises(FailedTasksError, match="cannot be run as it is") as refused:
+    with pytest.raises(SolverError, match="cannot be run as it is") as refused:
         plan.bring(wild, open_workplace())
     assert refused.value.exit_code == 3
     assert not [*(fresh / "plan").rglob("*.toml"), *(fresh / "plan").rglob("*.nc")]

@@ -10,6 +10,7 @@ import pytest
 import flexclear as fc
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.render import gl, surfaces
+from flexclear.pipeline.post.render.layout import CLEARANCE_COLOR, LOAD_COLOR, part_pose
 from flexclear.pipeline.post.render.ruler import pixels_per_metre, project, round_length
 from flexclear.pipeline.post.render.start_view import AXIS, columns, heights, page_view
 from tests.processes import printed
@@ -99,6 +100,111 @@ def test_axes_lie_along_the_joints(root: Path):
     assert extent[2] == pytest.approx(2.0 * AXIS * seen.drawn.size, rel=1e-6)
     assert extent[1] < 0.1 * extent[2]
     assert 0.5 * (axis.points.max(axis=0) + axis.points.min(axis=0)) == pytest.approx(hinge.point, abs=1e-12)
+
+
+def test_a_start_like_the_ideal_mechanism_is_shown_with_its_loose_joints(root: Path):
+    path = root / "scenes/checks/clearance_slider_crank.toml"
+    seen = fc.show(fc.load_scene(path, override={"start": {"at": "ideal"}})).view
+    details = {mark.text: mark.detail for mark in seen.marks}
+    assert details["pin"].startswith("clearance-revolute 100 µm")
+    assert [part.contact for part in seen.drawn.parts if part.color == CLEARANCE_COLOR] == [0]
+    assert any("clearances drawn" in note for note in seen.notes)
+
+
+def test_loads_along_joints_stops_and_gears_have_names(root: Path):
+    details = set()
+    for name in ("checks/stops", "checks/gears", "gallery/gear_shaft", "gallery/cam"):
+        scene = fc.load_scene(root / f"scenes/{name}.toml")
+        marks = {(mark.text, mark.detail) for mark in fc.show(scene).view.marks}
+        forces = {n for n, load in scene.load.items() if load.type != "gravity"}
+        assert {text for text, _ in marks} >= forces | set(scene.stop) | set(scene.gear)
+        details |= {detail for _, detail in marks}
+    assert {"gear -3.0: wheel – pinion", "joint-spring: rail"} <= details
+    assert any(text.startswith("stop of ") and "°" in text for text in details)
+
+
+def test_up_is_against_gravity_in_spatial_pictures_too(root: Path):
+    scene = fc.load_scene(root / "scenes/gallery/stewart.toml")
+    sideways = fc.edited(scene, {"load.gravity.acceleration": [0.0, 9.81, 0.0]})
+    for one, up in ((scene, [0.0, 0.0, 1.0]), (sideways, [0.0, -1.0, 0.0])):
+        seen = fc.show(one).view.drawn.view
+        assert not seen.planar
+        assert seen.up == pytest.approx(up, abs=1e-12)
+
+
+CAR = """
+title = "Wishbone in two bushings, on a strut"
+time = { end = 0.1 }
+[body.ground]
+type = "ground"
+[body.ground.frames]
+front = { position = [0.15, 0, 0] }
+rear = { position = [-0.15, 0, 0] }
+top = { position = [0, 0.3, 0.5] }
+[body.arm]
+type = "rigid"
+mass = 3.0
+inertia = [0.02, 0.03, 0.04]
+com = [0, 0.18, 0]
+pose = {}
+[body.arm.frames]
+front = { position = [0.15, 0, 0] }
+rear = { position = [-0.15, 0, 0] }
+ball = { position = [0, 0.4, 0] }
+[load.front]
+type = "bushing"
+between = ["ground.front", "arm.front"]
+stiffness = [8e6, 3e6, 8e6, 20, 200, 200]
+[load.rear]
+type = "bushing"
+between = ["ground.rear", "arm.rear"]
+stiffness = [3e6, 8e6, 8e6, 20, 200, 200]
+[load.strut]
+type = "spring-damper"
+between = ["ground.top", "arm.ball"]
+stiffness = 3e4
+damping = 1500.0
+free_length = 0.4
+"""
+
+
+def test_springs_dampers_and_bushings_are_drawn_and_a_wishbone_is_a_plate(tmp_path: Path):
+    (tmp_path / "car.toml").write_text(CAR, encoding="utf-8")
+    drawn = fc.show(tmp_path / "car.toml").view.drawn
+    arm, *rest = [part for part in drawn.parts if part.owner == 0 and part.ends is None and part.frame is None]
+    assert not rest
+    corners = np.array([[0.15, 0.0, 0.0], [-0.15, 0.0, 0.0], [0.0, 0.4, 0.0]]) - [0.0, 0.18, 0.0]
+    for corner in corners:  # the plate goes around each of its frames
+        assert np.linalg.norm(arm.surface.points - corner, axis=1).min() < 0.05
+    coil, cylinder, piston = (part for part in drawn.parts if part.ends is not None)
+    ends = np.array([[0.0, 0.3, 0.5], [0.0, 0.4, 0.0]])
+    for part, (start, end) in ((coil, ends), (cylinder, ends), (piston, ends[::-1])):
+        matrix = part_pose(drawn.run, part, 0)
+        assert matrix[:3, 3] == pytest.approx(start, abs=1e-12)
+        assert np.cross(matrix[:3, 2], end - start) == pytest.approx(np.zeros(3), abs=1e-12)
+    assert np.ptp(coil.surface.points[:, 2]) == pytest.approx(np.linalg.norm(ends[1] - ends[0]), rel=1e-9)
+    reach = [np.ptp(part.surface.points[:, 2]) for part in (cylinder, piston)]
+    assert sum(reach) > np.linalg.norm(ends[1] - ends[0]) > max(reach)
+    # rings of the bushings, in colour and place
+    rings = [part for part in drawn.parts if part.color == LOAD_COLOR and part.ends is None]
+    middles = [0.5 * (part.surface.points.max(axis=0) + part.surface.points.min(axis=0)) for part in rings]
+    assert np.array(middles) == pytest.approx(np.array([[0.15, 0.0, 0.0], [-0.15, 0.0, 0.0]]), abs=1e-9)
+    assert np.ptp(rings[0].surface.points, axis=0)[1] < np.ptp(rings[0].surface.points, axis=0)[0]  # about y
+    assert np.ptp(rings[1].surface.points, axis=0)[0] < np.ptp(rings[1].surface.points, axis=0)[1]  # about x
+
+
+def test_a_spring_on_a_rail_goes_around_the_body_that_slides(root: Path):
+    """The follower's stem is 10 mm by 10 mm: its coil is wider than the diagonal."""
+    drawn = fc.show(root / "scenes/gallery/cam.toml").view.drawn
+    (coil,) = (part for part in drawn.parts if part.ends is not None)
+    radius = np.linalg.norm(coil.surface.points[:, :2], axis=1).max()
+    assert radius > reach_of_follower(root)
+
+
+def reach_of_follower(root: Path) -> float:
+    """Half the diagonal of the stem [m]."""
+    _, stem = fc.load_scene(root / "scenes/gallery/cam.toml").body["follower"].geometry  # type: ignore[union-attr]
+    return 0.5 * float(np.hypot(*stem.size[:2]))
 
 
 def test_the_bar_is_as_long_as_it_says(root: Path):

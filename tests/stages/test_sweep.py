@@ -314,6 +314,16 @@ def test_every_kind_of_sweep_has_a_figure_of_equal_bytes(root: Path):
     assert len(pictures) == 3
 
 
+def test_a_sweep_keeps_the_unit_in_which_its_values_were_written(root: Path):
+    scene, short = root / "scenes/checks/pendulum.toml", {"time.end": 0.1}
+    mass = ["500 g", "2 kg"], {"from": "500 g", "to": "2 kg", "count": 2}
+    for given in mass:
+        found = fc.sweep(scene, {"body.bob.mass": given}, ["bob.velocity.largest"], set=short, workers=1)
+        assert found["body.bob.mass"].values == pytest.approx([0.5, 2.0])
+        assert found["body.bob.mass"].attrs["units"] == "kg"
+        assert found["body.bob.mass"].attrs["written_units"] == "g"
+
+
 def test_the_example_with_an_optimiser_finds_the_closed_form(root: Path):
     """The mass turns round where sqrt(k/m - (c/2m)^2) T = pi."""
     example = runpy.run_path(str(root / "docs/examples/optimise.py"))

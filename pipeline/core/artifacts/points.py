@@ -120,6 +120,7 @@ def dataset(
     coordinates: dict[str, Any] = {}
     for axis in design.axes:
         described = {"long_name": ", ".join(axis.places)} | ({"units": u} if (u := udunits(axis.unit)) else {})
+        described |= {"written_units": axis.written} if axis.written else {}
         coordinates[axis.name] = (axis.name if design.grid else "point", np.array(axis.coordinate), described)
     coordinates |= {"axis": list(AXES)} if "axis" in sizes else {}
     coordinates |= {"quat": list(QUATERNION)} if "quat" in sizes else {}

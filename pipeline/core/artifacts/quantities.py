@@ -129,9 +129,8 @@ def evaluate(run: xr.Dataset, text: str) -> xr.DataArray:
     if not quantity.over_time:
         return xr.DataArray(np.squeeze(events(run, quantity)), name=quantity.name, attrs=attributes)
     values, dim = series(run, quantity), quantity.dim
-    coordinates = {"time": run["time"].values} | ({dim: run[dim].values} if dim else {})
     shown, dims = (values, ("time", dim)) if dim else (values[:, 0], ("time",))
-    return xr.DataArray(shown, coordinates, dims, quantity.name, attributes)
+    return xr.DataArray(shown, {name: run[name].variable for name in dims}, dims, quantity.name, attributes)
 
 
 def owners(run: xr.Dataset) -> dict[str, dict[str, bool]]:

@@ -19,13 +19,14 @@ Value = Any
 class Axis:
     """One parameter. values: for the scene, those of all points or of one dimension of the grid.
 
-    unit: SI unit of the values where they were written with a unit; else empty.
+    unit: SI unit of the values where they were written with a unit; else empty.  written: that unit as written.
     """
 
     name: str
     places: tuple[str, ...]
     values: tuple[Value, ...]
     unit: str
+    written: str = ""
 
     @property
     def coordinate(self) -> list[float] | list[str]:
@@ -77,7 +78,8 @@ def _listed(sweep: Sweep, name: str) -> Axis:
     parameter = sweep.vary[name]
     if parameter.values is not None:
         units = {number_and_unit(v)[1] for v in parameter.values if _is_number(v)}
-        return Axis(name, sweep.places(name), parameter.values, units.pop() if len(units) == 1 else "")
+        unit = units.pop() if len(units) == 1 else ""
+        return Axis(name, sweep.places(name), parameter.values, unit, unit and _written(parameter.values[0]))
     a, b = parameter.numbers("first", "last")
     spaced = np.geomspace if parameter.spacing == "log" else np.linspace
     return _numbered(sweep, name, spaced(a, b, parameter.count or 2))
@@ -99,7 +101,13 @@ def _sampled(sweep: Sweep, name: str, fractions: np.ndarray) -> Axis:
 def _numbered(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:
     unit = sweep.vary[name].unit
     values = tuple(f"{x!r} {unit}" if unit else x for x in numbers.tolist())
-    return Axis(name, sweep.places(name), values, unit)
+    given = sweep.vary[name]
+    return Axis(name, sweep.places(name), values, unit, unit and _written(given.first or given.mean))
+
+
+def _written(value: Value) -> str:
+    """Return the unit with which a number was written."""
+    return value.strip().partition(" ")[2].strip() if isinstance(value, str) else ""
 
 
 def _unit_points(sample: Sample, parameters: int) -> np.ndarray:

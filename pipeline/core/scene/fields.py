@@ -4,7 +4,7 @@ import math
 import re
 from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import (
     AfterValidator,
@@ -159,8 +159,18 @@ class Part(BaseModel):
         frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True, use_attribute_docstrings=True
     )
 
+    #: begin of the paths of its keys, as messages show it
+    _owner: ClassVar[str] = "PART."
+
     source: Source | None = None
     """where the values come from; 'assumed: why' for an assumption"""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raise AttributeError for keys, as a scene is changed by copies; set private attributes."""
+        if name in type(self).model_fields:
+            remedy = f'fc.edited(scene, {{"{self._owner}{name}": {value!r}}}) returns a changed copy'
+            raise AttributeError(f"{name}: a scene and its parts cannot be changed in place; {remedy}")
+        super().__setattr__(name, value)
 
 
 class OnCoordinate(Part):

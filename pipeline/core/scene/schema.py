@@ -1,7 +1,7 @@
 """A whole scene as one frozen model; all towers receive a `Scene`."""
 
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -13,6 +13,7 @@ from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part
 from flexclear.pipeline.core.scene.formulas import check_formulas
 from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
+from flexclear.pipeline.core.scene.notebook import as_html
 from flexclear.pipeline.core.scene.output import Output
 from flexclear.pipeline.core.scene.owners import owners
 from flexclear.pipeline.core.scene.parts import (
@@ -178,6 +179,8 @@ def _requested(name: str, value: Any) -> Any:
 
 class Scene(Part):
     """The content of a scene file after composition. Names of parts are keys."""
+
+    _owner: ClassVar[str] = ""
 
     title: str
     """description in one line"""
@@ -371,6 +374,10 @@ class Scene(Part):
         return f"<Scene {self.name}: {self.summary()}; {self.time.start:g} to {self.time.end:g} s>"
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """Return the title, the times and a table of the parts by kind, for a notebook."""
+        return as_html(self)
 
     def summary(self) -> str:
         """Return the numbers of parts by kind, in words."""

@@ -97,3 +97,12 @@ class StoppedError(FlexclearError):
         super().__init__(why)
         self.partial, self.interrupted = partial, interrupted
         self.exit_code = INTERRUPTED if interrupted else ResourceError.exit_code
+
+
+def error_of(exit_code: int, place: str, text: str) -> FlexclearError:
+    """Return an error of the class with this exit code from a message that is complete already."""
+    kind = {one.exit_code: one for one in (InputError, SolverError, ResourceError)}.get(exit_code, FlexclearError)
+    error = _as_it_was(kind, (text,))
+    if isinstance(error, InputError):
+        error.place, error.problem, error.remedy = place, text, None
+    return error

@@ -61,21 +61,24 @@ class StartPose:
     refused: InputError | None
 
 
-def start_pose(scene: Scene, bundles: Mapping[str, Labelled], drawn: Mapping[str, xr.Dataset]) -> StartPose:
+def start_pose(
+    scene: Scene, placed: Scene, bundles: Mapping[str, Labelled], drawn: Mapping[str, xr.Dataset]
+) -> StartPose:
     """Return the start that the joints allow or, where they do not fit, the start by poses and the tree of the joints.
 
-    bundles: mass, inertia, frames of undeformed flexible bodies, by name.  drawn: the same for all bodies with a mesh.
-    Raises InputError where not even the tree of the joints can be built.
+    placed: the scene whose joints place the bodies, such as the ideal mechanism of the scene.  bundles: mass, inertia,
+    frames of undeformed flexible bodies, by name.  drawn: the same for all bodies with a mesh.  Raises InputError where
+    not even the tree of the joints can be built.
     """
-    mechanism, refused = build(scene, bundles), None
+    mechanism, refused = build(placed, bundles), None
     try:
         mechanism = assembled(mechanism)
     except InputError as error:
         refused, mechanism = error, _open(mechanism)
-    starts = given_coordinates(scene)
+    starts = given_coordinates(placed)
     poses = [link.start for link in mechanism.links]
     gaps = [] if refused is None else _gaps(mechanism, constraints(mechanism, starts=starts), poses)
-    return StartPose(_data(mechanism, drawn), (*gaps, *_loose(mechanism)), refused)
+    return StartPose(_data(scene, mechanism, drawn), (*gaps, *_loose(mechanism)), refused)
 
 
 def _open(mechanism: Mechanism) -> Mechanism:
@@ -111,10 +114,10 @@ def _loose(mechanism: Mechanism) -> list[Gap]:
     return result
 
 
-def _data(mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def _data(scene: Scene, mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
     import xarray as xr
 
-    scene, names = mechanism.scene, mechanism.moving_bodies
+    names = mechanism.moving_bodies
     poses = {name: _pose(mechanism, name) for name in scene.body}
     centres = []
     for name in names:

@@ -278,6 +278,7 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[C
         axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
         axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
         axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
+    style.flatten(axes)
     time = drawn[0].time
     axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)", title=f"{drawn[0].title} ({unit})")
 
@@ -306,6 +307,7 @@ def _distance(
         axes.plot(1e3 * time, factor * values, color=own[k], lw=0.9)
     time = lines[0][1]
     axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)")
+    style.flatten(axes)
     axes.set_ylim(bottom=0.0)
     axes.set_title(f"from the reference ({written})")
 

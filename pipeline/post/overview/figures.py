@@ -101,6 +101,7 @@ def _sheet(
         for label, (values, look) in lines.items():
             panel.plot(1e3 * time, values, label=label, **look)
         panel.set(title=title, xlim=(1e3 * time[0], 1e3 * time[-1]))
+        style.flatten(panel)
     for panel in figure.axes[-columns:]:
         panel.set_xlabel("time (ms)")
     if legend:
@@ -155,16 +156,17 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
     force = _without_noise(run, post["reaction"].values, "N")
     drives = [str(name) for name in run["drive"].values] if "drive_force" in run else []
     chosen = _chosen(names, first, force.max(axis=0), JOINTS)
+    loaded = [k for k in chosen if force[:, k].any()]
     panels: list[Panel] = [
-        (f"{names[k]}: force (N)", {"": (force[:, k], {"color": "#0072B2", "lw": 0.9})}) for k in chosen
+        (f"{names[k]}: force (N)", {"": (force[:, k], {"color": "#0072B2", "lw": 0.9})}) for k in loaded
     ]
     for k, name in enumerate(drives):
         title = f"{name}: drive ({quantities.unit(run, Quantity(name, 'drive_force'))})"
         panels.append((title, {"": (run["drive_force"].values[:, k], {"color": "#D55E00", "lw": 0.9})}))
-    below = "magnitude of the joint force"
-    return _sheet(
-        "reactions", run["time"].values, panels, 2, (f"Reactions and drives{_rest(len(names), JOINTS)}", below)
-    )
+    unloaded = [names[k] for k in chosen if k not in loaded]
+    below = "; no force: ".join(["magnitude of the joint force", *filter(None, [", ".join(unloaded)])])
+    heading = f"Reactions and drives{_rest(len(names), JOINTS)}", below
+    return _sheet("reactions", run["time"].values, panels, 2, heading) if panels else {}
 
 
 def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
@@ -172,27 +174,35 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
     names, joints = [str(name) for name in run["contact"].values], parameters(run).get("joint", {})
     chosen = _chosen(names, first, post["peak_force"].values, CONTACTS)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
-    for row, k in zip(axes, chosen, strict=True):
+    for place, (row, k) in enumerate(zip(axes, chosen, strict=True)):
         unit = quantities.unit(run, Quantity(names[k], "peak_force"))
+        gaps = run["contact_gap"].values[:, k]
+        factor, small = by_unit({"": gaps}, "m" if unit == "N" else "rad")
+        gap = f"gap ({small})"
         if names[k] in joints:
             orbit(row[0], run, float(post["clearance"].values[k]), k)
-            row[0].set_title(f"{names[k]}: {centre(run, k)}")
+            row[0].set_title(f"{names[k]}\n{centre(run, k)}")  # a line of its own, since names may be long
         else:  # the end of a stop
-            row[0].set_visible(False)
-        small = "µm" if unit == "N" else "µrad"
-        _over_time(row[1], run, 1e6 * run["contact_gap"].values[:, k], f"{names[k]}: gap ({small})")
+            gap = f"{names[k]}\n{gap}"
+            row[0].remove()
+            row[1].set_subplotspec(row[1].get_gridspec()[place, :2])
+        _over_time(row[1], run, factor * gaps, gap)
         row[1].axhline(0.0, color=style.SOFT, lw=0.8)
         fraction = float(post["contact_time_share"].values[k])
         count = impacts(int(post["impact_count"].values[k]), fraction)
         peak = float(post["peak_force"].values[k])
         pushes = "normal force" if unit == "N" else "torque"
         _over_time(row[2], run, run["contact_normal_force"].values[:, k])
-        row[2].set_title(f"{names[k]}: {pushes} ({unit})", pad=16)
+        for curve in filter(None, curves([run], Quantity(names[k], "peak_force"))):  # shorter than the outputs show
+            row[2].vlines(1e3 * curve.peaks[:, 0], 0.0, curve.peaks[:, 1], color="#D55E00", lw=0.6)
+            row[2].plot(1e3 * curve.peaks[:, 0], curve.peaks[:, 1], ".", color="#D55E00", ms=3)
+        row[2].set_title(f"{pushes} ({unit})", pad=16)
         # a separate line: next to the title it would be cut off
         closed = "" if "hardly" in count else f", {fraction:.0%} of the time in contact"
         text = f"{count}, peak {measured(peak, np.nan, unit)}{closed}"
         row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
-    style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
+    kinds = dict.fromkeys("joints with clearance" if names[k] in joints else "stops" for k in chosen)
+    style.heading(figure, f"{' and '.join(kinds).capitalize()}{_rest(len(names), CONTACTS)}")
     return style.files("contacts", figure)
 
 
@@ -200,6 +210,7 @@ def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str = "")
     time = 1e3 * run["time"].values
     axes.plot(time, values, color="#D55E00", lw=0.8)
     axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=title)
+    style.flatten(axes)
 
 
 def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[np.ndarray, np.ndarray]:
@@ -223,7 +234,7 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
     axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.6, alpha=0.8)
-    reach = 1.15 * radius
+    reach = max(1.15 * radius, 1.05 * float(np.abs(offset[:, [i, j]]).max()))
     axes.set(xlabel="xyz"[i], ylabel="xyz"[j], aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
     axes.set_title(centre(run, contact))
     return offset[:, i], offset[:, j]

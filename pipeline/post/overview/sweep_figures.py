@@ -13,12 +13,17 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from flexclear.pipeline.core.scene import units
+from flexclear.pipeline.core.scene.load import FAMILIES
+from flexclear.pipeline.core.scene.quantity import KINDS
 from flexclear.pipeline.post.plotting.style import INK, SOFT, files, heading, panels, plain, style
 
 COLUMNS = 2
 LINE, REFUSED = "#0072B2", "#D55E00"
 #: ratio of a parameter's largest to its least value above which its axis is logarithmic
 DECADE = 8.0
+#: largest number of values along the axis of a map that are all written
+FEW = 8
 #: factors for handy numbers on an axis
 HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
 NAME = "sweep"
@@ -40,7 +45,7 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
         figure, axes = panels(len(shown), columns, 9.6, 1.0, 2.9 if columns > 1 else 4.2)
         for ax, name in zip(axes, shown, strict=True):
             draw(figure, ax, shown[name], name)
-            ax.set_title(name)
+            ax.set_title(_in_words(name))
         refused = int((sweep["status"] == 1).sum())
         missing = int((sweep["status"] == 2).sum())
         sentences = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
@@ -134,7 +139,7 @@ def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
         ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     for value in x[sweep["status"].values == 1]:
         ax.axvline(value, color=REFUSED, lw=0.8, ls=":")
-    if x.min() > 0.0 and x.max() > DECADE * x.min():
+    if _in_decades(x):
         ax.set_xscale("log")
         plain(ax.xaxis)
     _label(ax, sweep, parameter, name)
@@ -158,12 +163,33 @@ def _parameter(sweep: xr.Dataset) -> str:
 def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     rows, columns = (str(dim) for dim in sweep["status"].dims)
     x, y = (sweep[dim].values * _scale(sweep, dim)[0] for dim in (columns, rows))
-    mesh = ax.pcolormesh(x, y, sweep[name].values, shading="nearest", cmap="viridis")
+    mesh = ax.pcolormesh(_edges(x), _edges(y), sweep[name].values, cmap="viridis")
+    for axis, values, scale in ((ax.xaxis, x, ax.set_xscale), (ax.yaxis, y, ax.set_yscale)):
+        if _in_decades(values):
+            scale("log")
+            plain(axis)
+        if len(values) <= FEW:  # the cells' own values, which may be uneven
+            axis.set_ticks(values, labels=[f"{value:.6g}" for value in values])
+            axis.set_ticks([], minor=True)
     _color_bar(figure, ax, mesh, _written(sweep[name].attrs["units"]))
     ax.grid(False)
     refused = np.argwhere(sweep["status"].values == 1)
     ax.plot(x[refused[:, 1]], y[refused[:, 0]], "x", color=REFUSED, ms=4.0)
     ax.set(xlabel=_axis(sweep, columns), ylabel=_axis(sweep, rows))
+
+
+def _in_decades(values: np.ndarray) -> bool:
+    """Return True for values that a logarithmic axis shows better."""
+    return bool(values.min() > 0.0 and values.max() > DECADE * values.min())
+
+
+def _edges(values: np.ndarray) -> np.ndarray:
+    """Return the borders of cells about values that go up: halfway between them, on the scale of their axis."""
+    logarithmic = _in_decades(values)
+    at = np.log(values) if logarithmic else values
+    step = np.diff(at) if at.size > 1 else np.array([1.0])
+    borders = np.concatenate([[at[0] - 0.5 * step[0]], at[:-1] + 0.5 * np.diff(at), [at[-1] + 0.5 * step[-1]]])
+    return np.exp(borders) if logarithmic else borders
 
 
 def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
@@ -193,13 +219,15 @@ def _label(ax: Axes, sweep: xr.Dataset, parameter: str, name: str) -> None:
 
 
 def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:
-    unit = sweep[parameter].attrs.get("units", "")
+    unit, written = (sweep[parameter].attrs.get(key, "") for key in ("units", "written_units"))
+    if written and (known := units.unit(written)):
+        return 1.0 / known[0], written
     return HANDY.get(unit, (1.0, _written(unit)))
 
 
-def _written(units: str) -> str:
+def _written(unit: str) -> str:
     """Return the units of a dataset in common notation: ``m/s`` for ``m s-1``, nothing for ``1``."""
-    parts = [] if units == "1" else units.split()
+    parts = [] if unit == "1" else unit.split()
     over, under = ([p for p in parts if ("-" in p) == below] for below in (False, True))
     powers = re.compile(r"(?<=[A-Za-z])-?(\d+)")
     written = [powers.sub(lambda m: "" if m[1] == "1" else f"$^{m[1]}$", " ".join(some)) for some in (over, under)]
@@ -208,4 +236,21 @@ def _written(units: str) -> str:
 
 def _axis(sweep: xr.Dataset, parameter: str) -> str:
     unit = _scale(sweep, parameter)[1]
-    return f"{parameter} ({unit})" if unit else parameter
+    return f"{_of_part(parameter)} ({unit})" if unit else _of_part(parameter)
+
+
+def _of_part(path: str) -> str:
+    """Return a key path in words: ``clearance of pin`` for ``joint.pin.clearance``."""
+    first, *keys = path.replace("_", " ").split(".")
+    return f"{' '.join(keys[1:])} of {keys[0]}" if first in FAMILIES and len(keys) > 1 else " ".join([first, *keys])
+
+
+def _in_words(name: str) -> str:
+    """Return a recorded quantity in words: ``platform: velocity, largest`` for ``platform.velocity.largest``."""
+    path, blank, axis = name.partition(" ")
+    parts = path.split(".")
+    kind = next((k for k, part in enumerate(parts) if part in KINDS), 0)
+    if not kind or "(" in name:
+        return name
+    words = ", ".join(part.replace("_", " ") for part in parts[kind:])
+    return f"{'.'.join(parts[:kind])}: {words}{blank}{axis}"

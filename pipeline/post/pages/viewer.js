@@ -33,11 +33,11 @@
     const s = Math.sin(angle), c = Math.cos(angle), w = cross(axis, v), d = dot(axis, v) * (1 - c);
     return v.map((x, k) => x * c + w[k] * s + axis[k] * d);
   };
-  const placed = (t, k) => { // a track's row: position, then quaternion w x y z -> matrix by columns
-    const [x, y, z, w, a, b, c] = t.subarray(7 * k, 7 * k + 7);
+  const placed = (t, k) => { // a track's row: position, quaternion w x y z, stretch along z -> matrix by columns
+    const [x, y, z, w, a, b, c, s] = t.subarray(8 * k, 8 * k + 8);
     return [1 - 2 * (b * b + c * c), 2 * (a * b + w * c), 2 * (a * c - w * b), 0,
       2 * (a * b - w * c), 1 - 2 * (a * a + c * c), 2 * (b * c + w * a), 0,
-      2 * (a * c + w * b), 2 * (b * c - w * a), 1 - 2 * (a * a + b * b), 0, x, y, z, 1];
+      s * 2 * (a * c + w * b), s * 2 * (b * c - w * a), s * (1 - 2 * (a * a + b * b)), 0, x, y, z, 1];
   };
   const UNMOVED = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
   const shown = (value) => Number(value.toPrecision(3)).toString();

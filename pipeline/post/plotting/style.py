@@ -107,6 +107,12 @@ def panels(
     return figure, list(axes.flat[:count])
 
 
+def flatten(axes: Axes) -> None:
+    """Mark only 0 on the upright axis where all lines are zero: its range would be made up."""
+    if not any(np.any(np.nan_to_num(np.asarray(line.get_ydata(), dtype=float))) for line in axes.lines):
+        axes.set(ylim=(-1.0, 1.0), yticks=[0.0])
+
+
 def scale_of(axes: Axes) -> str:
     """Return the scale for errors: logarithmic where a line of the axes has a positive value, else linear."""
     values = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]

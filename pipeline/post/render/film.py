@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.overview.curves import in_unit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render import film_speed, mechanism, ruler
+from flexclear.pipeline.post.render import film_speed, layout, mechanism, ruler
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
@@ -131,9 +131,9 @@ def _flexible(scene: pv.Plotter, drawn: mechanism.Mechanism, body: mechanism.Fle
 def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, impact: bool) -> None:
     for part, actor in zip(drawn.parts, actors.parts, strict=True):
         if part.owner is not None:
-            actor.user_matrix = mechanism.part_pose(drawn.run, part, step)
+            actor.user_matrix = layout.part_pose(drawn.run, part, step)
         if part.contact is not None:
-            actor.prop.color = mechanism.IMPACT_COLOR if impact else mechanism.CLEARANCE_COLOR
+            actor.prop.color = layout.IMPACT_COLOR if impact else layout.CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
         mesh.points, mesh["shade"] = mechanism.placed(drawn.run, bent, step)[0], mechanism.shade(drawn.run, bent, step)
 
@@ -197,5 +197,6 @@ def shading(bundle: xr.Dataset) -> dict[str, Any]:
 
 def image(scene: pv.Plotter) -> np.ndarray:
     """Return the current picture as bytes, shape (height, width, 3)."""
+    scene.reset_camera_clipping_range()  # the parts have moved
     scene.render()  # else a second screenshot would show the first one again
     return np.asarray(scene.screenshot(return_img=True))

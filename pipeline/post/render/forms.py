@@ -35,6 +35,8 @@ LARGEST = 0.1
 TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")
 SLIDING = ("prismatic", "cylindrical")
 BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
+#: frames on a body at which a load acts, and at which nothing does
+LOADED, BARE = "load", "frame"
 #: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits
 ROUND = 0.01
 #: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are visible
@@ -50,7 +52,8 @@ _SIDES = {
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """A joint's frame on a body: name, origin and axes in the body's axes, joint type, True for the first side."""
+    """A frame on a body: name, origin and axes in the body's axes, type of its joint (or LOADED, BARE), True for the
+    first side."""
 
     frame: str
     origin: np.ndarray
@@ -103,10 +106,15 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     com: centre of mass [m].  solid: equivalent solid about it, or None.  size: of the mechanism [m].  layer: counts
     bodies, so that flat links in one plane have different thicknesses and their faces do not coincide.
     """
-    joined = [seat for seat in seats if seat.joint != "fixed"] or list(seats)
-    points = _distinct([seat.origin for seat in (*joined, *seats)], NEAR * WIDTH * size)
+    used = [seat for seat in seats if seat.joint != BARE]
+    joined = [seat for seat in used if seat.joint not in ("fixed", LOADED)]
+    joined = joined or [seat for seat in used if seat.joint != LOADED]
+    points = _distinct([seat.origin for seat in (*joined, *used)], NEAR * WIDTH * size)
     if len(points) < 2:
-        return _lone(joined, points, com, solid, size)
+        far = _beyond(points, seats, joined, com, solid, size)
+        if len(far) < 2:
+            return _lone(joined, points, com, solid, size)
+        points = far
     spans = np.linalg.norm(points[:, None] - points[None], axis=-1)
     width = min(WIDTH * size, WIDEST * float(spans.max()))
     normal = _common_axis(joined)
@@ -122,6 +130,19 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     middle = points.mean(axis=0)
     bars = [surfaces.bar(middle, point, 0.8 * width) for point in points if np.linalg.norm(point - middle) > width]
     return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
+
+
+def _beyond(
+    points: np.ndarray, seats: Sequence[Seat], joined: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float
+) -> np.ndarray:
+    """Return points that show a body with one joint, or none, by its other frames too; empty where a block, a wheel or
+    its equivalent solid shows it better."""
+    arm = len(points) > 0 and np.linalg.norm(com - points[0]) > 1.5 * WIDTH * size
+    kinds = {seat.joint for seat in joined}
+    if (solid is not None and not joined) or (not arm and kinds & {*SLIDING, *TURNING}):
+        return np.empty((0, 3))
+    frames = _distinct([*points, *(seat.origin for seat in seats)], NEAR * WIDTH * size)
+    return _distinct([*frames, com], NEAR * WIDTH * size) if arm and len(frames) > 1 else frames
 
 
 def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
@@ -188,11 +209,26 @@ def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Sur
     width, axes = WIDTH * size, surfaces.along(seat.axes[:, 2])
     if not inner:
         return surfaces.moved(_disc(radius, width), seat.origin, axes)
-    half, outer = 0.5 * width, radius + width
-    profile = np.array([[radius, -half], [outer, -half], [outer, half], [radius, half], [radius, -half]])
-    ring = surfaces.turned(profile, 4 * surfaces.ROUND)
-    mark = surfaces.moved(surfaces.box((0.8 * width, 0.5 * width, 1.3 * width)), np.array([radius + half, 0.0, 0.0]))
-    return surfaces.moved(surfaces.merged([ring, mark]), seat.origin, axes)
+    middle = np.array([radius + 0.5 * width, 0.0, 0.0])
+    mark = surfaces.moved(surfaces.box((0.8 * width, 0.5 * width, 1.3 * width)), middle)
+    return surfaces.moved(surfaces.merged([ring(radius, radius + width, width), mark]), seat.origin, axes)
+
+
+def ring(inner: float, outer: float, thick: float) -> Surface:
+    """Return a ring about z."""
+    half = 0.5 * thick
+    profile = np.array([[inner, -half], [outer, -half], [outer, half], [inner, half], [inner, -half]])
+    return surfaces.turned(profile, 4 * surfaces.ROUND)
+
+
+def coil(radius: float, length: float, wire: float) -> Surface:
+    """Return a helical spring along z from the origin; it begins and ends on the axis."""
+    turns = int(np.clip(length / (1.2 * radius), 3, 10))
+    angle = np.linspace(0.0, 2.0 * np.pi * turns, 20 * turns)
+    height = length * np.linspace(0.12, 0.88, angle.size)
+    helix = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    return surfaces.tube(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, helix[0, 2]], *helix, [0.0, 0.0, helix[-1, 2]],
+                                   [0.0, 0.0, length]]), wire)  # fmt: skip
 
 
 def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
@@ -235,7 +271,7 @@ def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
     if not axes or any(abs(axis @ axes[0]) < 0.999 for axis in axes):
         return None
     slides = [seat.axes[:, 2] for seat in seats if seat.joint in SLIDING]
-    others = [seat for seat in seats if seat.joint not in (*TURNING, *SLIDING, *BALLS)]
+    others = [seat for seat in seats if seat.joint not in (*TURNING, *SLIDING, *BALLS, LOADED)]
     return None if others or any(abs(axis @ axes[0]) > 0.05 for axis in slides) else axes[0]
 
 

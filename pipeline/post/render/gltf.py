@@ -15,7 +15,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
-from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
+from flexclear.pipeline.post.render.layout import part_pose, pose
+from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.shapes.body_shape import fields_of, hertz, linear_fields
 
@@ -149,7 +150,12 @@ def _bent(file: _File, body: Flexible, name: str, q: np.ndarray) -> tuple[int, n
 
 def _follow(file: _File, node: int, times: int, matrices: np.ndarray) -> None:
     file.move(node, "translation", times, matrices[:, :3, 3])
-    quaternions = np.array([matrix_to_quaternion(matrix[:3, :3]) for matrix in matrices])
+    stretch = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    if not np.allclose(stretch, 1.0):
+        file.move(node, "scale", times, stretch)
+    quaternions = np.array(
+        [matrix_to_quaternion(matrix[:3, :3] / s) for matrix, s in zip(matrices, stretch, strict=True)]
+    )
     for k in range(1, len(quaternions)):  # the shorter rotation from each to the next
         if quaternions[k] @ quaternions[k - 1] < 0.0:
             quaternions[k] = -quaternions[k]

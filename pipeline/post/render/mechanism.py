@@ -10,11 +10,25 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.render import forms, surfaces
 from flexclear.pipeline.post.render.forms import Seat, Solid, Wheel, equivalent, wheels
+from flexclear.pipeline.post.render.layout import (
+    CLEARANCE_COLOR,
+    GROUND_COLOR,
+    JOINT_COLOR,
+    PIN,
+    SOCKET_COLOR,
+    Layout,
+    Part,
+    centre_at_rest,
+    names,
+    part_pose,
+    pose,
+    samples,
+    travel,
+)
+from flexclear.pipeline.post.render.load_parts import loads
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
 from flexclear.pipeline.post.shapes import body_shape
@@ -23,35 +37,15 @@ from flexclear.pipeline.post.single_run.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
 COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")
-JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf", "#E69F00", "#d7191c"
-GROUND_COLOR = "#8d98a4"
-#: fractions of the mechanism's size: joint spheres without a known ball radius, radius of pins, thickness of rails
-BALL, PIN, RAIL = 0.022, 0.011, 0.008
+#: fractions of the mechanism's size: joint spheres without a known ball radius, thickness of rails
+BALL, RAIL = 0.022, 0.008
 #: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
 SOCKET = 1.3
 #: size of a mechanism without extent: one body that rests [m]
 LONE = 1.0
-#: outputs at which the program measures the extent of a mechanism
-SAMPLES = 24
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
 #: largest drawn deformation as a fraction of the body's length
 DEFORMATION_SHARE = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A solid that moves with a body.
-
-    surface: about the body's centre of mass, or about the origin of `frame`, in the body's axes; for the ground in the
-    world.  contact: its column among the contacts, where it shows a joint with clearance.
-    """
-
-    owner: int | None  #: index of the body in the run; None for the ground
-    surface: Surface
-    color: str
-    opacity: float = 1.0
-    frame: int | None = None
-    contact: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,66 +94,6 @@ class Mechanism:
     stress: float | None = None  #: stress at the upper end of the colours [Pa], where they show stress
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """Poses of the bodies and frames of a run. given: parameters of its scene.  bundles: by name of the body."""
-
-    run: xr.Dataset
-    given: Mapping[str, Any]
-    bundles: Mapping[str, xr.Dataset]
-
-    @property
-    def bodies(self) -> list[str]:
-        """Names of the moving bodies."""
-        return _names(self.run, "body")
-
-    @property
-    def frames(self) -> list[str]:
-        """Names of the frames whose positions are recorded."""
-        return _names(self.run, "frame")
-
-    def owner(self, frame: str) -> int | None:
-        """Return the index of the body that has a frame; None for the ground."""
-        body = frame.partition(".")[0]
-        return self.bodies.index(body) if body in self.bodies else None
-
-    def local(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return origin [m] and axes (columns) of a frame in those of its body."""
-        body, _, name = frame.partition(".")
-        if body in self.bundles:
-            data = self.bundles[body].sel(frame=name)
-            return data["frame_position"].values, data["frame_rotation"].values
-        pose = Pose.model_validate(self.given.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
-        return np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())
-
-    def at_start(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return origin [m] and axes of a frame, in the world, at the first output."""
-        (origin, axes), owner = self.local(frame), self.owner(frame)
-        if owner is None:
-            return origin, axes
-        matrix = pose(self.run, owner, 0)
-        recorded = frame in self.frames
-        where = self.run.frame_position.values[0, self.frames.index(frame)] if recorded else matrix[:3, 3]
-        return where, matrix[:3, :3] @ axes
-
-    def centre(self, body: str) -> np.ndarray:
-        """Return the centre of mass of a moving body at rest, in its axes [m]."""
-        if body in self.bundles:
-            return centre_at_rest(self.bundles[body])
-        return np.array(self.given["body"][body].get("com", (0.0, 0.0, 0.0)))
-
-    def seated(self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
-        """Return a part at a frame, given in the frame's axes."""
-        (origin, axes), owner = self.local(frame), self.owner(frame)
-        if owner is None:
-            return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
-        if frame in self.frames:
-            number = self.frames.index(frame)
-            return Part(owner, surfaces.moved(part, np.zeros(3), axes), color, opacity, number, contact)
-        origin = origin - self.centre(frame.partition(".")[0])
-        return Part(owner, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
-
-
 def mechanism(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None, *, stressed: bool = False
 ) -> Mechanism:
@@ -179,39 +113,25 @@ def mechanism(
     positions = run.frame_position.values if at.frames else run.position.values
     shown = np.concatenate([positions.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
-    parts = (*_bodies(at, looks, size), *_joints(at, size))
+    bodies = tuple(_bodies(at, looks, size))
+    parts = (*bodies, *_joints(at, size), *loads(at, size, bodies))
     chosen_view = view(run, at.given, looks.direction, looks.up)
     top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
-    return Mechanism(run, parts, flexible, chosen_view, size, _cloud(run, parts, flexible), looks, top)
+    shown = cloud(run, parts, flexible, samples(run))
+    return Mechanism(run, parts, flexible, chosen_view, size, shown, looks, top)
 
 
-def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
-    """Return corners of the boxes of all parts, and points of flexible bodies, at some outputs of the run."""
+def cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible], steps: Sequence[int]) -> np.ndarray:
+    """Return corners of the boxes of all parts, and points of flexible bodies, at these outputs of the run."""
     clouds = []
-    for step in np.unique(np.linspace(0, run.sizes["time"] - 1, SAMPLES).astype(int)):
+    for step in steps:
         for part in parts:
             low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
             corners = np.where(_CORNERS, high, low)
-            matrix = part_pose(run, part, int(step))
+            matrix = part_pose(run, part, step)
             clouds.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
-        clouds += [placed(run, body, int(step))[0][::7] for body in flexible]
+        clouds += [placed(run, body, step)[0][::7] for body in flexible]
     return np.concatenate(clouds) if clouds else run.position.values[0]
-
-
-def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
-    """Return the homogeneous matrix of a body, from axes through its centre of mass to the world."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = quaternion_to_matrix(run.quaternion.values[step, index])
-    matrix[:3, 3] = run.position.values[step, index]
-    return matrix
-
-
-def part_pose(run: xr.Dataset, part: Part, step: int) -> np.ndarray:
-    """Return the homogeneous matrix from the axes of a part's surface to the world."""
-    matrix = np.eye(4) if part.owner is None else pose(run, part.owner, step)
-    if part.frame is not None:
-        matrix[:3, 3] = run.frame_position.values[step, part.frame]
-    return matrix
 
 
 def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
@@ -226,7 +146,7 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
 def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
     """Return the coloured values at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
     if body.stressed:
-        return body_shape.stress_on_surface(run, body.bundle, _names(run, "body")[body.index], step)
+        return body_shape.stress_on_surface(run, body.bundle, names(run, "body")[body.index], step)
     return placed(run, body, step)[1]
 
 
@@ -238,28 +158,21 @@ def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surf
     return surfaces.shaded(points, surfaces.triangulated(faces(bundle)), sharp=sharp)
 
 
-def centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
-    """Return the centre of mass in the bundle's axes [m]; it is the run's position, unlike the bundle's origin."""
-    moment: np.ndarray = bundle.first_moment.values
-    return moment / float(bundle.mass)
-
-
 def rest(bundle: xr.Dataset) -> np.ndarray:
     """Return points of the skin of an undeformed body, its centre of mass at the origin [m], shape (point, 3)."""
     return surface(bundle, np.zeros(bundle.sizes["mode"]))[0] - centre_at_rest(bundle)
 
 
-def _names(run: xr.Dataset, dim: str) -> list[str]:
-    """Return the names along a dimension; none where the run lacks the dimension."""
-    return [str(name) for name in run[dim].values] if dim in run.coords else []
-
-
 def _seats(at: Layout) -> dict[str, list[Seat]]:
-    """Return the joints' frames on each body."""
+    """Return the frames on each body: those of joints, then those of loads, then all others."""
+    sites = [(joint["type"], joint["between"]) for joint in at.given.get("joint", {}).values()]
+    sites += [(forms.LOADED, load.get("between", [load.get("frame")])) for load in at.given.get("load", {}).values()]
+    bodies = at.given.get("body", {}).items()
+    sites += [(forms.BARE, [f"{name}.{frame}" for frame in body.get("frames", ())]) for name, body in bodies]
     by_body: dict[str, list[Seat]] = {}
-    for joint in at.given.get("joint", {}).values():
-        for k, frame in enumerate(joint["between"]):
-            seat = Seat(frame, *at.local(frame), joint["type"], k == 0)
+    for kind, frames in sites:
+        for k, frame in enumerate(filter(None, frames)):
+            seat = Seat(frame, *at.local(frame), kind, k == 0)
             by_body.setdefault(frame.partition(".")[0], []).append(seat)
     return by_body
 
@@ -305,7 +218,7 @@ def _with_wheels(
 
 def _joints(at: Layout, size: float) -> Iterator[Part]:
     """Yield balls, pins, rails, crosses and planes of the joints."""
-    contacts = _names(at.run, "contact")
+    contacts = names(at.run, "contact")
     for name, joint in at.given.get("joint", {}).items():
         kind, (first, second) = joint["type"], joint["between"]
         contact = contacts.index(name) if name in contacts else None
@@ -331,7 +244,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
             elif grounded:
                 yield at.seated(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
         elif kind in forms.SLIDING:
-            low, high = _travel(at.run, name)
+            low, high = travel(at.run, name)
             rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
             middle = np.array([0.0, 0.0, 0.5 * (low + high)])
             yield at.seated(first, surfaces.moved(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
@@ -357,15 +270,6 @@ def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
     return surfaces.moved(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
 
 
-def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
-    """Return least and largest displacement along a joint's axis [m], that of the assembled start included."""
-    for name in (joint, f"{joint}.translation"):
-        if "coordinate" in run.coords and name in run.coordinate.values:
-            values = run.joint_position.sel(coordinate=name).values
-            return min(0.0, float(values.min())), max(0.0, float(values.max()))
-    return 0.0, 0.0
-
-
 def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
     columns = np.flatnonzero(run.mode_body.values == name)
     q = run.modal_coordinate.values[:, columns]
@@ -375,4 +279,4 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, s
     shown = stressed and name in body_shape.stress_recorded(run)
     if stressed:  # grey does not look like a stress
         color = None if shown else GROUND_COLOR
-    return Flexible(_names(run, "body").index(name), bundle, columns, scale, color, shown)
+    return Flexible(names(run, "body").index(name), bundle, columns, scale, color, shown)

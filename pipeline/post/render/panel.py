@@ -197,6 +197,7 @@ def _curve(axes: style.Axes, run: xr.Dataset, values: np.ndarray, color: str, wi
     axes.plot(time, values, color=color, lw=width)
     axes.set(xlabel="time (ms)", xlim=(time[0], time[-1]))
     axes.locator_params(axis="x", nbins=5)  # else they change with the width that the layout leaves
+    style.flatten(axes)
     return Cursor(_dot(axes, 6), time, values)
 
 

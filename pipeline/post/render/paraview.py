@@ -15,7 +15,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.render import surfaces
-from flexclear.pipeline.post.render.mechanism import Mechanism, part_pose, placed, skin
+from flexclear.pipeline.post.render.layout import part_pose
+from flexclear.pipeline.post.render.mechanism import Mechanism, placed, skin
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.shapes.body_shape import surface
 from flexclear.pipeline.post.single_run.series import parameters

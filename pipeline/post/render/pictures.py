@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, cast
 
@@ -19,7 +19,7 @@ from flexclear.pipeline.post.overview import figures
 from flexclear.pipeline.post.pages import media, viewer, viewer_page
 from flexclear.pipeline.post.plotting import mode_sheet, style
 from flexclear.pipeline.post.render import film_speed, gl, gltf, joint_view, panel, paraview, player, vibrations
-from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
+from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, cloud, mechanism
 from flexclear.pipeline.post.single_run.series import derive
 
 #: outputs of a series for ParaView, and of a glTF file
@@ -81,6 +81,7 @@ def _still(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, byte
     drawn, margin = shown.mechanism(stressed=stressed), ruler.BAR if stressed else 0
     moved = np.abs(drawn.run.position.values - drawn.run.position.values[:1]).sum(axis=(1, 2))
     step = int(np.argmax(drawn.run["von_mises_stress"].values.max(axis=1) if stressed else moved))
+    drawn = replace(drawn, cloud=cloud(drawn.run, drawn.parts, drawn.flexible, [step]))
     picture = film.still(drawn, step, margin=margin)
     return {f"{'stress' if stressed else 'mechanism'}.png": png(ruler.annotated(picture, drawn, margin))}
 

@@ -14,7 +14,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.post.overview.curves import in_unit, scaled
-from flexclear.pipeline.post.render import film_speed, joint_view, mechanism, surfaces
+from flexclear.pipeline.post.render import film_speed, joint_view, layout, mechanism, surfaces
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, axes_of, eye
 from flexclear.pipeline.post.shapes import body_shape
@@ -29,16 +29,20 @@ FRACTION = 0.12
 def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     """Return a run for the viewer: bodies on their tracks, flexible ones bent."""
     run, steps = drawn.run, _steps(drawn.run, drawn.looks, frames)
-    tracks: dict[tuple[int | None, int | None], int] = {}
+    tracks: dict[tuple[int | None, ...], tuple[int, layout.Part]] = {}
+
+    def track(part: layout.Part) -> int:
+        key = (part.owner, part.frame, None if part.ends is None else id(part))
+        return tracks.setdefault(key, (len(tracks), part))[0]
+
     meshes = []
     for part in drawn.parts:
-        key = (part.owner, part.frame)
-        track = -1 if part.owner is None else tracks.setdefault(key, len(tracks))
-        meshes.append(_still(part.surface, part.color, part.opacity) | {"track": track})
+        own = -1 if part.owner is None else track(part)
+        meshes.append(_still(part.surface, part.color, part.opacity) | {"track": own})
     for body in drawn.flexible:
-        track = tracks.setdefault((body.index, None), len(tracks))
-        meshes.append(_bent(run, body, steps) | {"track": track})
-    tracks_of = [_track(run, owner, frame, steps) for owner, frame in tracks]
+        whole = layout.Part(body.index, surfaces.EMPTY, "")
+        meshes.append(_bent(run, body, steps) | {"track": track(whole)})
+    tracks_of = [_track(run, part, steps) for _, part in tracks.values()]
     return {
         "meshes": meshes,
         "tracks": [_floats(track) for track in tracks_of],
@@ -63,7 +67,7 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
     """
     steps, shown = _steps(run, looks, FRAMES), joint_view.shown(run, contact)
     centre = run["contact_offset"].values[steps, contact]
-    unturned = np.tile([1.0, 0.0, 0.0, 0.0], (len(steps), 1))
+    unturned = np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (len(steps), 1))
     readings = [
         {"label": label, "unit": unit, "values": [float(f"{v:.4g}") for v in factor * run[name].values[steps, contact]]}
         for name, label, unit, factor in (
@@ -74,8 +78,8 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
     return {
         "meshes": [
             _still(shown.path, joint_view.PATH_COLOR, 1.0) | {"track": -1},
-            _still(shown.mark, mechanism.CLEARANCE_COLOR, 1.0) | {"track": 0},
-            _still(shown.room, mechanism.SOCKET_COLOR, 0.3) | {"track": -1},
+            _still(shown.mark, layout.CLEARANCE_COLOR, 1.0) | {"track": 0},
+            _still(shown.room, layout.SOCKET_COLOR, 0.3) | {"track": -1},
         ],
         "tracks": [_floats(np.column_stack([centre, unturned]))],
         "times": _rounded(run, steps),
@@ -168,13 +172,13 @@ def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[
     return content | ({"color": body.color, "plain": True} if body.color else {})
 
 
-def _track(run: xr.Dataset, owner: int | None, frame: int | None, steps: np.ndarray) -> np.ndarray:
-    assert owner is not None
-    part = mechanism.Part(owner, surfaces.EMPTY, "", frame=frame)
+def _track(run: xr.Dataset, part: layout.Part, steps: np.ndarray) -> np.ndarray:
+    """Return position, quaternion, and stretch along z of a part at outputs, shape (frame, 8)."""
     rows = []
     for step in steps:
-        matrix = mechanism.part_pose(run, part, int(step))
-        rows.append([*matrix[:3, 3], *matrix_to_quaternion(matrix[:3, :3])])
+        matrix = layout.part_pose(run, part, int(step))
+        stretch = np.linalg.norm(matrix[:3, :3], axis=0)
+        rows.append([*matrix[:3, 3], *matrix_to_quaternion(matrix[:3, :3] / stretch), stretch[2]])
     return np.array(rows)
 
 

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.post.overview.curves import in_unit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render import forms, mechanism, player, surfaces
+from flexclear.pipeline.post.render import forms, layout, mechanism, player, surfaces
 from flexclear.pipeline.post.render.mechanism import Mechanism
 from flexclear.pipeline.post.render.ruler import exaggeration, project, ruler
 from flexclear.pipeline.post.render.surfaces import Surface
@@ -22,7 +23,7 @@ from flexclear.pipeline.post.render.view import flat, gravity
 from flexclear.pipeline.post.shapes.body_shape import has_edges
 from flexclear.pipeline.post.single_run.series import parameters
 
-BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", "#7a4a00"
+BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", layout.LOAD_COLOR
 CLEARANCE, GAP = "#a35f00", "#c4161c"
 #: fractions of the mechanism's size: half length and thickness of a drawn axis, radius of a drive's arrow, of a gap
 AXIS, THIN, ARC, THICK = 0.055, 0.0016, 0.035, 0.004
@@ -73,7 +74,7 @@ def start_view(
 ) -> StartView:
     """Return the view of a start; gaps: of joints that do not fit."""
     text, drawn = parameters(run), mechanism.mechanism(run, bundles, looks)
-    at = mechanism.Layout(run, text, bundles)
+    at = layout.Layout(run, text, bundles)
     # world position of each joint's second frame, and the axes of its first one
     joints = {
         name: (at.at_start(second)[0], at.at_start(first)[1])
@@ -89,19 +90,17 @@ def start_view(
         *(_still(body, opacity) for body in drawn.flexible),
     ]
     drawn = replace(drawn, parts=tuple(solid), flexible=())
-    extra = [mechanism.Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
+    extra = [layout.Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
     marked = list(_marks(run, drawn, text, joints, gaps))
     cloud = np.concatenate([drawn.cloud, *(part.surface.points for part in extra), *([m.point] for m in marked)])
     drawn = replace(drawn, parts=(*drawn.parts, *extra), cloud=cloud)
     return StartView(drawn, tuple(marked), tuple(_notes(drawn, text, gaps)), tuple(gaps), gravity(text))
 
 
-def _still(body: mechanism.Flexible, opacity: float) -> mechanism.Part:
+def _still(body: mechanism.Flexible, opacity: float) -> layout.Part:
     """Return a meshed body without deformation."""
     shown = mechanism.skin(body.bundle, mechanism.rest(body.bundle), sharp=has_edges(body.bundle))
-    return mechanism.Part(
-        body.index, shown, body.color or mechanism.COLORS[body.index % len(mechanism.COLORS)], opacity
-    )
+    return layout.Part(body.index, shown, body.color or mechanism.COLORS[body.index % len(mechanism.COLORS)], opacity)
 
 
 def page_view(start: StartView) -> dict[str, Any]:
@@ -189,20 +188,40 @@ def _marks(
         yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
     for name, drive in text.get("drive", {}).items():
         if "joint" in drive:
-            which = ".".join(filter(None, [drive["joint"], drive.get("coordinate")]))
             where = joints[drive["joint"]][0]
-            yield Mark(name, f"drives {which}: {drive['law']['type']}", where, DRIVE)
+            yield Mark(name, f"drives {_coordinate(drive)}: {drive['law']['type']}", where, DRIVE)
         else:
             yield Mark(name, f"drives {drive['frame']}", positions[drive["frame"]], DRIVE)
             used.add(drive["frame"])
     for name, load in text.get("load", {}).items():
         at = load.get("between", [load["frame"]] if "frame" in load else [])
+        used |= set(at)
         if at:
-            used |= set(at)
             yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([positions[f] for f in at], axis=0), LOAD)
+        elif "joint" in load:
+            yield Mark(name, f"{load['type']}: {_coordinate(load)}", joints[load["joint"]][0], LOAD)
+    for name, stop in text.get("stop", {}).items():
+        kind = text["joint"][stop["joint"]]["type"]
+        yield Mark(name, f"stop of {_coordinate(stop)}: {_range(stop, kind)}", joints[stop["joint"]][0], JOINT)
+    for name, gear in text.get("gear", {}).items():
+        pair = [gear["first"], gear["second"]]
+        where = np.mean([joints[one.partition(".")[0]][0] for one in pair], axis=0)
+        yield Mark(name, f"gear {gear['ratio']}: {' – '.join(pair)}", where, JOINT)
     for name, where in positions.items():
         if name not in used:
             yield Mark(name, "frame", where, FRAME)
+
+
+def _coordinate(part: Mapping[str, Any]) -> str:
+    """Return the joint coordinate on which a part acts, as a scene names it."""
+    return ".".join(filter(None, [part["joint"], part.get("coordinate")]))
+
+
+def _range(stop: Mapping[str, Any], kind: str) -> str:
+    """Return the ends of a stop in words; kind: type of its joint."""
+    turns = stop.get("coordinate") == "rotation" or kind not in forms.SLIDING
+    ends = {end: quantity(stop[end], "angle" if turns else "length") for end in ("lower", "upper") if end in stop}
+    return ", ".join(f"{e} {f'{np.degrees(v):.4g}°' if turns else in_unit(v, 'm')}" for e, v in ends.items())
 
 
 def _of_body(body: Mapping[str, Any]) -> str:
@@ -213,8 +232,8 @@ def _of_body(body: Mapping[str, Any]) -> str:
 def _middle(run: xr.Dataset, drawn: mechanism.Mechanism, index: int) -> np.ndarray:
     """Return a point on the drawn shape of a body, close to the middle of that shape."""
     for part in drawn.parts:
-        if part.owner == index and part.frame is None and part.contact is None:
-            matrix = mechanism.pose(run, index, 0)
+        if part.owner == index and part.frame is None and part.contact is None and part.ends is None:
+            matrix = layout.pose(run, index, 0)
             low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
             return np.asarray(matrix[:3, :3] @ (0.5 * (low + high)) + matrix[:3, 3])
     return np.asarray(run["position"].values[0, index])

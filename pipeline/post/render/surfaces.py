@@ -147,6 +147,14 @@ def tube(positions: np.ndarray, radius: float, corners: int = 6) -> Surface:
     return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(positions), corners + 1)[:, ::-1])
 
 
+def reach(points: np.ndarray, triangles: np.ndarray, height: float) -> float:
+    """Return the largest distance from the z axis in the section of a surface at a height; 0 without a section."""
+    start, end = points[triangles], points[np.roll(triangles, -1, axis=1)]
+    part = (height - start[..., 2]) / np.where(start[..., 2] == end[..., 2], np.inf, end[..., 2] - start[..., 2])
+    cut = (start + part[..., None] * (end - start))[(part > 0.0) & (part < 1.0)]
+    return float(np.linalg.norm(cut[:, :2], axis=1).max(initial=0.0))
+
+
 def grid(rows: int, columns: int) -> np.ndarray:
     """Return triangles between points in rows and columns, shape (2 (rows - 1) (columns - 1), 3)."""
     index = np.arange(rows * columns).reshape(rows, columns)

@@ -10,7 +10,8 @@ import xarray as xr
 
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.render import film_speed, surfaces
-from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
+from flexclear.pipeline.post.render.layout import Part, part_pose, pose
+from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
 from flexclear.pipeline.post.shapes.body_shape import hertz, linear_fields
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
@@ -74,7 +75,9 @@ def vibrations(drawn: Mechanism, linear: xr.Dataset) -> Vibrations:
         matrix = part_pose(run, part, 0)
         drawn_part = surfaces.moved(part.surface, matrix[:3, 3], matrix[:3, :3])
         moved = np.zeros((count, 2, *drawn_part.points.shape))
-        if part.owner is not None:
+        if part.ends is not None:
+            moved = _stretched(run, linear, motions, part, drawn_part.points)
+        elif part.owner is not None:
             moved = _rigid(motions, part.owner, drawn_part.points, run["position"].values[0, part.owner])
         pieces.append(Piece(drawn_part, moved, part.color, part.opacity, True))
     pieces += [_bending(run, body, linear, motions) for body in drawn.flexible]
@@ -131,6 +134,21 @@ def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray)
     """Return displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
     move, turn = motions[owner]
     return move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
+
+
+def _stretched(run: xr.Dataset, linear: xr.Dataset, motions: Motions, part: Part, points: np.ndarray) -> np.ndarray:
+    """Return displacements of points between two ends, which vary evenly from one end to the other; as of `_rigid`."""
+    assert part.ends is not None
+    places = [site.position(run, 0) for site in part.ends]
+    line = places[1] - places[0]
+    along = np.clip((points - places[0]) @ line / (line @ line or 1.0), 0.0, 1.0)[:, None]
+    moved = np.zeros((linear.sizes["vibration"], 2, *points.shape))
+    for site, place, weight in zip(part.ends, places, (1.0 - along, along), strict=True):
+        if site.frame is not None and not np.any(site.origin):  # its bending included
+            moved += linear["frame_translation"].values[:, :, site.frame, None] * weight
+        elif site.owner is not None:
+            moved += _rigid(motions, site.owner, place[None], run["position"].values[0, site.owner]) * weight
+    return moved
 
 
 def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:

@@ -34,8 +34,8 @@ def view(
 ) -> View:
     """Return the view of a run.
 
-    given: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms. asked,
-    upwards: direction to the eye, and upward direction, as the user requests them.
+    given: the scene's parameters, for gravity, whose opposite is up. asked, upwards: direction to the eye, and upward
+    direction, as the user requests them.
     """
     up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     if asked is not None:
@@ -43,7 +43,7 @@ def view(
         return View(direction / np.linalg.norm(direction) * np.linalg.norm(SPATIAL), _across(up, direction), False)
     normal = plane(run)
     if normal is None:
-        return _spatial(up if upwards is not None else np.array([0.0, 0.0, 1.0]))
+        return _spatial(up)
     return flat(normal, given, upwards)
 
 
