@@ -1,7 +1,7 @@
 r"""A modally reduced body in the floating frame of reference, without neglected coupling terms.
 
-A point is at :math:`r = X + S q + \tfrac12 q^T G q` in the body frame. The quadratic part is the motion of sections that
-turn, and in solids that of the stresses of a spin; it counts where it multiplies rigid motion, as
+A point is at :math:`r = X + S q + \tfrac12 q^T G q` in the body frame. The quadratic part is the motion of
+sections that turn, and in solids that of the stresses of a spin; it counts where it multiplies rigid motion, as
 :math:`L_{kl} = \int\rho X_k G_l`. All terms of the equations follow from two families of vectors that are linear in the
 state, with the invariants of the bundle,
 
@@ -95,22 +95,22 @@ def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
     def invariants(d, k):
         """Fill MODAL with P (first 9 n) and V (next 9 n); row (3k + l) holds n values.
 
-        Also store int rho X_k (q'^T G q')_l in SCRATCH.
+        Also store int rho r_k (q'^T G q')_l in SCRATCH, up to a part that is symmetric in k and l.
         """
         body = d.flexes[k]
         n, e = body.n_modes, body.moment0
         for pair in range(9):
-            drift = 0.0
+            drift, across = 0.0, pair % 4 != 0  # terms of equal axes are symmetric
             for j in range(n):
                 row = pair * n + j
                 P_row, V_row, bent = d.flex_data[body.data0 + 3 * n + row].value, 0.0, 0.0
                 end = d.moment_rows[body.moment_row0 + row].end
                 while e < end:
                     i, moment = d.moments[e].mode, d.moment_values[e]
-                    x, u = d.x[body.q0 + i], d.u[body.c0 + i]
-                    P_row += (moment.value + moment.second) * x
-                    V_row += moment.value * u
-                    bent += moment.second * u
+                    P_row += moment.position * d.x[body.q0 + i]
+                    V_row += moment.rate * d.u[body.c0 + i]
+                    if across:
+                        bent += moment.position * d.u[body.c0 + i]
                     e += 1
                 d.modal[row], d.modal[9 * n + row] = P_row, V_row
                 drift += bent * d.u[body.c0 + j]

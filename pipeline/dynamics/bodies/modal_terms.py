@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_symmetric,
 )
 
-#: SCRATCH: second moment int rho r r^T (9), D = int rho r rdot^T (9), int rho X (q'^T G q')^T (9)
+#: SCRATCH: second moment int rho r r^T (9), D = int rho r rdot^T (9), int rho r (q'^T G q')^T (9)
 RATE, DRIFT = 9, 18
 
 

@@ -163,11 +163,10 @@ def _interface_data(bundle: Labelled, basis: InterfaceBasis) -> np.ndarray:
 
 
 def _moments(bundle: Labelled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return nonzero int rho S_ki S_lj and second-order moments by row (3k + l) n + j: pairs of values, modes i, and the
-    end of each row among them."""
-    both = np.stack([bundle[name].values for name in ("mode_mode_moment", "second_order_moment")])
-    n = both.shape[-1]
-    k, l, i, j = np.nonzero(np.any(np.abs(both) > NO_COUPLING * max(np.abs(both[0]).max(), 1e-300), axis=0))
+    """Return nonzero rows of MOMENT_VALUES by row (3k + l) n + j, modes i, and the end of each row among them."""
+    F, L = bundle["mode_mode_moment"].values, bundle["second_order_moment"].values
+    n, both = F.shape[-1], np.stack([F + L, F])
+    k, l, i, j = np.nonzero(np.any(np.abs(both) > NO_COUPLING * max(np.abs(F).max(), 1e-300), axis=0))
     row = (3 * k + l) * n + j
     order = np.lexsort((i, row))
     return both[:, k, l, i, j][:, order].T, i[order], np.cumsum(np.bincount(row, minlength=9 * n))

@@ -1,7 +1,7 @@
 r"""Second-order motion of a beam whose strains are linear in the nodal unknowns, as the stiffness of its loads.
 
-A section at x turns by the rotation vector :math:`\theta` and moves by u. To second order the strains of a geometrically
-exact beam are, with e along the rod,
+A section at x turns by the rotation vector :math:`\theta` and moves by u. To second order the strains of a
+geometrically exact beam are, with e along the rod,
 
 .. math:: \Gamma = u' - \theta\times e + \tfrac12\,\theta\times(\theta\times e) - \theta\times u', \qquad
           \kappa = \theta' - \tfrac12\,\theta\times\theta',
@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.structure.fe import slices as sections
 from flexclear.pipeline.structure.fe import beam as beams
+from flexclear.pipeline.structure.fe import slices as sections
 from flexclear.pipeline.structure.fe.beam import Beam, at_points
 from flexclear.pipeline.structure.fe.model import SecondOrder
 from flexclear.pipeline.structure.fe.section import POINTS, WEIGHTS
@@ -39,9 +39,9 @@ BEYOND /= WEIGHTS
 
 @dataclass(frozen=True)
 class Loads:
-    """Forces and moments of m loads, mesh axes: at the Gauss points (m, cells, points, 3), at points of the rod (m, p, 3).
+    """Forces and moments of m loads, mesh axes: at the Gauss points, (m, cells, points, 3), and at p points of the rod.
 
-    at: positions of these points along the rod [m], shape (p,).
+    at: positions of these p points along the rod [m].  point_force, point_moment: shape (m, p, 3).
     """
 
     force: np.ndarray
@@ -92,7 +92,7 @@ def _unit(beam: Beam, x: float) -> Loads:
 
 
 def _resultants(mesh: xr.Dataset, beam: Beam, loads: Loads, x0: float) -> Any:
-    """Yield internal force and moment of each load, shape (points, 3): of the part beyond each Gauss point, seen from x0."""
+    """Yield internal force and moment of each load, shape (points, 3): loads beyond each Gauss point, seen from x0."""
     e, ends = beam.axes[:, 0], mesh["abscissa"].values[mesh["cell_node"].values]
     x = np.asarray(beam.basis.global_coordinates())[0]
     before = (ends.mean(axis=1) < x0)[:, None, None]
@@ -117,7 +117,9 @@ def _resultants(mesh: xr.Dataset, beam: Beam, loads: Loads, x0: float) -> Any:
     return ((F.reshape(-1, 3), M.reshape(-1, 3)) for F, M in zip(force, moment, strict=True))
 
 
-def _stiffness_form(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+def _stiffness_form(
+    mesh: xr.Dataset, beam: Beam, vectors: np.ndarray
+) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """Return the geometric stiffness (n, n) of vectors, from internal force and moment at the points, (points, 3)."""
     e, n = beam.axes[:, 0], vectors.shape[1]
 

@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def _rows(numbers, o, n, vector, first):
-    """Return one row of three forms n n, a table's values from row o on, times n entries of an array from `first` on."""
+    """Return a row of three forms (n, n), a table's values from row o on, times n entries of an array from `first`."""
     x = y = z = 0.0
     for i in range(n):
         factor = vector[first + i]

@@ -77,7 +77,7 @@ def mass(solid: Solid) -> sp.csr_array:
 
 
 def stress_stiffness(solid: Solid, displacement: np.ndarray) -> sp.csr_array:
-    r"""Return :math:`\int \sigma_{ij}\,\partial_i N_a\,\partial_j N_b` [N/m] of the stress of a displacement, shape (n, n).
+    r"""Return :math:`\int\sigma_{ij}\,\partial_i N_a\,\partial_j N_b` [N/m] of a displacement's stress, shape (n, n).
 
     displacement: of the nodes [m], shape (n, 3).
     """

@@ -19,8 +19,8 @@ import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.pipeline.structure.fe.solid import elasticity
-from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, sampled
 from flexclear.pipeline.structure.fe.solid.model import Unknowns, solid_of, unknowns_of
+
 
 def inertial(mesh: xr.Dataset) -> tuple[sp.csr_array, sp.csr_array, np.ndarray]:
     """Return the map from the model's vector to the nodes, their mass along one axis, and nodal loads rho X_k e_l.
