@@ -23,6 +23,7 @@ from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.basis import ModeRequest
 from flexclear.pipeline.structure.modes.solution import solve
 
 Table = dict[str, Any]
@@ -49,7 +50,7 @@ class Body:
     recipe: Table
     supports: str = "clamped"
     reference: str = "craig-bampton"
-    count: int | None = None
+    up_to: float | None = None  #: highest normal mode [Hz]; None for a complete basis
     stiffening: bool = False
     axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
     radius: float = 0.0
@@ -77,14 +78,15 @@ def rectangle(width: float, height: float) -> Table:
 
 
 @cache
-def _reduced(recipe: str, reference: str, count: int | None, stiffening: bool) -> xr.Dataset:
+def _reduced(recipe: str, reference: str, up_to: float | None, stiffening: bool) -> xr.Dataset:
     mesh = kind.build(json.loads(recipe))
-    return bundle.build(mesh, solve(mesh, reference, count), stiffening=stiffening)
+    modes = solve(mesh, reference, requested=ModeRequest(up_to=up_to))
+    return bundle.build(mesh, modes, stiffening=stiffening)
 
 
 def reduced(body: Body) -> xr.Dataset:
     """Return the body's reduced bundle."""
-    return _reduced(json.dumps(body.recipe), body.reference, body.count, body.stiffening)
+    return _reduced(json.dumps(body.recipe), body.reference, body.up_to, body.stiffening)
 
 
 def turning(body: Body, speed: float) -> Table:
@@ -143,11 +145,11 @@ def vibrations(body: Body, speed: float) -> xr.Dataset:
 
 
 def _shaft(theory: str, supports: str, springs: float = 0.0) -> Body:
-    return Body(rod(0.8, circle(0.02), theory, 24), supports, springs=springs, count=61)
+    return Body(rod(0.8, circle(0.02), theory, 24), supports, springs=springs, up_to=2e4)
 
 
 def _bar(theory: str, length: float, supports: str) -> Body:
-    return Body(rod(length, rectangle(0.03, 0.02), theory, 24), supports, count=60)
+    return Body(rod(length, rectangle(0.03, 0.02), theory, 24), supports, up_to=2e4)
 
 
 def _disc_at_end(theory: str, *, section: bool) -> Body:
@@ -169,14 +171,14 @@ def _blade(theory: str, pitch: float, *, inward: bool = False) -> Body:
     axis = (0.0, float(np.sin(angle)), float(np.cos(angle)))
     section, radius = (rectangle(0.02, 0.004), 0.8) if inward else (rectangle(0.04, 0.006), 0.05)
     recipe = rod(0.5, section, theory, 16, ALUMINIUM)
-    return Body(recipe, count=60, stiffening=True, axis=axis, radius=radius, inward=inward)
+    return Body(recipe, up_to=1e4, stiffening=True, axis=axis, radius=radius, inward=inward)
 
 
 def _solid_blade() -> Body:
     frames = {name: {"on": {"region": region}, "tie": tie, "axes": ALONG} for name, region, tie in FACES}
     shape = {"type": "block", "size": [0.5, 0.04, 0.006], "element": "hex20", "cells": [25, 4, 1]}
     recipe = {"interfaces": ["A", "B"], "shape": shape, "material": ALUMINIUM, "frames": frames}
-    return Body(recipe, count=30, stiffening=True, axis=(0.0, 0.0, 1.0), radius=0.05)
+    return Body(recipe, up_to=3e3, stiffening=True, axis=(0.0, 0.0, 1.0), radius=0.05)
 
 
 def _friswell() -> Body:
@@ -188,11 +190,11 @@ def _friswell() -> Body:
         "d2": {"mass": 51.5252611115262, "inertia": [0.4235805840543383] * 2 + [0.8050822048675969]},
     }
     recipe = rod(1.5, circle(0.025), "timoshenko", 24, material, frames=frames, interfaces=list(frames))
-    return Body(recipe, "springs", springs=1e6, discs=discs, count=42)
+    return Body(recipe, "springs", springs=1e6, discs=discs, up_to=5e3)
 
 
 CASES: dict[str, Callable[[], Body]] = {
-    "1-clamped-free": lambda: Body(rod(1.2, circle(0.01), "rayleigh", 24), count=61),
+    "1-clamped-free": lambda: Body(rod(1.2, circle(0.01), "rayleigh", 24), up_to=2e4),
     **{f"2-{t}-pins": lambda t=t: _shaft(t, "pins") for t in ("euler-bernoulli", "rayleigh", "timoshenko")},
     **{f"2-{t}-springs": lambda t=t: _shaft(t, "springs", 2e7) for t in ("rayleigh", "timoshenko")},
     "3a": lambda: _disc_at_end("timoshenko", section=False),

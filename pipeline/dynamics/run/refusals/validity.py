@@ -129,19 +129,19 @@ def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
         return
     fraction = speeds[row] / body.first
     turns = (
-        f"{body.name}: at t = {time[row]:.6g} s it turns at {speeds[row]:.4g} rad/s, {fraction:.2g} of its first natural "
-        f"frequency ({body.first:.4g} rad/s)"
+        f"{body.name}: at t = {time[row]:.6g} s it turns at {speeds[row]:.4g} rad/s, {fraction:.2g} of its first "
+        f"natural frequency ({body.first:.4g} rad/s)"
     )
     if body.sections_turn:
         yield (
             f"{turns}, and nothing stiffens it: clamped to a small hub, that frequency would be higher by "
-            f"{100.0 * (np.sqrt(1.0 + TENSION * fraction**2) - 1.0):.2g} %; linear modes hold below {SPIN:g} and diverge "
-            "close to 1: give the body stiffening = {}"
+            f"{100.0 * (np.sqrt(1.0 + TENSION * fraction**2) - 1.0):.2g} %; linear modes hold below {SPIN:g} and "
+            "diverge close to 1: give the body stiffening = {}"
         )
     else:
         yield (
-            f"{turns}, and its matrices do not give the second-order motion of its rotation: frequencies are wrong by up "
-            f"to {50.0 * fraction**2:.2g} %; mesh it with a recipe, or lump its mass at nodes that turn"
+            f"{turns}, and its matrices do not give the second-order motion of its rotation: frequencies are wrong by "
+            f"up to {50.0 * fraction**2:.2g} %; mesh it with a recipe, or lump its mass at nodes that turn"
         )
 
 
