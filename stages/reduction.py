@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene.registry import lookup, module_of
@@ -15,12 +14,11 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.system.progress import Progress
 
 STRESS = "flexclear.pipeline.structure.stress"
-SHORTENING = "flexclear.pipeline.structure.modes.geometric_stiffness"
 WHERE = "[output] stress"
 
 
 def params(scene: Scene, body: str) -> dict[str, Any]:
-    """Return whether and where stresses, and whether shortening by bending, are requested; else no entry."""
+    """Return whether and where stresses, and whether stiffening, are requested; else no entry."""
     requested: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
     if gauges := scene.output.on(body):
         requested["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
@@ -28,10 +26,8 @@ def params(scene: Scene, body: str) -> dict[str, Any]:
 
 
 def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
-    """Return the modules for the requested stresses and shortening; raise InputError when there is none."""
-    requested = params(scene, body)
-    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in requested else ()
-    return (*stress, *((SHORTENING,) if "stiffening" in requested else ()))
+    """Return the module for the requested stresses; raise InputError when there is none."""
+    return (module_of(STRESS, kind, where=WHERE),) if "stress" in params(scene, body) else ()
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -44,6 +40,4 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     if params.get("stress"):
         recover = lookup(STRESS, str(mesh.attrs.get("body_kind", "beam")), where=WHERE)
         extra |= recover(mesh, modes, params.get("gauges", {}))
-    if params.get("stiffening"):
-        extra |= import_module(SHORTENING).variables(mesh, modes)
-    return {"nc": bundle.build(mesh, modes, extra)}
+    return {"nc": bundle.build(mesh, modes, extra, stiffening=params.get("stiffening", False))}

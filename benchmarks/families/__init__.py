@@ -22,4 +22,5 @@ NAMES = {
     "gallery": "gallery:FAMILY",
     "plan": "plan:FAMILY",
     "effects": "effects:FAMILY",
+    "turning": "turning:FAMILY",
 }

@@ -182,7 +182,7 @@ FLEXES = topology(
     "link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0 book"
 )
 BASIS = topology("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
-MOMENTS = topology("mode")  # mode i of int rho S_ki S_lj, row after row
+MOMENTS = topology("mode")  # mode i of MOMENT_VALUES, row after row
 MOMENT_ROWS = topology("end")  # per body and row (3k + l) n + j of these: index in MOMENTS after its last one
 PORTS = topology("flex column shapes")  # column, shapes: the first ones, of moving shapes
 PAIRS = topology("momentum column entry")  # entry: index in the mass matrix's envelope
@@ -231,13 +231,15 @@ DRIVES = topology("book")  # index in the ledger of each drive's work
 #: and a bound of their polar moment about its origin
 LINK_NUMBERS = numbers("mass com:3 inertia:6 borne reaching")
 SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
-FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3")
-FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness, damping (n); stiffening 2 (n n)
-MOMENT_VALUES = numbers("value")
+#: untilted: inertia of sections that twist but do not tilt (xx yy zz xy xz yz), without gyroscopic effect
+FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3 untilted:6")
+FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness, damping (n); stiffening 3 (n n)
+#: rate: F of `bodies.flexible`, int rho S_ki S_lj; position: F + L, with int rho X_k G_lij of the second-order motion
+MOMENT_VALUES = numbers("position rate")
 BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
-PORT_DATA = numbers("value")  # per port, r moving shapes: translation (3r), rotation (3r); with stiffening (r r)
+PORT_DATA = numbers("value")  # per port, r moving shapes: translation (3r), rotation (3r); with stiffening 6 (r r)
 #: radius: of the inner surface; stiffness, exponent, damping: of the normal law (`contact.law.Numbers`); shape: further
 #: numbers of its kind of surfaces; length: size of the mechanism that it belongs to
 CONTACT_NUMBERS = numbers("clearance radius floor stick_speed stiffness exponent damping friction_law:6 shape:2 length")
@@ -281,7 +283,7 @@ TRANSMITTED = work("moments:3x3 forces:3x3", "n_links")
 LOCAL, GAIN = work("angular:3 linear:3", "columns"), work("moment:3 force:3", "nv")
 #: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _stretches(
-    "bias:nv+n_drives modal_bias:nv modal:25*most_modes scratch:18 mass:mass_size force:nv residual:n_closure_rows "
+    "bias:nv+n_drives modal_bias:nv modal:25*most_modes scratch:27 mass:mass_size force:nv residual:n_closure_rows "
     "residual_rate:n_closure_rows gamma:n_closure_rows"
 )
 #: wrenches of the closure rows; then those of the couplings on their first joints

@@ -81,7 +81,7 @@ def test_a_run_that_ends_as_its_beam_diverges_names_the_beam() -> None:
     with pytest.raises(SolverError, match="evaluations is reached") as refusal:
         turning(8.0, 9.81, solver={"evaluations": 300}, **{"time.end": 30.0})
     assert "beam: at t =" in str(refusal.value)
-    assert "turns at 8 rad/s, 2.1 of its first frequency" in str(refusal.value)
+    assert "turns at 8 rad/s, 2.1 of its first natural frequency" in str(refusal.value)
     assert "stiffening = {}" in str(refusal.value)
 
 

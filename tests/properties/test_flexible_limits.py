@@ -13,7 +13,6 @@ from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.geometric_stiffness import variables
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE, bundles
 
@@ -37,7 +36,7 @@ def stroke(
         recipe["material"]["youngs_modulus"] *= stiffer
         grid = kind.build({**recipe, "elements": elements})
         shapes = solve(grid, body.modes.reference, body.modes.count, interfaces=body.modes.interfaces)
-        bundles[name] = bundle.build(grid, shapes, variables(grid, shapes))
+        bundles[name] = bundle.build(grid, shapes, stiffening=body.stiffening is not None)
     return dynamics.simulate(loaded, bundles, lambda fraction, text: None)
 
 

@@ -1,4 +1,4 @@
-"""The shortening of a bent beam: forms of the bundle against direct integration, and what loads on its ends do."""
+"""Second-order motion of beams: forms of the bundle against direct integration, and what loads on their ends do."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,17 +7,21 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.pipeline.core.numerics.rotations import skew
 from flexclear.pipeline.core.scene.load import read_toml
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import analyses
+from flexclear.pipeline.structure.fe import beam as beams
+from flexclear.pipeline.structure.fe.section import POINTS
+from flexclear.pipeline.structure.fe.slices import fields_at_points, motion
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.geometric_stiffness import variables
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import ground, joint, rigid, scene
 
 RECIPE = TREE / "meshes" / "checks" / "slender_beam.toml"
+AXIS = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -31,70 +35,84 @@ def reduce(reference: str, count: int | None, interfaces: tuple[str, ...] | None
     """A beam's bundle; `recipe` replaces whole parts of the recipe."""
     grid = kind.build({**read_toml(Path(RECIPE)), **recipe})
     modes = solve(grid, reference, count, interfaces=interfaces)
-    return Reduced(grid, modes, bundle.build(grid, modes, variables(grid, modes)))
+    return Reduced(grid, modes, bundle.build(grid, modes, stiffening=True))
 
 
-def slopes_squared(reduced: Reduced, q: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places and v'^2 + w'^2 of cubic elements, at the middles of `points` parts of each element."""
-    x = reduced.mesh["node_position"].values[:, 0]
-    d = (reduced.modes["vector"].values @ q).reshape(-1, 6)
-    s = (np.arange(points) + 0.5) / points
-    at, total = [], []
-    for i in range(len(x) - 1):
-        h = x[i + 1] - x[i]
-        ends = np.array([-6 * s + 6 * s**2, h * (1 - 4 * s + 3 * s**2), 6 * s - 6 * s**2, h * (3 * s**2 - 2 * s)]) / h
-        v = np.array([d[i, 1], d[i, 5], d[i + 1, 1], d[i + 1, 5]]) @ ends
-        w = np.array([d[i, 2], -d[i, 4], d[i + 1, 2], -d[i + 1, 4]]) @ ends
-        at.append(x[i] + h * s)
-        total.append(v**2 + w**2)
-    return np.concatenate(at), np.concatenate(total)
+def second_order(reduced: Reduced, q: np.ndarray, x0: float, steps: int) -> tuple[np.ndarray, ...]:
+    """Middles of equal steps; there, second-order displacement and rotation matrix; displacement and rotation at ends.
+
+    The rotation follows the curvature and the position the turned axis, from x0, so that the strains stay those of the
+    linear fields: theta2' = theta x theta' / 2, u2' = theta2 x e + theta x (theta x e) / 2 + theta x strain, less what
+    twist shortens the fibres by, r^2 phi'^2 / 4 on average over a round section.
+    """
+    beam, vector = beams.assemble(reduced.mesh), (reduced.modes["vector"].values @ q)[:, None]
+
+    def strains(*fields: object) -> tuple[object, ...]:
+        found, (_, v, w) = beam.kinematics.strains(*fields), beam.kinematics.section(*fields)[0]
+        return found["stretch"], v.grad[0], w.grad[0], found["twist"], -1.0 * found["bend_w"], found["bend_v"]
+
+    # polynomials of a cell have degree three at most: its five Gauss points carry them
+    s = (np.arange(steps) + 0.5) / steps
+    carry = np.vander(s, 5) @ np.linalg.inv(np.vander(POINTS, 5))
+    shape = (*beam.basis.dx.shape, 6)
+    at_points = [(part @ vector).reshape(shape) for part in (motion(beam), fields_at_points(beam, strains))]
+    section, strain = (np.einsum("sp,cpk->csk", carry, part).reshape(-1, 6) for part in at_points)
+    x = np.linspace(0.0, 1.0, len(section), endpoint=False) + 0.5 / len(section)
+    theta, curvature = section[:, 3:], strain[:, 3:]
+    stretched = strain[:, :3] - np.cross(theta, AXIS)
+
+    def integral(rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """From x0, by the midpoint rule: at the middles and at the ends of the steps."""
+        edges = np.concatenate([np.zeros((1, 3)), np.cumsum(rate, axis=0)]) / len(x)
+        edges -= edges[round(x0 * len(x))]
+        return 0.5 * (edges[1:] + edges[:-1]), edges
+
+    turned, turned_ends = integral(0.5 * np.cross(theta, curvature))
+    rate = np.cross(turned, AXIS) + 0.5 * np.cross(theta, np.cross(theta, AXIS)) + np.cross(theta, stretched)
+    rate -= np.outer(0.25 * 4e-6 * curvature[:, 0] ** 2, AXIS)
+    spin = 0.5 * skew(theta) @ skew(theta) + skew(turned)
+    moved, moved_ends = integral(rate)
+    return x, moved, spin, moved_ends, turned_ends
 
 
+@pytest.mark.parametrize("theory", ["rayleigh", "timoshenko"])
 @pytest.mark.parametrize("first", ["root", "middle", "tip"])
-@pytest.mark.parametrize("reference", ["craig-bampton", "free-free"])
-def test_forms_are_what_the_shortened_axis_integrates_to(reference: str, first: str) -> None:
-    """Brute force: running sums of slopes, then of places, with the origin of the way at the first interface."""
+def test_forms_are_integrals_of_the_motion_that_keeps_the_strains_linear(first: str, theory: str) -> None:
+    """Work of the loads' internal forces on the strains, against displacements integrated along the rod."""
     frames = {"root": {"x": 0.0}, "middle": {"x": 0.25}, "tip": {"x": 1.0}}
     other = "tip" if first != "tip" else "root"
-    reduced = reduce(reference, None, (first, other), elements=4, frames=frames)
-    q = np.random.default_rng(5).normal(size=reduced.bundle.sizes["mode"])
-    points = 4000
-    x, squares = slopes_squared(reduced, q, points)
-    width = 1.0 / len(x)
-    way = -width * (np.cumsum(squares) - 0.5 * squares)
-    edges = np.concatenate([[0.0], -width * np.cumsum(squares)])
-    at = {name: edges[round(part["x"] / width)] for name, part in frames.items()}
-    way = way - at[first]
-    line = 7850.0 * np.pi * 4e-6
-    # midpoint sums over 4000 parts per element: 1 / (24 * 4000^2) of the curvature of the squares
-    near = 1e-6
-    for name, weight in (("first", line), ("second", line * x)):
-        form = reduced.bundle[f"shortening_{name}_moment"].values
-        assert q @ form @ q == pytest.approx(np.sum(weight * way) * width, rel=near)
-        assert np.array_equal(form, form.T)
-    for name in frames:
-        form = reduced.bundle["frame_shortening"].sel(frame=name).values
-        assert q @ form @ q == pytest.approx(at[name] - at[first], rel=near, abs=1e-12)
+    reduced = reduce("free-free", None, (first, other), elements=4, frames=frames, theory=theory)
+    q, steps = np.random.default_rng(5).normal(size=reduced.bundle.sizes["mode"]), 4000
+    x, u, turned, *at_ends = second_order(reduced, q, frames[first]["x"], steps)
+    line, width = 7850.0 * np.pi * 4e-6, 1.0 / len(x)
+    spread = line * 1e-6 * np.diag([0.0, 1.0, 1.0])
+    # midpoint sums over 4000 parts per element: 1 / (24 * 4000^2) of the curvature of the sums
+    near = 2e-6
+
+    def close(form: np.ndarray, integral: np.ndarray, size: float) -> None:
+        assert np.allclose(form, form.swapaxes(-1, -2), rtol=0.0, atol=1e-12 * np.abs(form).max())
+        assert 0.5 * np.einsum("...ij,i,j->...", form, q, q) == pytest.approx(integral, rel=near, abs=near * size)
+
+    total = line * width * u.sum(axis=0)
+    close(reduced.bundle["second_order_first_moment"].values, total, np.abs(total).max())
+    moment = np.zeros((3, 3))
+    moment[0] = line * width * x @ u
+    moment += width * np.einsum("km,slm->kl", spread, turned)
+    close(reduced.bundle["second_order_moment"].values, moment, np.abs(moment).max())
+    for name, part in frames.items():
+        for motion_of, values in zip(("translation", "rotation"), at_ends, strict=True):
+            form = reduced.bundle[f"frame_second_{motion_of}"].sel(frame=name).values
+            close(form, values[round(part["x"] * len(x))], np.abs(values).max())
 
 
-def test_stretching_and_twisting_shorten_nothing() -> None:
-    """Not at all where they are pure; modes have bending in them that the eigensolver's rounding left there."""
+def test_stretching_alone_moves_nothing_to_second_order() -> None:
     reduced = reduce("craig-bampton", 20)
-    plain = np.isin(reduced.modes["kind"].values, ["axial", "torsion"])
-    assert plain.any()
-    vectors = reduced.modes["vector"]
-    bends = np.isin(np.arange(len(vectors)) % 6, [1, 2, 4, 5])
-    pure = vectors.values.copy()
-    pure[np.ix_(bends, plain)] = 0.0
-    exact = variables(reduced.mesh, reduced.modes.assign(vector=(vectors.dims, pure)))
-    # the axial mode is 0.7 % above a bending one: eps times the largest eigenvalue of the mesh, 25 times theirs, over
-    # their gap is 4e-13; some two hundred times that
-    rounding = 1e-10
-    for name in ("shortening_first_moment", "shortening_second_moment", "frame_shortening"):
-        assert np.abs(exact[name][1][..., ~plain, :]).max() > 0.0
-        assert not exact[name][1][..., plain, :].any()
+    axial = reduced.modes["kind"].values == "axial"
+    assert axial.any()
+    for name in ("second_order_first_moment", "second_order_moment", "frame_second_translation"):
         form = reduced.bundle[name].values
-        assert np.abs(form[..., plain, :]).max() < rounding * np.abs(form).max()
+        # bending that the eigensolver's rounding left in these modes
+        assert np.abs(form[..., axial, :][..., axial]).max() < 1e-10 * np.abs(form).max()
 
 
 #: all bending of the mast in both planes, and some of its stretching and twisting

@@ -175,12 +175,15 @@ frame_position | frame axis | m | undeformed origin of the named frame in the bo
 frame_rotation | frame axis axis2 | 1 | rotation matrix, named frame to body frame, undeformed
 frame_translation_shape | frame axis mode | 1 | displacement of the frame per modal coordinate, body axes
 frame_rotation_shape | frame axis mode | rad m-1 | rotation vector of the frame per modal coordinate, body axes
-shortening_first_moment? | mode mode2 | kg m-1 | integral of rho times the displacement along x that bending causes,
-    second derivative
-shortening_second_moment? | mode mode2 | kg | integral of rho x times the displacement along x that bending causes,
-    second derivative
-frame_shortening? | frame mode mode2 | m-1 | displacement of the frame along x that bending causes, second derivative
+second_order_moment | axis axis2 mode mode2 | kg | integral of rho X_k times the second derivative of the displacement
+    along l by modal coordinates
+second_order_first_moment? | axis mode mode2 | kg m-1 | integral of rho times the second derivative of the displacement
     by modal coordinates
+frame_second_translation? | frame axis mode mode2 | m-1 | second derivative of the frame's displacement by modal
+    coordinates, body axes
+frame_second_rotation? | frame axis mode mode2 | rad m-2 | second derivative of the frame's rotation vector by modal
+    coordinates, body axes
+untilted_inertia | axis axis2 | kg m2 | moment of inertia of sections that twist but do not tilt (Euler-Bernoulli)
 node_position | node axis | m | undeformed node position in the body frame
 cell_node | cell corner | 1 | node indices of each cell
 shape_translation | node axis mode | 1 | node displacement per modal coordinate, body axes

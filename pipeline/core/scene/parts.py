@@ -197,7 +197,7 @@ class Rayleigh(Part):
 
 
 class Stiffening(Part):
-    """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
+    """Forces and accelerations stiffen the body, or soften it in compression: bending and twist shorten it."""
 
 
 class FlexibleBody(Moving):
@@ -211,7 +211,7 @@ class FlexibleBody(Moving):
     damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
     """one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh damping; default: none"""
     stiffening: Stiffening | None = None
-    """``{}`` for a beam that rotates fast or carries large axial loads; default: linear shapes"""
+    """``{}`` for a body that forces and accelerations stiffen or soften, as a blade or column; default: they do not"""
 
 
 class MeshedRigidBody(Moving):

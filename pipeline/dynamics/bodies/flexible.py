@@ -1,12 +1,16 @@
 r"""A modally reduced body in the floating frame of reference, without neglected coupling terms.
 
-A point is at ``r = X + S q`` in the body frame. All terms of the equations follow from two
-families of vectors that are linear in the state, with the invariants of the bundle,
+A point is at :math:`r = X + S q + \tfrac12 q^T G q` in the body frame. The quadratic part is the motion of
+sections that turn, and in solids that of the stresses of a spin; it counts where it multiplies rigid motion, as
+:math:`L_{kl} = \int\rho X_k G_l`. All terms of the equations follow from two families of vectors that are linear in the
+state, with the invariants of the bundle,
 
-.. math:: P_{kl} = \int\rho\, r_k S_l = E_{kl} + F_{kl} q, \qquad V_{kl} = \int\rho\, \dot r_k S_l = F_{kl}\dot q
+.. math:: P_{kl} = \int\rho\, r_k \frac{\partial r_l}{\partial q} = E_{kl} + (F_{kl} + L_{kl}) q, \qquad
+          V_{kl} = \int\rho\, \dot r_k S_l = F_{kl}\dot q
 
-after Shabana, *Dynamics of Multibody Systems*, ch. 5, and Wang & Wang (2019), eqs. (9)-(15).
-Where bending shortens the body, r also moves along x by a quadratic form of q (see `effects.stiffening.bodies`).
+after Shabana, *Dynamics of Multibody Systems*, ch. 5, and Wang & Wang (2019), eqs. (9)-(15). They come from a
+Lagrangian, so power and energy agree to rounding.
+Where loads stiffen the body, the quadratic part also moves its centre and its frames (see `effects.stiffening.bodies`).
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from typing import Any
 
 from flexclear.pipeline.dynamics.bodies.interface import all_in_interface, deform, modal_rates
 from flexclear.pipeline.dynamics.bodies.modal_terms import (
+    DRIFT,
     RATE,
     make_carrying,
     modal_forces,
@@ -35,11 +40,13 @@ from flexclear.pipeline.dynamics.vectors import (
     ZERO,
     add,
     add_wrench,
+    at6,
     at9,
     congruence,
     cross,
     dot,
     scale,
+    sub,
     turn,
     turn_back,
     turn_symmetric,
@@ -47,12 +54,18 @@ from flexclear.pipeline.dynamics.vectors import (
 
 
 @kernel
-def straight(d, k, j, vector, first):
-    """Return 0: shapes are linear, bending does not shorten the body."""
-    return 0.0
+def _still(d, k, j, vector, first):
+    """Return zero: loads do not stiffen the body."""
+    return ZERO
 
 
-LINEAR = SimpleNamespace(first_moment=straight, second_moment=straight, at_port=straight)
+@kernel
+def _still_frame(d, p, j, vector, first):
+    """Return zero displacement and rotation of a frame."""
+    return ZERO, ZERO
+
+
+LINEAR = SimpleNamespace(first_moment=_still, at_port=_still_frame)
 
 
 def of_each(body: Callable) -> Callable:
@@ -66,44 +79,48 @@ def of_each(body: Callable) -> Callable:
     return bodies
 
 
-def flexible_bodies(shortening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]:
+def flexible_bodies(stiffening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]:
     """Return the factory of the kernels of flexible bodies; its argument is the mass matrix module, `articulated` or
-    `composite`. `shortening`: linear shapes, or those that bending shortens (`effects.stiffening.bodies`)."""
-    return partial(_flexible_bodies, shortening)
+    `composite`. `stiffening`: linear motion of frames, or with the part of `effects.stiffening.bodies`."""
+    return partial(_flexible_bodies, stiffening)
 
 
-def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
-    first_moment, second_moment = shortening.first_moment, shortening.second_moment
-    site, inboard = make_ports(shortening.at_port, tree)
+def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
+    first_moment = stiffening.first_moment
+    site, inboard = make_ports(stiffening.at_port, tree)
     carried, body_mass_matrix = make_carrying(tree)
     reference, demand_of = tree.origin, tree.demand_of
 
     @kernel
     def invariants(d, k):
-        """Fill MODAL with P (first 9 n) and V (next 9 n); row (3k + l) holds n values."""
+        """Fill MODAL with P (first 9 n) and V (next 9 n); row (3k + l) holds n values.
+
+        Also store int rho r_k (q'^T G q')_l in SCRATCH, up to a part that is symmetric in k and l.
+        """
         body = d.flexes[k]
         n, e = body.n_modes, body.moment0
-        for row in range(9 * n):
-            P_row, V_row, end = (
-                d.flex_data[body.data0 + 3 * n + row].value,
-                0.0,
-                d.moment_rows[body.moment_row0 + row].end,
-            )
-            while e < end:
-                i, F = d.moments[e].mode, d.moment_values[e].value
-                P_row += F * d.x[body.q0 + i]
-                V_row += F * d.u[body.c0 + i]
-                e += 1
-            d.modal[row], d.modal[9 * n + row] = P_row, V_row
-        for j in range(n):
-            d.modal[j] += second_moment(d, k, j, d.x, body.q0)
+        for pair in range(9):
+            drift, across = 0.0, pair % 4 != 0  # terms of equal axes are symmetric
+            for j in range(n):
+                row = pair * n + j
+                P_row, V_row, bent = d.flex_data[body.data0 + 3 * n + row].value, 0.0, 0.0
+                end = d.moment_rows[body.moment_row0 + row].end
+                while e < end:
+                    i, moment = d.moments[e].mode, d.moment_values[e]
+                    P_row += moment.position * d.x[body.q0 + i]
+                    V_row += moment.rate * d.u[body.c0 + i]
+                    if across:
+                        bent += moment.position * d.u[body.c0 + i]
+                    e += 1
+                d.modal[row], d.modal[9 * n + row] = P_row, V_row
+                drift += bent * d.u[body.c0 + j]
+            d.scratch[DRIFT + pair] = drift
 
     @kernel
     def shape(d, k, j):
-        """Return the first moment of mode j's displacement per unit rate: int rho S_j, plus the part of shortening."""
+        """Return the first moment of mode j's displacement per unit rate: int rho S_j, plus the part of stiffening."""
         body = d.flexes[k]
-        C = of_mode(d.flex_data, body.data0, body.n_modes, j)
-        return (C[0] + first_moment(d, k, j, d.x, body.q0), C[1], C[2])
+        return add(of_mode(d.flex_data, body.data0, body.n_modes, j), first_moment(d, k, j, d.x, body.q0))
 
     @kernel
     def sums(d, k):
@@ -157,9 +174,9 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
         T = bias + 4 * n
         all_in_interface(d, k, d.at_modal + bias, d.at_modal_bias + c0, d.at_modal + T)
         for j in range(n):
-            drawn = first_moment(d, k, j, d.x, body.q0)  # if not zero, shapes are eigenmodes
             C = of_mode(d.interface_data, body.interface0, n, j)
-            linear = turn(R, (C[0] + drawn, C[1], C[2]))
+            # if the second part is not zero, shapes are eigenmodes
+            linear = turn(R, add(C, first_moment(d, k, j, d.x, body.q0)))
             angular = turn(R, (d.modal[T + j], d.modal[T + n + j], d.modal[T + 2 * n + j]))
             momentum = d.momenta[c0 + j]
             momentum.angular = add(angular, cross(p, linear))
@@ -184,10 +201,11 @@ def _flexible_bodies(shortening: Any, tree: Any) -> FlexibleBodies:
         force = add(scale(mass, a), cross(alpha, first))
         force = add(force, cross(omega, add(cross(omega, first), scale(2.0, first_rate))))
         for j in range(body.n_modes):
-            # shortening accelerates points along x also at constant modal rates
-            force = add(force, (d.u[body.c0 + j] * first_moment(d, k, j, d.u, body.c0), 0.0, 0.0))
-        moment = add(cross(first, a), turn_symmetric(J, alpha))
-        moment = add(moment, cross(omega, turn_symmetric(J, omega)))
+            # the quadratic part accelerates points also at constant modal rates
+            force = add(force, scale(d.u[body.c0 + j], first_moment(d, k, j, d.u, body.c0)))
+        moment = add(add(cross(first, a), spin(d.scratch, DRIFT, 1, 0)), turn_symmetric(J, alpha))
+        untilted = at6(d.flex_numbers[k].untilted, 0)
+        moment = add(moment, cross(omega, sub(turn_symmetric(J, omega), turn_symmetric(untilted, omega))))
         # 2 int rho r x (omega x rdot) = 2 (tr(D) omega - D^T omega)
         D = at9(d.scratch, RATE)
         twice = add(scale(D[0] + D[4] + D[8], omega), scale(-1.0, turn_back(D, omega)))

@@ -1,4 +1,4 @@
-"""Terms of the equations of a flexible body that do not depend on shortening by bending."""
+"""Terms of the equations of a flexible body that do not depend on its stiffening by loads."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_symmetric,
 )
 
-RATE = 9  #: SCRATCH: second moment int rho r r^T (9), then D = int rho r rdot^T (9)
+#: SCRATCH: second moment int rho r r^T (9), D = int rho r rdot^T (9), int rho r (q'^T G q')^T (9)
+RATE, DRIFT = 9, 18
 
 
 @kernel
@@ -29,8 +30,9 @@ def of_mode(numbers, first, n, j):
 
 @kernel
 def tensor(Q):
-    """Return the inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment at the start of Q."""
-    return (Q[4] + Q[8], Q[0] + Q[8], Q[0] + Q[4], -Q[1], -Q[2], -Q[5])
+    """Return the inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the symmetric part of the start of Q."""
+    across = (-0.5 * (Q[1] + Q[3]), -0.5 * (Q[2] + Q[6]), -0.5 * (Q[5] + Q[7]))
+    return (Q[4] + Q[8], Q[0] + Q[8], Q[0] + Q[4], *across)
 
 
 @kernel

@@ -1,6 +1,7 @@
 """Frames on flexible bodies: deformation, its rates, and the twist per rate of each moving shape.
 
-A frame turns by the rotation vector theta = Psi q and moves by Phi q; its rotation is the full exp(theta),
+A frame turns by the rotation vector theta = Psi q and moves by Phi q (each with a quadratic part where loads stiffen
+the body); its rotation is the full exp(theta),
 so that angular velocity and energy agree to rounding.
 """
 
@@ -34,8 +35,9 @@ def moving(body):
     return body.n_modes - body.n_held, body.c0 + body.n_held
 
 
-def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
-    """Build the kernels `site` and `inboard`; shortening(d, p, j, vector, first): shortening along x, or zero.
+def make_ports(stiffening: Callable, tree: Any) -> tuple[Callable, Callable]:
+    """Build the kernels `site` and `inboard`; stiffening(d, p, j, vector, first): row j of the frame's second-order
+    displacement and rotation, times n entries of an array from `first` on.
 
     tree: module that factors the mass matrix, and may need columns about the origin of their link.
     """
@@ -55,13 +57,15 @@ def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
         for j in range(n):
             x, u, du = d.interface_x[c + j], d.interface_u[c + j], d.du[c + j]
             phi, psi = of_mode(d.port_data, move, n, j), of_mode(d.port_data, spin, n, j)
-            drawn = shortening(d, p, j, d.interface_x, c)
-            bent = (phi[0] + drawn, phi[1], phi[2])
-            s = add(s, scale(x, (phi[0] + 0.5 * drawn, phi[1], phi[2])))
-            s_rate, s_acc = add(s_rate, scale(u, bent)), add(s_acc, scale(du, bent))
-            s_acc = add(s_acc, (u * shortening(d, p, j, d.interface_u, c), 0.0, 0.0))
-            theta, theta_rate = add(theta, scale(x, psi)), add(theta_rate, scale(u, psi))
-            theta_acc = add(theta_acc, scale(du, psi))
+            (move2, spin2), (move2_rate, spin2_rate) = (
+                stiffening(d, p, j, d.interface_x, c),
+                stiffening(d, p, j, d.interface_u, c),
+            )
+            s, theta = add(s, scale(x, add(phi, scale(0.5, move2)))), add(theta, scale(x, add(psi, scale(0.5, spin2))))
+            phi, psi = add(phi, move2), add(psi, spin2)
+            s_rate, theta_rate = add(s_rate, scale(u, phi)), add(theta_rate, scale(u, psi))
+            s_acc = add(s_acc, add(scale(du, phi), scale(u, move2_rate)))
+            theta_acc = add(theta_acc, add(scale(du, psi), scale(u, spin2_rate)))
         local = add(undeformed.origin, s)
         turned = product(exponential(theta), undeformed.axes)
         alpha = add(tangent_rate(theta, theta_rate), tangent(theta, theta_acc))
@@ -78,10 +82,10 @@ def make_ports(shortening: Callable, tree: Any) -> tuple[Callable, Callable]:
         n, c = moving(d.flexes[port.flex])
         spin = product(R, tangent_matrix(theta))
         for j in range(n):
-            phi = of_mode(d.port_data, port.shapes, n, j)
-            bent = (phi[0] + shortening(d, p, j, d.interface_x, c), phi[1], phi[2])
-            angular = scale(sign, turn(spin, of_mode(d.port_data, port.shapes + 3 * n, n, j)))
-            linear = scale(sign, turn(R, bent))
+            move2, spin2 = stiffening(d, p, j, d.interface_x, c)
+            psi = add(of_mode(d.port_data, port.shapes + 3 * n, n, j), spin2)
+            angular = scale(sign, turn(spin, psi))
+            linear = scale(sign, turn(R, add(of_mode(d.port_data, port.shapes, n, j), move2)))
             add_twist(d.columns[first + j], angular, add(linear, cross(origin, angular)))
             localise_shape(d, first + j, base + j if base >= 0 else -1, angular, add(linear, cross(arm, angular)))
 

@@ -17,6 +17,7 @@ from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium
 from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
 from flexclear.pipeline.dynamics.record.dataset import attributes, recorded, subject
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions
+from flexclear.pipeline.dynamics.run.refusals import validity
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
@@ -43,6 +44,7 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
         iterations=rest.iterations,
         mobility=rest.at.Z.shape[1],
         redundant_closure_rows=rest.at.redundant,
+        warnings="\n".join(validity.warnings(bench.model, once.time, seen)),
         undetermined_reactions=", ".join(n for n in bench.scene.joint if n in bench.engine.mobility.redundant_joints),
     )
 
@@ -123,7 +125,7 @@ def _energies(motions: Motions) -> dict[str, np.ndarray]:
     """Return twice the kinetic energy of every moving body in states, by name, shape (rows - 1,) each.
 
     motions: first row: the drives' motion alone, which is subtracted; then those with the speeds of vibrations.
-    Shortening of bent beams is of second order here and neglected.
+    What loads stiffen is of second order here and neglected.
     """
     energies = {name: _rigid(body, motions.body(name)) for name, body in motions.model.scene.rigid().items()}
     for i in motions.model.numbering.flexible:
@@ -147,11 +149,12 @@ def _rigid(body: RigidBody, motion: Motion) -> np.ndarray:
 def _flexible(bundle: Labelled, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return twice the kinetic energy of a modally reduced body whose frame moves; see `bodies.flexible`."""
     v, omega = _relative(frame)
-    E, F, C = (bundle[n].values for n in ("position_mode_moment", "mode_mode_moment", "modal_first_moment"))
+    E, C = (bundle[n].values for n in ("position_mode_moment", "modal_first_moment"))
+    F = bundle["mode_mode_moment"].values + bundle["second_order_moment"].values
     P = E + np.einsum("klij,i->klj", F, q)
     half = np.einsum("klj,j->kl", E, q)
     second = bundle["second_moment"].values + half + half.T + np.einsum("klij,i,j->kl", F, q, q)
-    inertia = np.trace(second) * np.eye(3) - second
+    inertia = np.trace(second) * np.eye(3) - 0.5 * (second + second.T)
     first, rate = bundle["first_moment"].values + C @ q, u @ C.T
     spin = np.array([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
     energy = float(bundle["mass"].values) * np.sum(v * v, axis=1)

@@ -31,10 +31,11 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
     losses: ledger index of the energy that modal damping dissipates, of each independent mechanism.
     """
     flex, flex_real, ends = list[tuple[int, ...]](), list[list[float]](), list[int]()
-    data, index, value, interface = list[float](), list[int](), list[float](), list[float]()
+    data, index, interface = list[float](), list[int](), list[float]()
+    value = list[list[float]]()
     entry, entry_value = list[tuple[int, int]](), list[float]()
     mechanism, bodies = numbering.mechanism, numbering.mechanism.scene.flexible()
-    any_shortened = any(b.stiffening is not None for b in bodies.values())
+    any_stiffened = any(b.stiffening is not None for b in bodies.values())
     for i in numbering.flexible:
         name, bundle = _body(mechanism, i)
         q, c = numbering.modal_positions[i], numbering.modal_coordinates[i]
@@ -45,18 +46,24 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
         of_basis = (basis.held, len(entry), len(entries), len(entry) + held, len(interface))
         flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis, losses[mechanism.components.of(i)]))
         flex_real.append(
-            [float(bundle["mass"].values), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
+            [
+                float(bundle["mass"].values),
+                *bundle["first_moment"].values,
+                *bundle["second_moment"].values.ravel(),
+                *bundle["untilted_inertia"].values[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
+            ]
         )
         entry += entries
         entry_value += [basis.matrix[where_] for where_ in entries]
         interface += _interface_data(bundle, basis).tolist()
         data += _data(bundle, _damping(name, bodies[name], bundle)).tolist()
-        if any_shortened:
-            data += np.concatenate(_forms(mechanism, i, len(q))).tolist()
+        if any_stiffened:
+            first, _ = stiffening(mechanism, i)
+            data += (np.zeros(3 * len(q) ** 2) if first is None else first.ravel()).tolist()
         ends += (len(value) + row_ends).tolist()
         value += moments.tolist()
         index += where.tolist()
-    port, port_real, port_data = _ports(numbering, any_shortened)
+    port, port_real, port_data = _ports(numbering, any_stiffened)
     return {
         m.FLEXES: flex,
         m.MOMENTS: index,
@@ -81,41 +88,38 @@ def _body(mechanism: Mechanism, link: int) -> tuple[str, Labelled]:
     return name, bundle
 
 
-def shortening(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray | None:
-    """Return a bent body's shortening per pair of modes at a frame [1/(kg m)], or first moment [1/m]; (mode, mode).
+def stiffening(
+    mechanism: Mechanism, link: int, frame: str | None = None
+) -> tuple[np.ndarray, np.ndarray] | tuple[None, None]:
+    """Return second derivatives of a frame's displacement [1/m] and rotation [1/m^2] by modes, (axis, mode, mode).
 
-    link: a flexible one.  frame: its name in the bundle, None for the first moment.  None without stiffening in the
-    scene.
+    link: a flexible one.  frame: its name in the bundle, None for the first moment [kg/m], twice.  None without
+    stiffening in the scene.
     """
     body, bundle = _body(mechanism, link)
     if mechanism.scene.flexible()[body].stiffening is None:
-        return None
-    if "frame_shortening" not in bundle:
-        raise InputError(
-            f"[body.{body}.stiffening]",
-            "the bundle of its mesh has no shortening of bent bodies",
-            "stiffening is for beams; remove it",
-        )
+        return None, None
     if frame is None:
-        return bundle["shortening_first_moment"].values
-    return bundle["frame_shortening"].values[frame_index(bundle, frame)]
+        return (bundle["second_order_first_moment"].values,) * 2
+    k = frame_index(bundle, frame)
+    return bundle["frame_second_translation"].values[k], bundle["frame_second_rotation"].values[k]
 
 
 def shift(
-    shape: np.ndarray, shortening: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
+    shape: np.ndarray, second: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    r"""Return displacement :math:`S q + \tfrac12 q^T B q\, e_x` of a point in the body frame, and its two rates.
+    r"""Return displacement :math:`S q + \tfrac12 q^T G q` of a point in the body frame, and its two rates.
 
-    shape: S, (3, mode).  shortening: B of a bent beam, (mode, mode); None where the scene leaves it out.
+    shape: S, (3, mode).  second: G, (3, mode, mode); None where loads do not stiffen the body.
     q, u, du: modal coordinates, rates and second rates, (time, mode).
     """
-    displacement, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
-    if shortening is not None:
-        bent, turning = q @ shortening, u @ shortening
-        displacement[:, 0] += 0.5 * np.sum(bent * q, axis=1)
-        rate[:, 0] += np.sum(bent * u, axis=1)
-        second[:, 0] += np.sum(bent * du, axis=1) + np.sum(turning * u, axis=1)
-    return displacement, rate, second
+    displacement, rate, acceleration = q @ shape.T, u @ shape.T, du @ shape.T
+    if second is not None:
+        bent, turning = np.einsum("ti,kij->tkj", q, second), np.einsum("ti,kij->tkj", u, second)
+        displacement += 0.5 * np.einsum("tkj,tj->tk", bent, q)
+        rate += np.einsum("tkj,tj->tk", bent, u)
+        acceleration += np.einsum("tkj,tj->tk", bent, du) + np.einsum("tkj,tj->tk", turning, u)
+    return displacement, rate, acceleration
 
 
 def _damping(name: str, body: FlexibleBody, bundle: Labelled) -> np.ndarray:
@@ -132,13 +136,6 @@ def _damping(name: str, body: FlexibleBody, bundle: Labelled) -> np.ndarray:
         )
     ratios = given.ratios if isinstance(given, RatioPerMode) else given or 0.0
     return 2.0 * np.asarray(ratios) * np.sqrt(square)
-
-
-def _forms(mechanism: Mechanism, link: int, n: int) -> list[np.ndarray]:
-    """Return int rho B and int rho x B of a body, n n entries each; zeros for a body without stiffening."""
-    first = shortening(mechanism, link)
-    second = None if first is None else _body(mechanism, link)[1]["shortening_second_moment"].values
-    return [np.zeros(n * n) if form is None else form.ravel() for form in (first, second)]
 
 
 def _data(bundle: Labelled, damping: np.ndarray) -> np.ndarray:
@@ -166,13 +163,13 @@ def _interface_data(bundle: Labelled, basis: InterfaceBasis) -> np.ndarray:
 
 
 def _moments(bundle: Labelled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return nonzero int rho S_ki S_lj by row (3k + l) n + j: values, modes i, and the end of each row among them."""
-    F = bundle["mode_mode_moment"].values
-    n = F.shape[-1]
-    k, l, i, j = np.nonzero(np.abs(F) > NO_COUPLING * max(np.abs(F).max(), 1e-300))
+    """Return nonzero rows of MOMENT_VALUES by row (3k + l) n + j, modes i, and the end of each row among them."""
+    F, L = bundle["mode_mode_moment"].values, bundle["second_order_moment"].values
+    n, both = F.shape[-1], np.stack([F + L, F])
+    k, l, i, j = np.nonzero(np.any(np.abs(both) > NO_COUPLING * max(np.abs(F).max(), 1e-300), axis=0))
     row = (3 * k + l) * n + j
     order = np.lexsort((i, row))
-    return F[k, l, i, j][order], i[order], np.cumsum(np.bincount(row, minlength=9 * n))
+    return both[:, k, l, i, j][:, order].T, i[order], np.cumsum(np.bincount(row, minlength=9 * n))
 
 
 def _inboard_frame(mechanism: Mechanism, link: int) -> str | None:
@@ -187,8 +184,7 @@ def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
     if frame is None:
         return False
     _, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
-    at_frame = shortening(mechanism, link, frame)
-    return any(np.any(shape) for shape in [*shapes, *([] if at_frame is None else [at_frame])])
+    return any(np.any(shape) for shape in [*shapes, *stiffening(mechanism, link, frame)] if shape is not None)
 
 
 def coupled(mechanism: Mechanism, link: int) -> bool:
@@ -199,7 +195,7 @@ def coupled(mechanism: Mechanism, link: int) -> bool:
     return _inboard_moves(mechanism, link) or mass_coupled(_body(mechanism, link)[1])
 
 
-def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any], list[float]]:
+def _ports(numbering: Numbering, stiffened: bool) -> tuple[list[Any], list[Any], list[float]]:
     """Return the tables of ports: of sites, then one per flexible link's own frame (`Numbering.port_of_inboard`)."""
     mechanism = numbering.mechanism
     rows, reals, data = list[Any](), list[Any](), list[float]()
@@ -211,9 +207,9 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
         else:
             pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
         chunks: list[np.ndarray] = [(shape @ numbering.bases[link].moving).ravel() for shape in shapes]
-        if shortened:
-            at_frame = None if frame is None else shortening(mechanism, link, frame)
-            chunks.append(np.zeros(n * n) if at_frame is None else at_frame.ravel())
+        if stiffened:
+            forms = (None, None) if frame is None else stiffening(mechanism, link, frame)
+            chunks += [np.zeros(3 * n * n) if form is None else form.ravel() for form in forms]
         rows.append((numbering.flexible.index(link), column, len(data)))
         reals.append(pose)
         data += np.concatenate(chunks).tolist()
@@ -228,5 +224,6 @@ def start_place(mechanism: Mechanism, site: Site) -> Placement:
     label = site.frame.partition(".")[2]
     _, moves, turns = frame_shapes(bundle, label)
     rest = np.zeros((1, len(q)))
-    shifted, _, _ = shift(moves, shortening(mechanism, site.link, label), q[None], rest, rest)
-    return Placement(site.placement.p + shifted[0], rotation_vector_to_matrix(turns @ q) @ site.placement.R)
+    second = stiffening(mechanism, site.link, label)
+    shifted, turned = (shift(S, G, q[None], rest, rest)[0][0] for S, G in zip((moves, turns), second, strict=True))
+    return Placement(site.placement.p + shifted, rotation_vector_to_matrix(turned) @ site.placement.R)

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
 from flexclear.pipeline.dynamics.model.driving import joint_type
-from flexclear.pipeline.dynamics.model.flexible_bodies import shift, shortening, start_place
+from flexclear.pipeline.dynamics.model.flexible_bodies import shift, start_place, stiffening
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.model import Model
@@ -330,21 +330,21 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
 class Centre:
     """Centre of mass of a body; place: its position in the frame of its link, undeformed.
 
-    shape, shortening: its displacement with the modal coordinates, as in `flexible_bodies.shift`.  positions, speeds:
+    shape, second: its displacement with the modal coordinates, as in `flexible_bodies.shift`.  positions, speeds:
     indices of these coordinates among the free ones.
     """
 
     link: int
     place: np.ndarray
     shape: np.ndarray
-    shortening: np.ndarray | None = None
+    second: np.ndarray | None = None
     positions: range = range(0)
     speeds: range = range(0)
 
     def motion(self, frames: np.ndarray, q: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return angular velocity of the body and velocity of its centre of mass, world axes, shape (6,)."""
         frame, bent, bending = frames[self.link], q[None, self.positions], u[None, self.speeds]
-        moved, rate, _ = shift(self.shape, self.shortening, bent, bending, np.zeros_like(bent))
+        moved, rate, _ = shift(self.shape, self.second, bent, bending, np.zeros_like(bent))
         arm = frame["axes"] @ (self.place + moved[0])
         v = frame["velocity"] + np.cross(frame["omega"], arm) + frame["axes"] @ rate[0]
         return np.concatenate([frame["omega"], v])
@@ -359,9 +359,9 @@ def centre_of(model: Model, name: str) -> Centre:
         return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
-    bent, numbering = shortening(model.mechanism, i), model.numbering
-    bent = None if bent is None else bent / link.mass
-    return Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
+    (form, _), numbering = stiffening(model.mechanism, i), model.numbering
+    second = None if form is None else form / link.mass
+    return Centre(i, first, shape, second, numbering.modal_positions[i], numbering.modal_coordinates[i])
 
 
 def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:

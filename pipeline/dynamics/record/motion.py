@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import continued, cross, turned
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics.equations.observation import Observed, Variables
-from flexclear.pipeline.dynamics.model.flexible_bodies import shift, shortening
+from flexclear.pipeline.dynamics.model.flexible_bodies import shift, stiffening
 from flexclear.pipeline.dynamics.model.interface_basis import frame_index
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
@@ -70,9 +70,9 @@ class Modal:
     u: np.ndarray
     du: np.ndarray
 
-    def shift(self, shape: np.ndarray, shortening: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def shift(self, shape: np.ndarray, second: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return displacement, rate and second rate of a point in the body frame; see `model.flexible_bodies.shift`."""
-        return shift(shape, shortening, self.q, self.u, self.du)
+        return shift(shape, second, self.q, self.u, self.du)
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Motions:
             return self.link(i).at(placement.point(np.array(body.com)), placement.R)
         assert link.bundle is not None
         shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
-        arm, rate, second = self.modal(i).shift(shape, shortening(self.model.mechanism, i))
+        arm, rate, second = self.modal(i).shift(shape, stiffening(self.model.mechanism, i)[0])
         return self.link(i).moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
 
     @cached_property
@@ -155,7 +155,7 @@ class Motions:
             if bundle is not None:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].values[frame_index(bundle, label)]
-                bent = placement.p + self.modal(i).shift(S, shortening(self.model.mechanism, i, label))[0]
+                bent = placement.p + self.modal(i).shift(S, stiffening(self.model.mechanism, i, label)[0])[0]
                 positions[:, k] = link.p + turned(link.R, bent)
         return positions
 
@@ -172,8 +172,9 @@ class Motions:
             label, state = name.partition(".")[2], self.modal(i)
             at = frame_index(bundle, label)
             S, P = (bundle[f"frame_{k}_shape"].values[at] for k in ("translation", "rotation"))
-            arm, rate, second = state.shift(S, shortening(self.model.mechanism, i, label))
-            turning = turned(link.R, _angular_velocity(state.q @ P.T, state.u @ P.T))
+            move, turn = stiffening(self.model.mechanism, i, label)
+            arm, rate, second = state.shift(S, move)
+            turning = turned(link.R, _angular_velocity(*state.shift(P, turn)[:2]))
             velocities[name] = link.moving(placement.p + arm, rate, second).v, link.omega + turning
         return velocities
 

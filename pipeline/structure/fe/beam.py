@@ -72,20 +72,6 @@ def assemble(mesh: xr.Dataset) -> Beam:
     return Beam(K, mass, kinematics, basis, to_fields, mesh["node_position"].values, axes, component, along)
 
 
-def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_array:
-    r"""Return the stiffness of deflections under a tension N, :math:`\int N (v'^2 + w'^2)\,dx`, shape (ndof, ndof).
-
-    axial_force: N [N], tension positive, of each cell, shape (cells,), or at its Gauss points, shape (cells, points).
-    Only the axis counts: terms of the twist (Wagner) and of masses off the axis are neglected.
-    Source: Przemieniecki (1968), ch. 15.
-    """
-    beam = assemble(mesh)
-    force = np.asarray(axial_force, dtype=float)
-    force = np.broadcast_to(force.reshape(len(force), -1), beam.basis.dx.shape)
-    form = _form(beam.kinematics, _work_of_tension)
-    return _in_vector_order(form.assemble(beam.basis, force=force), beam.to_fields)
-
-
 def rigid_vectors(beam: Beam, about: np.ndarray | None = None) -> np.ndarray:
     """Return three translations and three rotations about a point, by default the mesh origin, shape (ndof, 6)."""
     inside = beam.size - beam.nodal_size
@@ -164,11 +150,6 @@ def _kinetic_energy(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> An
     translation = p["line"] * sum(x * dx for x, dx in zip(s, ds, strict=True))
     slopes = p["slope_v"] * v * dv + p["slope_w"] * w * dw + p["slope_both"] * (v * dw + w * dv)
     return translation + p["twist"] * t * dt + slopes
-
-
-def _work_of_tension(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
-    (_, v, w), (_, dv, dw) = kinematics.section(*trial)[0], kinematics.section(*test)[0]
-    return p["force"] * (v.grad[0] * dv.grad[0] + w.grad[0] * dw.grad[0])
 
 
 def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:

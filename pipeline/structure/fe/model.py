@@ -42,6 +42,22 @@ class Integrals:
     modal_first_moment: np.ndarray  #: int rho S, shape (3, n)
     position_mode_moment: np.ndarray  #: int rho X_k S_lj, shape (3, 3, n)
     mode_mode_moment: np.ndarray  #: int rho S_ki S_lj, shape (3, 3, n, n)
+    second_order_moment: np.ndarray  #: of sections that turn, see `SecondOrder`; zero for solids
+    untilted_inertia: np.ndarray  #: of sections that twist but do not tilt [kg m^2], shape (3, 3)
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """Integrals of the displacements that are quadratic in n modal coordinates, 1/2 q^T G q, in axes of the mesh frame.
+
+    They count where they multiply rigid motion, and forces at named frames.  The last three are None where forces and
+    accelerations do not stiffen the body.
+    """
+
+    second_order_moment: np.ndarray  #: int rho X_k G_l [kg], shape (3, 3, n, n)
+    second_order_first_moment: np.ndarray | None = None  #: int rho G [kg/m], shape (3, n, n)
+    frame_second_translation: np.ndarray | None = None  #: G of the frames' origins [1/m], shape (frames, 3, n, n)
+    frame_second_rotation: np.ndarray | None = None  #: of their rotation vectors [1/m^2], shape (frames, 3, n, n)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ import xarray as xr
 
 from flexclear.pipeline.structure import closed_form
 from flexclear.pipeline.structure.fe import beam as beams
-from flexclear.pipeline.structure.fe import beam_mesh
+from flexclear.pipeline.structure.fe import beam_loads, beam_mesh
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
-from flexclear.pipeline.structure.fe.model import Drawn, Families, Interface, Model, interfaces, selection
+from flexclear.pipeline.structure.fe.model import Drawn, Families, Interface, Model, SecondOrder, interfaces, selection
 from flexclear.pipeline.structure.fe.section import Section, shape
 from flexclear.pipeline.structure.fe.slices import integrate, slices
 from flexclear.pipeline.structure.kinds.kind import Kind
@@ -94,10 +94,21 @@ def _sections(mesh: xr.Dataset, beam: Beam) -> tuple[np.ndarray, np.ndarray | No
     return radius, np.stack(flat) @ beam.axes[:, 1:].T
 
 
+def _second_order(
+    mesh: xr.Dataset, model: Model, vectors: np.ndarray, stiffening: bool, held: Interface | None
+) -> SecondOrder | None:
+    if not stiffening:
+        return None  # the motion of the sections is a volume integral
+    x = mesh["abscissa"].values
+    node = dict(zip(mesh["frame"].values.tolist(), mesh["frame_node"].values, strict=True))
+    return beam_loads.second_order(mesh, float(x.min() if held is None else x[node[held.name]]), vectors)
+
+
 KIND = Kind(
     build=beam_mesh.build,
     vtu=beam_mesh.as_vtu,
     assemble=assemble,
     words=lambda model, families, vectors: [name.partition("_")[0] for name in families],
     exact=closed_form.columns,
+    second_order=_second_order,
 )

@@ -11,13 +11,20 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.structure.fe.model import Interface, Model, SecondOrder
 from flexclear.pipeline.structure.fe.recipe import parse
 from flexclear.pipeline.structure.kinds import name_of
 
 FAMILY = "flexclear.pipeline.structure.kinds"
 #: name of a recipe in messages, where the caller has no better one
 PLACE = "mesh recipe"
+
+
+def no_stresses(mesh: xr.Dataset, model: Model, vectors: np.ndarray, stiffening: bool, held: Interface | None) -> None:
+    """Return None: the stresses of the body are unknown; raise InputError where they are needed."""
+    if stiffening:
+        raise InputError("[body] stiffening", "matrices do not give the stresses of a body", "remove stiffening")
 
 
 @dataclass(frozen=True)
@@ -30,6 +37,8 @@ class Kind:
     words: one word for the motion of each mode, from its family and vectors of shape (ndof, n).
     exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
         families and the interfaces' names; None for kinds without any.
+    second_order: second-order motion of vectors (ndof, n) that follows from stresses: without stiffening by forces and
+        accelerations (False), or with it, held at an interface, if any; None where it has no such part.
     """
 
     build: Callable[[Any, Path, str], xr.Dataset]
@@ -37,6 +46,7 @@ class Kind:
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
     exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] | None = None
+    second_order: Callable[[xr.Dataset, Model, np.ndarray, bool, Interface | None], SecondOrder | None] = no_stresses
 
 
 def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLACE) -> xr.Dataset:

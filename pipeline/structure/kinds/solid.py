@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
+import xarray as xr
 
-from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.model import Interface, Model, SecondOrder
 from flexclear.pipeline.structure.fe.solid import mesh as meshes
+from flexclear.pipeline.structure.fe.solid import prestress
 from flexclear.pipeline.structure.fe.solid.model import assemble
 from flexclear.pipeline.structure.kinds.kind import Kind
+from flexclear.pipeline.structure.modes.statics import Flexibility, border, support
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
@@ -38,4 +42,40 @@ def _word(along: float, out: float, turn: float) -> str:
     return "axial" if along > out + turn else "bending"
 
 
-KIND = Kind(build=meshes.build, vtu=meshes.as_vtu, assemble=assemble, words=_words)
+def _second_order(
+    mesh: xr.Dataset, model: Model, vectors: np.ndarray, stiffening: bool, held: Interface | None
+) -> SecondOrder:
+    """Return the second-order motion under the stresses of a free spin; with stiffening, under those of all loads."""
+    flexibility, n = support(model, lambda fraction: None), vectors.shape[1]
+    spread, line, nodal = prestress.inertial(mesh)
+    if not stiffening:
+        pairs = np.stack(np.triu_indices(3), axis=1)
+        nodal = np.stack([0.5 * (nodal[:, k, l] + nodal[:, l, k]) for k, l in pairs], axis=1)
+        work = prestress.forms(mesh, vectors, *_relieved(flexibility, spread, line, nodal, spread.T @ nodal))
+        moment = np.empty((3, 3, n, n))
+        for (k, l), form in zip(pairs, work, strict=True):
+            moment[k, l] = moment[l, k] = -form
+        return SecondOrder(moment)
+    of_frames = np.hstack([frame.motion.T.toarray() for frame in model.interfaces])
+    nodal = np.hstack([nodal.reshape(len(nodal), 12), np.zeros((len(nodal), of_frames.shape[1]))])
+    loads = np.hstack([spread.T @ nodal[:, :12], of_frames])
+    if held is None:
+        response, nodal = _relieved(flexibility, spread, line, nodal, loads)
+    else:
+        response = border(flexibility, held.motion).solve(loads)
+    forms = -prestress.forms(mesh, vectors, response, nodal)
+    moments, at_frames = forms[:12].reshape(4, 3, n, n), forms[12:].reshape(-1, 2, 3, n, n)
+    return SecondOrder(moments[:3], moments[3], at_frames[:, 0], at_frames[:, 1])
+
+
+def _relieved(
+    flexibility: Flexibility, spread: sp.csr_array, line: sp.csr_array, nodal: np.ndarray, loads: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return response (ndof, m) and nodal loads (3 nodes, m) of a free body, with its inertia forces."""
+    acceleration = np.linalg.solve(flexibility.inertia, flexibility.model.rigid.T @ loads)
+    moved = spread @ (flexibility.model.rigid @ acceleration)
+    inertia = (line @ moved.reshape(line.shape[0], -1)).reshape(moved.shape)
+    return flexibility.response(flexibility.balanced(loads)), nodal - inertia
+
+
+KIND = Kind(build=meshes.build, vtu=meshes.as_vtu, assemble=assemble, words=_words, second_order=_second_order)

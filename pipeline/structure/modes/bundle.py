@@ -14,21 +14,28 @@ from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 
 
-def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None = None) -> xr.Dataset:
+def build(
+    mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None = None, *, stiffening: bool = False
+) -> xr.Dataset:
     """Build the reduced bundle (schema BUNDLE) of a mesh and its modes.
 
-    extra: further variables, such as those of stress recovery.
+    extra: further variables, such as those of stress recovery.  stiffening: with the second-order motion by which
+    forces and accelerations stiffen the body, held at the first of the modes' interfaces.
 
     Without deformation the body frame is the mesh frame; how it follows the deformation is defined by the
     reference condition of the modes.  Units per modal coordinate: q in m, for modal masses of 1 kg.
     """
-    model = of_mesh(mesh).assemble(mesh)
+    kind = of_mesh(mesh)
+    model = kind.assemble(mesh)
     vectors = modes["vector"].values
     drawn = model.drawn.moved(vectors)
     integrals = model.integrate(vectors)
+    held = next((frame for frame in model.interfaces if frame.name in modes.attrs["interfaces"].split()[:1]), None)
+    second = kind.second_order(mesh, model, vectors, stiffening, held)
     moved = np.stack([frame.motion @ vectors for frame in model.interfaces])
     values = {
         **vars(integrals),
+        **({} if second is None else {name: value for name, value in vars(second).items() if value is not None}),
         "modal_mass": np.einsum("kkij->ij", integrals.mode_mode_moment),
         **model.frames(),
         "frame_translation_shape": moved[:, :3],

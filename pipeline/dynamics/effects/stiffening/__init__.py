@@ -1,1 +1,1 @@
-"""Shortening of beams by bending, which stiffens them when they rotate or are pulled."""
+"""Stiffening of flexible bodies by forces and accelerations."""

@@ -217,6 +217,8 @@ def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
         modal_first_moment=mesh["unknown_first_moment"].values @ vectors,
         position_mode_moment=mesh["unknown_position_moment"].values @ vectors,
         mode_mode_moment=pair,
+        second_order_moment=np.zeros_like(pair),
+        untilted_inertia=np.zeros((3, 3)),
     )
 
 
@@ -269,8 +271,8 @@ def _lumped(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions:
     size = np.array([1.0] * 3 + [np.ptp(positions, axis=0).max()] * 3)
     if np.any(np.abs(expected - blocks) > ALIKE * mass[:, None, None] * np.outer(size, size)):
         return None
-    motion = at_centres(models.node_motion(index, component, len(first)), c)
-    return Slices(mass, positions[first] + c, spread(J), motion)
+    motion, D = at_centres(models.node_motion(index, component, len(first)), c), spread(J)
+    return Slices(mass, positions[first] + c, D, motion, D, c)
 
 
 def _blocks(M: sp.csr_array, index: np.ndarray, component: np.ndarray, count: int) -> np.ndarray | None:

@@ -76,6 +76,26 @@ def mass(solid: Solid) -> sp.csr_array:
     return symmetric(sp.csr_array((data, indices, indptr), shape=(n, n)))
 
 
+def stress_stiffness(solid: Solid, displacement: np.ndarray) -> sp.csr_array:
+    r"""Return :math:`\int\sigma_{ij}\,\partial_i N_a\,\partial_j N_b` [N/m] of a displacement's stress, shape (n, n).
+
+    displacement: of the nodes [m], shape (n, 3).
+    """
+    at = sampled(solid.element, ELEMENTS[solid.element].stiffness_order)
+    (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
+    data = np.zeros(len(indices))
+    for part in chunks(solid, at):
+        weight, gradient = gradients(solid, part, at)
+        slope = np.einsum("cak,cqai->cqik", displacement[solid.cells[part]], gradient, optimize=True)
+        lame, shear = (values[part][:, None, None, None] for values in (solid.lame, solid.shear))
+        volume = np.trace(slope, axis1=2, axis2=3)[..., None, None] * np.eye(3)
+        stress = lame * volume + shear * (slope + slope.swapaxes(2, 3))
+        pulled = (gradient @ stress) * weight[..., None, None]
+        K = np.einsum("cqai,cqbi->cab", pulled, gradient, optimize=True)
+        data += np.bincount(pairs[part].ravel(), K.ravel(), minlength=len(data))
+    return symmetric(sp.csr_array((data, indices, indptr), shape=(n, n)))
+
+
 def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) -> None:
     """Raise InputError when cells are inverted or flat at some quadrature point."""
     blank = np.zeros(len(cells))

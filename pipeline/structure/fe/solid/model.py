@@ -83,6 +83,8 @@ def integrals(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array, vecto
         modal_first_moment=weighted.sum(axis=0),
         position_mode_moment=np.einsum("nk,nlj->klj", nodes, weighted, optimize=True),
         mode_mode_moment=pair,
+        second_order_moment=np.zeros_like(pair),
+        untilted_inertia=np.zeros((3, 3)),
     )
 
 
