@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -195,20 +195,18 @@ def _friswell() -> Body:
 
 CASES: dict[str, Callable[[], Body]] = {
     "1-clamped-free": lambda: Body(rod(1.2, circle(0.01), "rayleigh", 24), up_to=2e4),
-    **{f"2-{t}-pins": lambda t=t: _shaft(t, "pins") for t in ("euler-bernoulli", "rayleigh", "timoshenko")},
-    **{f"2-{t}-springs": lambda t=t: _shaft(t, "springs", 2e7) for t in ("rayleigh", "timoshenko")},
+    **{f"2-{t}-pins": partial(_shaft, t, "pins") for t in ("euler-bernoulli", "rayleigh", "timoshenko")},
+    **{f"2-{t}-springs": partial(_shaft, t, "springs", 2e7) for t in ("rayleigh", "timoshenko")},
     "3a": lambda: _disc_at_end("timoshenko", section=False),
     "3b": lambda: _disc_at_end("timoshenko", section=True),
     "3b_rayleigh": lambda: _disc_at_end("rayleigh", section=True),
     "4-clamped-free": lambda: _bar("timoshenko", 0.5, "clamped"),
-    **{f"4-pins-{t}": lambda t=t: _bar(t, 0.8, "pins") for t in ("rayleigh", "timoshenko")},
+    **{f"4-pins-{t}": partial(_bar, t, 0.8, "pins") for t in ("rayleigh", "timoshenko")},
     **{
-        f"5-{t}-pitch{p}": lambda t=t, p=p: _blade(t, p)
-        for t in ("euler-bernoulli", "rayleigh", "timoshenko")
-        for p in (0, 45)
+        f"5-{t}-pitch{p}": partial(_blade, t, p) for t in ("euler-bernoulli", "rayleigh", "timoshenko") for p in (0, 45)
     },
     "5-solid-pitch0": _solid_blade,
-    **{f"6-{t}": lambda t=t: _blade(t, 0, inward=True) for t in ("euler-bernoulli", "rayleigh", "timoshenko")},
+    **{f"6-{t}": partial(_blade, t, 0, inward=True) for t in ("euler-bernoulli", "rayleigh", "timoshenko")},
     "8-5.9.1": _friswell,
 }
 

@@ -16,12 +16,12 @@ from flexclear.pipeline.core.artifacts import modal
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.fe.statics import Flexibility, support
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import bundle, deficits, eigen
 from flexclear.pipeline.structure.modes.basis import ModeRequest
 from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 MESHES = Path(__file__).parents[2] / "meshes"
 #: the rod of ../../meshes/actuated_rod.toml

@@ -15,12 +15,12 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.fe.statics import Flexibility, support
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import eigen, normal, reference
 from flexclear.pipeline.structure.modes.condition import Condition, check
 from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.pipeline.structure.modes.statics import Flexibility, support
 from tests.processes import printed
 
 ROOT = Path(__file__).parents[2]

@@ -10,8 +10,8 @@ from flexclear.pipeline.structure.fe.model import Interface, Model, SecondOrder
 from flexclear.pipeline.structure.fe.solid import mesh as meshes
 from flexclear.pipeline.structure.fe.solid import prestress
 from flexclear.pipeline.structure.fe.solid.model import assemble
+from flexclear.pipeline.structure.fe.statics import Flexibility, border, support
 from flexclear.pipeline.structure.kinds.kind import Kind
-from flexclear.pipeline.structure.modes.statics import Flexibility, border, support
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5

@@ -13,10 +13,10 @@ import numpy as np
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import Interface, Model
+from flexclear.pipeline.structure.fe.statics import Flexibility, border
 from flexclear.pipeline.structure.modes import deficits, eigen, normal
 from flexclear.pipeline.structure.modes.condition import Condition
 from flexclear.pipeline.structure.modes.normal import WHERE, Normal
-from flexclear.pipeline.structure.modes.statics import Flexibility, border
 
 #: normal modes in the first attempt where a fraction decides how many are needed; each further attempt doubles them
 FIRST = 16

@@ -35,9 +35,9 @@ import scipy.sparse as sp
 from flexclear.pipeline.core.artifacts.compliance import fractions, reduced
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import DIRECTIONS, Interface, Model
+from flexclear.pipeline.structure.fe.statics import Flexibility
 from flexclear.pipeline.structure.modes import eigen, normal
 from flexclear.pipeline.structure.modes.condition import in_own_axes
-from flexclear.pipeline.structure.modes.statics import Flexibility
 
 #: frequencies of the error bound, as fractions of the free body's first frequency
 BOUND_AT = (0.0, 0.25, 0.5)

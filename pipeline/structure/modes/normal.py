@@ -13,8 +13,8 @@ import scipy.sparse.linalg
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import Model, own_dofs
+from flexclear.pipeline.structure.fe.statics import Flexibility, border
 from flexclear.pipeline.structure.modes import eigen
-from flexclear.pipeline.structure.modes.statics import Flexibility, border
 from flexclear.pipeline.structure.sparse.multifrontal import negative_pivots
 
 #: size of the largest dense eigenproblem; its three matrices take about a gigabyte

@@ -14,11 +14,11 @@ from flexclear.pipeline.core.scene.registry import lookup, suggestion
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.structure.fe.model import DOFS, Interface, Model
+from flexclear.pipeline.structure.fe.statics import Flexibility, support
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import basis, deficits, eigen
 from flexclear.pipeline.structure.modes.basis import ModeRequest
 from flexclear.pipeline.structure.modes.condition import Condition, Given, check
-from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.parts import Modes

@@ -32,7 +32,7 @@ from flexclear.pipeline.structure.fe.solid import elasticity
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, from_stress_points, sampled
 from flexclear.pipeline.structure.fe.solid.model import assemble, solid_of, surface, unknowns_of
-from flexclear.pipeline.structure.modes.statics import support
+from flexclear.pipeline.structure.fe.statics import support
 
 #: rows and columns of the six components of a symmetric tensor, in the order of the dimension `tensor`
 ROWS, COLUMNS = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
