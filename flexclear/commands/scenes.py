@@ -23,7 +23,7 @@ from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system import file_names
-from flexclear.pipeline.core.system.errors import InputError, InputErrors, ResourceError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, ResourceError, SolverError, errors_of, refuse
 from flexclear.pipeline.core.system.external_files import reading, require_file
 from flexclear.pipeline.core.system.version import DISTRIBUTION
 from flexclear.pipeline.core.workflow.progress import WARNING
@@ -267,13 +267,9 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
                 graph.up_to("post")
             path = graph.scene.path
             by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
-        except InputErrors as errors:
-            wrong.extend(errors.errors)
         except InputError as error:
-            wrong.append(error)
-    if wrong:
-        messages = [lines.located(error) for error in wrong]
-        raise messages[0] if len(messages) == 1 else InputErrors(messages)
+            wrong += errors_of(error)
+    refuse([lines.located(error) for error in wrong])
     _refuse_namesakes([graph.scene for graph in by_scene.values()])
     return list(by_scene.values())
 
@@ -284,16 +280,7 @@ def in_file(path: Path | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise placed(error, path) from None
-
-
-def placed(error: InputError, path: Path | None) -> InputError:
-    """Return an error with the file before its place, where that is only a part of the file."""
-    if isinstance(error, InputErrors):
-        return InputErrors([placed(one, path) for one in error.errors])
-    if path is None or not error.place.startswith("["):
-        return error
-    return InputError(f"{path} {error.place}", error.problem, error.remedy)
+        raise lines.placed(error, path) from None
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
@@ -317,9 +304,7 @@ def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
 def require_names(scene: Scene) -> None:
     """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
-    wrong = dangling(table, recipe_frames, str(scene.path or scene.name))
-    if wrong:
-        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+    refuse(dangling(table, recipe_frames, str(scene.path or scene.name)))
 
 
 def recipe_frames(mesh: str) -> list[str] | None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
@@ -19,6 +19,7 @@ from flexclear.pipeline.dynamics.model.flexible_bodies import shift, shortening,
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.plausibility import refuse_short
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modes
 
 #: state -> frames of all links and sites (named fields of LINK_FRAMES and SITE_FRAMES), and residual rates of the
@@ -33,8 +34,6 @@ INPUT_DIGITS = 1e-6
 WRONG = 0.05
 #: combinations of speeds that change rates by less than this fraction of the largest have no effect, as redundant rows
 REDUNDANT = 1e-9
-#: a spring shorter than this fraction of the mechanism's size has no direction
-SHORTEST_SPRING = 1e-9
 
 
 def start_state(model: Model) -> np.ndarray:
@@ -344,13 +343,7 @@ def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[in
 
 
 def check_loads(model: Model, loads: np.ndarray) -> None:
-    """Raise InputError for a spring or damper of zero length: it has no direction; loads: rows of LOAD at the start."""
-    for (name, _), value in zip(model.loads, loads["value"], strict=True):
-        load = model.scene.load[name]
-        has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
-        if has_direction and value <= SHORTEST_SPRING * model.length:
-            raise InputError(
-                f"[load.{name}.between]",
-                "its two ends coincide at the start, so that its force has no direction",
-                "move an end; only a spring with free_length = 0 and without damping may start so",
-            )
+    """Raise InputErrors for springs and dampers of zero length; loads: rows of LOAD at the start."""
+    forces, given = model.scene.load, zip(model.loads, loads["value"], strict=True)
+    lengths = {name: float(value) for (name, _), value in given if hasattr(forces[name], "between")}
+    together(partial(refuse_short, name, forces[name], length, model.length) for name, length in lengths.items())
