@@ -83,7 +83,8 @@ def start_errors(mechanism: Mechanism, *, overlaps: bool = True) -> list[InputEr
 
 def _refuse_missed(contact: Contact, offset: np.ndarray) -> None:
     """Raise InputError for a pin or ball outside its hollow part, with the distance."""
-    joint, centre = contact.joint, "centre line" if contact.joint.type == "clearance-slot" else "centre"
+    joint: Any = contact.joint
+    centre = "centre line" if joint.type == "clearance-slot" else "centre"
     (hollow, inner), away = joint.surfaces, length(float(np.linalg.norm(offset)))
     raise InputError(
         f"[{contact.place}.between]",
