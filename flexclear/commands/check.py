@@ -17,7 +17,15 @@ from typing import TYPE_CHECKING, Any
 from flexclear.commands import scenes, show
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
+from flexclear.pipeline.core.scene.load import (
+    RECIPE,
+    SCENE,
+    SWEEP,
+    compose,
+    is_file,
+    kind_of_file,
+    read_toml,
+)
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.variants import ideal, loose
 from flexclear.pipeline.core.system.errors import (
@@ -40,14 +48,14 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.model.mechanism import Mechanism
     from flexclear.pipeline.structure.fe.model import Model
 
-#: errors about a file: it is wrong, asks for too much, or starts in a pose from which several motions are possible
-MISTAKES = (InputError, ResourceError, SolverError)
+#: errors about a file: it is wrong, or asks for too much
+MISTAKES = (InputError, ResourceError)
 #: larger mesh files, and meshes with more unknowns, are checked by the run only [bytes, unknowns]
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
 #: extents of a mesh from a file outside of which its unit of length is doubted [m]
 SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
 #: parts without which the start pose of a mechanism is another
-PLACING = ("[drive.", "[start.")
+PLACING = ("[drive.", "[start.", "[gear.")
 #: number of unused frames that are listed
 LISTED_FRAMES = 3
 
@@ -297,8 +305,11 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
         from flexclear.pipeline.dynamics.run.evaluation.engine import refuse_singular
 
         model = tabulate(mechanism)
-        mechanism = model.mechanism
-        findings.attempt(lambda: refuse_singular(model, analyse(model)), whole.path)
+        mechanism, mobility = model.mechanism, analyse(model)
+        try:
+            refuse_singular(model, mobility)
+        except SolverError as error:
+            raise InputError("[start]", str(error)) from None
     else:
         from flexclear.pipeline.dynamics.model.assembly import assembled
 

@@ -276,7 +276,9 @@ def test_quantities_and_parameters_of_any_name_can_be_written(tmp_path: Path):
     kept = [variable(parse_recorded(name, owners), "values") for name in names]
     given = ["µ", "2nd mass", "mass in %", "body.bob.mass", "m" * 256]
     for name in given:
-        read_sweep({"scene": "a", "keep": ["q.position.final"], "vary": {name: {"values": [1.0], "places": ["c"]}}}, "x")
+        read_sweep(
+            {"scene": "a", "keep": ["q.position.final"], "vary": {name: {"values": [1.0], "places": ["c"]}}}, "x"
+        )
     xr.Dataset({name: (given, np.zeros((1,) * len(given))) for name in kept}).to_netcdf(tmp_path / "a.nc")
     assert kept[0].endswith("(bob.position.x - bob.position.y).final")
 
