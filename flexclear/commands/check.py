@@ -314,8 +314,7 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
         from flexclear.pipeline.dynamics.model.assembly import assembled
 
         mechanism = assembled(mechanism)
-    balanced = whole.start is not None and whole.start.at == "equilibrium"  # which separates surfaces that overlap
-    refuse(start_errors(mechanism, overlaps=not balanced))
+    refuse(start_errors(mechanism, final=whole.start is None or whole.start.at != "equilibrium"))
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):

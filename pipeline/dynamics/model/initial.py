@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
-from flexclear.pipeline.core.system.errors import InputError, together
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
@@ -19,7 +18,6 @@ from flexclear.pipeline.dynamics.model.flexible_bodies import shift, shortening,
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.plausibility import refuse_short
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modes
 
 #: state -> frames of all links and sites (named fields of LINK_FRAMES and SITE_FRAMES), and residual rates of the
@@ -340,10 +338,3 @@ def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[in
     for follow in model.parts.functions("states"):
         states |= follow(model, sites, internal)
     return states
-
-
-def check_loads(model: Model, loads: np.ndarray) -> None:
-    """Raise InputErrors for springs and dampers of zero length; loads: rows of LOAD at the start."""
-    forces, given = model.scene.load, zip(model.loads, loads["value"], strict=True)
-    lengths = {name: float(value) for (name, _), value in given if hasattr(forces[name], "between")}
-    together(partial(refuse_short, name, forces[name], length, model.length) for name, length in lengths.items())

@@ -60,24 +60,27 @@ def separations(mechanism: Mechanism) -> Iterator[Separation]:
             yield Separation(contact, -float(gap), np.array(offset), inner)
 
 
-def start_errors(mechanism: Mechanism, *, overlaps: bool = True) -> list[InputError]:
-    """Return the errors of a start pose: parts outside their hollow parts, and springs without length.
+def start_errors(mechanism: Mechanism, *, final: bool = True) -> list[InputError]:
+    """Return the errors of a start pose: parts outside their hollow parts, surfaces that overlap, and springs without
+    length.
 
-    overlaps: also surfaces that overlap. Small overlaps, which rounding of poses may cause, pass, and those which the
-    assembly of flexible bodies may remove.
+    Small overlaps, which rounding of poses may cause, pass, and those which the assembly of flexible bodies may remove.
+    final: False for a pose close to which an equilibrium is searched; only parts outside of others are errors there.
     """
     scene, slack = mechanism.scene, 0.0 if mechanism.all_rigid else 2.0 * mechanism.start_residual
     checks = list[Callable[[], None]]()
     for contact, depth, offset, _ in separations(mechanism):
         if depth > contact.joint.radius + slack and isinstance(contact.joint, HOLLOW):
             checks.append(partial(_refuse_missed, contact, offset))
-        elif overlaps and depth > SAME_POINT * max(contact.joint.clearance, contact.joint.radius) + slack:
+        elif final and depth > SAME_POINT * max(contact.joint.clearance, contact.joint.radius) + slack:
             checks.append(partial(refuse_depth, scene, contact, depth))
-    for name, load in scene.forces().items():
+    for name, load in scene.forces().items() if final else ():
         frames = getattr(load, "between", ())
         if frames and len(set(_links(mechanism, frames))) == 2:
             ends = [_position(mechanism, frame) for frame in frames]
-            checks.append(partial(refuse_short, name, load, float(np.linalg.norm(ends[1] - ends[0])), mechanism.length))
+            checks.append(
+                partial(_refuse_short, name, load, float(np.linalg.norm(ends[1] - ends[0])), mechanism.length)
+            )
     return errors_from(checks)
 
 
@@ -94,7 +97,7 @@ def _refuse_missed(contact: Contact, offset: np.ndarray) -> None:
     )
 
 
-def refuse_short(name: str, load: Any, distance: float, size: float) -> None:
+def _refuse_short(name: str, load: Any, distance: float, size: float) -> None:
     """Raise InputError for a spring or damper of zero length: it has no direction; size: of the mechanism [m]."""
     directed = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
     if directed and distance <= SHORTEST_SPRING * size:

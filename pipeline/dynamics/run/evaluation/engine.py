@@ -241,7 +241,7 @@ def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[
 
 def prepare(model: Model, progress: Progress) -> Engine:
     """Return the engine of a model, its kernels compiled or loaded. Raise SolverError for an impossible start."""
-    refuse(start_errors(model.mechanism, overlaps=False))
+    refuse(start_errors(model.mechanism, final=False))
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     refuse_singular(model, mobility)

@@ -43,7 +43,6 @@ def consistent_start(engine: Engine) -> np.ndarray:
     if model.loads or model.arrays.size(m.N_INTERNAL):
         _look(engine, y)
         y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
-        initial.check_loads(model, engine.table(m.LOAD))
     depths = overlapping(engine, y).items()
     together(partial(refuse_depth, model.scene, model.contacts[c], depth) for c, depth in depths)
     return y
