@@ -268,7 +268,7 @@ def _check_rest(path: Path, settings: Sequence[str], errors: str) -> None:
     for family in ACTING:
         table[family] = {name: part for name, part in table.get(family, {}).items() if (family, name) not in wrong}
     left = {key: value for key, value in table.items() if key not in ("view", "accuracy", "event")}
-    with suppress(ValidationError), in_file(path):
+    with suppress(ValidationError, ResourceError), in_file(path):
         simulation.check_parts(simulation.params(Scene.model_validate(left)))
 
 
