@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import of_run
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.core.workflow.task import PATH, Task
 from flexclear.stages import (
     derived_series,
     meshing,
@@ -269,6 +269,7 @@ class Graph:
         run = "simulation:run" if single_run else f"analyses:{function or stage}"
         modules = simulation.modules(self.scene, alone=single_run)
         task = self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
+        task = replace(task, check="flexclear.stages.simulation:check_parts")
         return replace(task, met=simulation.met(self.scene)) if single_run else task
 
     def _folder(self, below: str = "") -> str:
@@ -293,6 +294,7 @@ class Graph:
         """
         names = {"nc": f"{part}.nc", "vtu": f"{part}.vtu"} if part else {"nc": f"{shown}.nc"} if shown else {}
         of_scene = {} if part else {"name": self.scene.name, "limits": self.scene.limits.written()}
+        of_scene |= {PATH: str(self.scene.path)} if of_scene and self.scene.path is not None else {}
         return Task(
             stage=stage,
             scene=self.scene.name,

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.scene.load import is_file
 from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.external_files import companions
 from flexclear.pipeline.post.render import gl
 from flexclear.stages.simulation import bundles
@@ -33,10 +31,7 @@ FILMED = ("motion", "stress")
 
 
 def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
-    """Return subject, format, the scene's view, the watched parts, and the GL libraries where pictures depend on them.
-
-    Raises InputError for missing files of shapes.
-    """
+    """Return subject, format, view, watched parts, and the GL libraries where pictures depend on them."""
     values: dict[str, Any] = {"what": what, "format": kind}
     if what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4"):
         values["gl"] = gl.state()  # which GL libraries this machine has
@@ -57,19 +52,8 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
 
 def _looks(scene: Scene) -> dict[str, Any]:
     """Return shapes and colours of bodies that have some; files by name, since the key contains their content."""
-    looks = {}
-    for name, body in scene.body.items():
-        look = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
-        for k, shape in enumerate(look.get("geometry", ())):
-            if shape["type"] == "file" and not is_file(Path(shape["file"])):
-                raise InputError(
-                    f"{scene.path or scene.name} [body.{name}.geometry.{k}]",
-                    f"there is no file {shape['file']}",
-                    "paths are relative to the scene",
-                )
-        if look:
-            looks[name] = look
-    return looks
+    looks = {n: b.model_dump(mode="json", include=set(UNSEEN), exclude_none=True) for n, b in scene.body.items()}
+    return {name: look for name, look in looks.items() if look}
 
 
 def files(scene: Scene, what: str) -> dict[str, Path]:

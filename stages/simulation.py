@@ -13,7 +13,7 @@ from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.system import machine
-from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.pipeline.core.system.errors import ResourceError, refuse
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.task import given_arrays
 from flexclear.pipeline.dynamics.compile.reach import met as met
@@ -78,6 +78,13 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Pro
         simulated = dynamics.simulated(scene, reduced, progress)
     warnings = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
     return {"nc": simulated.assign_attrs(warnings=warnings) if warnings else simulated}
+
+
+def check_parts(params: Mapping[str, Any]) -> None:
+    """Raise InputErrors for the parts of a scene that are wrong on their own, before its bodies are reduced."""
+    from flexclear.pipeline.dynamics.model.checks import part_errors
+
+    refuse(part_errors(rebuild(params)))
 
 
 def check_run(scene: Scene, results: Path) -> None:

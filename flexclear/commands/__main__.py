@@ -102,10 +102,14 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError with the nearest option for an unknown one; exit code 2 for every error."""
+        from difflib import get_close_matches  # here, since correct options do not need it
+
         unknown = message.removeprefix("unrecognized arguments: ").split()
         if unknown[0].startswith("-") and message.startswith("unrecognized"):
-            name = unknown[0].partition("=")[0]
-            raise InputError(name, "unknown option", suggestion(name, sorted(self.options)))
+            name, known = unknown[0].partition("=")[0], {option.lstrip("-"): option for option in self.options}
+            near = get_close_matches(name.lstrip("-"), known, n=1)  # without the dashes, which all of them share
+            hint = f"did you mean '{known[near[0]]}'?" if near else f"known: {', '.join(sorted(self.options))}"
+            raise InputError(name, "unknown option", hint)
         super().error(message)
 
 

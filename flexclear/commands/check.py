@@ -17,10 +17,25 @@ from typing import TYPE_CHECKING, Any
 from flexclear.commands import scenes, show
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
+from flexclear.pipeline.core.scene.load import (
+    RECIPE,
+    SCENE,
+    SWEEP,
+    compose,
+    is_file,
+    kind_of_file,
+    read_toml,
+)
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.variants import ideal, loose
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
+from flexclear.pipeline.core.system.errors import (
+    FlexclearError,
+    InputError,
+    ResourceError,
+    SolverError,
+    errors_of,
+    refuse,
+)
 from flexclear.stages import meshing, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options
@@ -39,8 +54,8 @@ MISTAKES = (InputError, ResourceError)
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
 #: extents of a mesh from a file outside of which its unit of length is doubted [m]
 SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
-#: parts without which a mechanism fits together as well
-ACTING = ("[load.", "[gear.", "[stop.")
+#: parts without which the start pose of a mechanism is another
+PLACING = ("[drive.", "[start.", "[gear.")
 #: number of unused frames that are listed
 LISTED_FRAMES = 3
 
@@ -112,7 +127,8 @@ class Findings:
             with scenes.in_file(path):
                 check()
         except MISTAKES as error:
-            self.errors += error.errors if isinstance(error, InputErrors) else [error]
+            raised = errors_of(error) if isinstance(error, InputError) else [error]
+            self.errors += [one for one in raised if str(one) not in map(str, self.errors)]
             return False
         return True
 
@@ -142,12 +158,12 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
     for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
         findings.errors += mesh_of(Path(mesh))[1].errors
     for scene in loaded:
-        findings.attempt(partial(Graph(scene).up_to, "post"), path)
-        for check in _laws(scene):
-            findings.attempt(check, path)
+        complete = findings.attempt(partial(Graph(scene).up_to, "post"), path) and not findings.errors
+        findings.attempt(partial(simulation.check_parts, simulation.params(scene)), path)
+        unplaced = any(part in str(error) for error in findings.errors for part in PLACING)
         findings.warnings += scenes.implausibilities(scene, settings)
         findings.notes.append(scene.summary())
-        if not findings.errors:
+        if complete and not unplaced:
             compute(scene, mesh_of, findings)
 
 
@@ -174,22 +190,6 @@ def _recipe(path: Path, settings: Sequence[str], findings: Findings) -> None:
     frames = ", ".join(table.get("frames", {})) or "none"
     findings.warnings += of_mesh.warnings
     findings.notes.append(f"a mesh recipe, {table['shape']['type']}, frames: {frames}{mass}")
-
-
-def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
-    """Yield a check for each prescribed coordinate: it must exist, and its values must fit."""
-    from flexclear.pipeline.dynamics.model.driving import prescribed
-    from flexclear.pipeline.dynamics.model.laws import checked_law
-
-    for name, drive in scene.drive.items():
-        if getattr(drive, "joint", None) in (None, *scene.joint):
-            one_drive = scene.model_copy(update={"drive": {name: drive}})
-
-            def check(one_drive: Scene = one_drive) -> None:
-                for one in prescribed(one_drive):
-                    checked_law(one_drive, one.law, one.dimension, one.place)
-
-            yield check
 
 
 def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
@@ -226,10 +226,10 @@ def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
     for name, part in whole.flexible().items():
         if name in bodies:
             findings.attempt(partial(_modes, bodies[name], name, part), whole.path)
-    if findings.errors or set(bodies) != set(whole.recipes()):
+    if set(bodies) != set(whole.recipes()):
         return
     rigid = {name: body.rigid for name, body in bodies.items()}
-    if findings.attempt(partial(_assembled, whole, rigid, findings), whole.path):
+    if findings.attempt(partial(_assembled, whole, rigid, findings), whole.path) and not findings.errors:
         _free_motions(whole, rigid, findings)
 
 
@@ -294,31 +294,31 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
 
     Flexible bodies are undeformed; of rigid mechanisms rank and drives are checked, too.
     """
-    from flexclear.pipeline.dynamics.model.mobility import analyse
-    from flexclear.pipeline.dynamics.model.model import tabulate
-    from flexclear.pipeline.dynamics.model.plausibility import (
-        missing_joints,
-        refuse_missed,
-        refuse_overlap,
-        unused_frames,
-    )
+    from flexclear.pipeline.dynamics.model.checks import mechanism_errors
+    from flexclear.pipeline.dynamics.model.plausibility import doubts, start_errors, unused_frames
 
     mechanism = _mechanism(whole, rigid)
-    if mechanism.all_rigid:
+    sound = findings.attempt(lambda: refuse(mechanism_errors(whole, mechanism)), whole.path)
+    if mechanism.all_rigid and sound:
+        from flexclear.pipeline.dynamics.model.mobility import analyse
+        from flexclear.pipeline.dynamics.model.model import tabulate
+        from flexclear.pipeline.dynamics.run.evaluation.engine import refuse_singular
+
         model = tabulate(mechanism)
-        mechanism = model.mechanism
-        analyse(model)
-        refuse_missed(mechanism)
-        refuse_overlap(mechanism)
+        mechanism, mobility = model.mechanism, analyse(model)
+        try:
+            refuse_singular(model, mobility)
+        except SolverError as error:
+            raise InputError("[start]", str(error)) from None
     else:
         from flexclear.pipeline.dynamics.model.assembly import assembled
 
         mechanism = assembled(mechanism)
-        refuse_missed(mechanism)
+    refuse(start_errors(mechanism, final=whole.start is None or whole.start.at != "equilibrium"))
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
-    for body, text, remedy in missing_joints(mechanism):
-        findings.warnings.append(scenes.placed(InputError(f"[body.{body}]", text, remedy), whole.path))
+    for place, text, remedy in doubts(mechanism):
+        findings.warnings.append(lines.placed(InputError(place, text, remedy), whole.path))
     unused = unused_frames(mechanism)
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
@@ -333,7 +333,7 @@ def _starts_ideal(whole: Scene) -> bool:
 def _note_choice(whole: Scene, mechanism: Mechanism, findings: Findings) -> None:
     """Warn of a start that the scene does not choose; frames moved within their tolerance are no choice."""
     if "[start.joint." in mechanism.choice:
-        findings.warnings.append(scenes.placed(InputError("[start]", mechanism.choice), whole.path))
+        findings.warnings.append(lines.placed(InputError("[start]", mechanism.choice), whole.path))
 
 
 def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
@@ -349,10 +349,7 @@ def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
 
 
 def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
-    """Note the free motions besides the drives, with rigid bodies and loose joints closed, where these fit.
-
-    Loads, gears and stops are read as well: an error in one of them is an error of the scene itself.
-    """
+    """Note the free motions besides the drives, with rigid bodies and loose joints closed, where these fit."""
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
 
@@ -360,9 +357,7 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings
     try:
         model = tabulate(_mechanism(ideal(whole) if idealised else whole, rigid))
         free = analyse(model).mobility
-    except InputError as error:  # other errors: the mechanism moves only with flexible bodies or with clearance
-        if error.place.startswith(ACTING):
-            findings.errors.append(scenes.placed(error, whole.path))
+    except InputError:  # the mechanism moves only with flexible bodies or with clearance
         return
     if _starts_ideal(whole):
         _note_choice(whole, model.mechanism, findings)

@@ -116,7 +116,7 @@ def command(options: argparse.Namespace) -> None:
         path, left_out = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
         print(f"{path}: the scene's files, versions and messages; repeat with: flexclear doctor --repeat {path.name}")
         for file in left_out:
-            print(f"left out: {file}, since a mesh names it outside of the scene's folders; move it next to the mesh")
+            print(f"left out: {file}, which is outside of the scene's folder; copy it there if it may be shared")
         return
     if options.repeat is not None:
         same, report = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))

@@ -16,7 +16,7 @@ from typing import Any
 
 from flexclear.commands import scenes
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
-from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
+from flexclear.pipeline.core.artifacts.paths import DATA, TREE, kernel_root, results_root
 from flexclear.pipeline.core.scene.load import is_file, overridden, read_toml
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.system.external_files import companions, require_file
@@ -107,10 +107,10 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
 def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], list[Path]]:
     """Return all files of a scene, with True for scenes and recipes (texts of ours), and the files to leave out.
 
-    Left out are files that meshes name outside of all other folders: they may be private, and only the mesh names them.
-    Errors in a file are skipped, since the bundle exists to report them.
+    Left out are files outside of the scene's folder and of this program's own scenes and meshes: they may be private,
+    and a scene of someone else may name them.  Errors in a file are skipped: the bundle exists to report them.
     """
-    texts, others, within = [scene], list[Path](), list[Path]()
+    texts, others = [scene], list[Path]()
     for path in texts:  # the list grows by the scenes that these extend
         with contextlib.suppress(FlexclearError):
             extended = path.parent / str(read_toml(path).get("extends", path.name))
@@ -125,15 +125,14 @@ def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], lis
     for path in recipes:
         with contextlib.suppress(FlexclearError):
             others += meshing.named(read_toml(path), path.parent)
-    for path in others:
+    for path in list(others):
         with contextlib.suppress(FlexclearError):
-            within.extend(companions(path))
-    ours, others, within = (
-        [path.resolve() for path in part if is_file(path)] for part in (texts + recipes, others, within)
-    )
-    folders = {path.parent for path in (*ours, *others)}
-    near = [path for path in within if any(path.is_relative_to(folder) for folder in folders)]
-    return dict.fromkeys((*others, *near), False) | dict.fromkeys(ours, True), sorted({*within} - {*near})
+            others.extend(companions(path))
+    opened = dict.fromkeys((path.resolve() for path in others if is_file(path)), False)
+    opened |= dict.fromkeys((path.resolve() for path in texts + recipes if is_file(path)), True)
+    folders = (scene.parent, *((DATA / name).resolve() for name in ("scenes", "meshes")))
+    near = {path: ours for path, ours in opened.items() if any(path.is_relative_to(folder) for folder in folders)}
+    return near, sorted(opened.keys() - near.keys())
 
 
 def _named(node: object, key: str) -> list[Path]:

@@ -7,9 +7,12 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
 
 from flexclear.commands import export
 from flexclear.pipeline.core.artifacts import maintenance
@@ -17,19 +20,21 @@ from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
+from flexclear.pipeline.core.scene.load import is_file, load_scene, overridden, read_toml, scene_name
 from flexclear.pipeline.core.scene.plausibility import implausible
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system import file_names
-from flexclear.pipeline.core.system.errors import InputError, InputErrors, ResourceError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, ResourceError, SolverError, errors_from, errors_of, refuse
 from flexclear.pipeline.core.system.external_files import reading, require_file
 from flexclear.pipeline.core.system.version import DISTRIBUTION
 from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.pipeline.post.pages import media
 from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+from flexclear.stages import simulation
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
@@ -37,9 +42,10 @@ from flexclear.stages.workplace import Made, Workplace, add_options, open_workpl
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.pipeline.core.scene.schema import Scene
 #: largest length of the `--set` changes in a folder's name [bytes]
 LONGEST_EDITS = 100
+#: parts without which the others form a scene as well
+ACTING = ("drive", "load", "stop", "gear")
 #: folder below a scene's results that is not for users
 FACTS = ".facts"
 
@@ -239,10 +245,31 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
 
 
 def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
-    """Load the scene called `name` and apply `settings`; its own name then contains them, and so do its results."""
-    scene = load_scene(find_scene(name), overrides(settings))
+    """Load the scene called `name` and apply `settings`; its own name then contains them, and so do its results.
+
+    Raises InputErrors; where only some parts cannot be read, also for the others.
+    """
+    path = find_scene(name)
+    try:
+        scene = load_scene(path, overrides(settings))
+    except InputError as error:
+        refuse([*errors_of(error), *errors_from([partial(_check_rest, path, settings, str(error))])])
+        raise
     scene._name = with_edits(scene.name, settings)
     return scene
+
+
+def _check_rest(path: Path, settings: Sequence[str], errors: str) -> None:
+    """Check the parts that no error names of a scene that cannot be read, where these form a scene on their own."""
+    wrong = set(re.findall(r"\[(\w+)\.([\w-]+)", errors))
+    if not wrong or any(family not in ACTING for family, _ in wrong):
+        return
+    table = overridden(path, overrides(settings))
+    for family in ACTING:
+        table[family] = {name: part for name, part in table.get(family, {}).items() if (family, name) not in wrong}
+    left = {key: value for key, value in table.items() if key not in ("view", "accuracy", "event")}
+    with suppress(ValidationError, ResourceError), in_file(path):
+        simulation.check_parts(simulation.params(Scene.model_validate(left)))
 
 
 def with_edits(name: str, settings: Sequence[str]) -> str:
@@ -267,13 +294,9 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
                 graph.up_to("post")
             path = graph.scene.path
             by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
-        except InputErrors as errors:
-            wrong.extend(errors.errors)
         except InputError as error:
-            wrong.append(error)
-    if wrong:
-        messages = [lines.located(error) for error in wrong]
-        raise messages[0] if len(messages) == 1 else InputErrors(messages)
+            wrong += errors_of(error)
+    refuse([lines.located(error) for error in wrong])
     _refuse_namesakes([graph.scene for graph in by_scene.values()])
     return list(by_scene.values())
 
@@ -284,16 +307,7 @@ def in_file(path: Path | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise placed(error, path) from None
-
-
-def placed(error: InputError, path: Path | None) -> InputError:
-    """Return an error with the file before its place, where that is only a part of the file."""
-    if isinstance(error, InputErrors):
-        return InputErrors([placed(one, path) for one in error.errors])
-    if path is None or not error.place.startswith("["):
-        return error
-    return InputError(f"{path} {error.place}", error.problem, error.remedy)
+        raise lines.placed(error, path) from None
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
@@ -317,9 +331,7 @@ def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
 def require_names(scene: Scene) -> None:
     """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
-    wrong = dangling(table, recipe_frames, str(scene.path or scene.name))
-    if wrong:
-        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+    refuse(dangling(table, recipe_frames, str(scene.path or scene.name)))
 
 
 def recipe_frames(mesh: str) -> list[str] | None:

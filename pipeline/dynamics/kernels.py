@@ -53,6 +53,10 @@ class Kernel:
         self.py_func, self._make = py_func, make
         self.__name__, self.__doc__, self.__module__ = py_func.__name__, py_func.__doc__, py_func.__module__
 
+    def __call__(self, *arguments: Any) -> Any:
+        """Evaluate the function in Python, once and without compilation."""
+        return self.py_func(*arguments)
+
     @cached_property
     def dispatcher(self) -> Any:
         """Numba's dispatcher, which compiles the function for the types of its arguments."""

@@ -17,6 +17,7 @@ from flexclear.pipeline.core.artifacts import points as results
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.artifacts.quantities import regular_times
 from flexclear.pipeline.core.artifacts.store import FAMILY, Record, Store
+from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.limits import check_members, require_scatter
 from flexclear.pipeline.core.scene.load import edited, with_numbers
@@ -152,6 +153,10 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     sweep_design = design(sweep)
     _check_values(base, sweep_design, where)
     base = edited(base, sweep_design.points()[0])
+    try:
+        simulation.check_parts(simulation.params(base))
+    except InputError as error:
+        raise lines.located(lines.placed(error, base.path)) from None
     recorded = tuple(_recorded(base, name, where) for name in sweep.keep)
     _check_recorded(sweep, base, sweep_design, recorded, where)
     _check_units(base, sweep_design, recorded, where)

@@ -12,6 +12,7 @@ from scipy.special import beta
 from flexclear.pipeline.core.scene.laws import Expression, Harmonic, Step
 from flexclear.pipeline.core.scene.load import edited, load_scene, scene_of
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.dynamics.compile import sources
@@ -204,6 +205,12 @@ def law(value: str, dimension: str = "length", **more: Any) -> Pieces:
 def test_a_sine_that_is_written_out_is_the_built_in_law() -> None:
     known = pieces_of(Harmonic(type="harmonic", amplitude="10 mm", frequency="7 rad/s", phase="0.3 rad"), "length")
     assert law("a * sin(w * t + 0.3 rad)") == known
+
+
+@pytest.mark.parametrize("degrees", ["30°", "30 °", "30º"])
+def test_a_sign_for_degrees_is_a_unit(degrees: str) -> None:
+    assert law(f"a * sin(w * t + {degrees})") == law("a * sin(w * t + 30 deg)")
+    assert quantity(degrees, "angle") == pytest.approx(np.pi / 6.0, rel=1e-15)
 
 
 def test_products_of_sines_and_kinks_have_exact_rates() -> None:

@@ -79,6 +79,35 @@ def test_a_bundle_holds_files_of_any_name_but_none_from_elsewhere(
     assert names == {"mine.toml", "base", "rod.recipe", "body.inp", "parts/a.dat"}
 
 
+def test_nothing_outside_of_the_folder_of_a_scene_is_packed_or_quoted(
+    scene: Path, tmp_path: Path, command: Command
+) -> None:
+    """A scene of someone else may name any file as the scene that it extends, as a recipe, or as the table of a law."""
+    law = '[drive.d]\njoint = "j"\n[drive.d.law]\ntype = "table"\nfile = "{}"\ntime.column = {}\nvalue.column = 2\n'
+    for name in ("keys", "keys.csv"):
+        private = tmp_path / "home" / name
+        private.parent.mkdir(exist_ok=True)
+        private.write_text("-----BEGIN KEY-----, b\nnobody's, business\n")
+        (scene.parent / "keys.toml").unlink(missing_ok=True)
+        (scene.parent / "keys.toml").symlink_to(private)
+        for text in (
+            f'extends = "{private}"\n',
+            ROD.replace("MESH", str(private)),
+            ROD.replace("MESH", "keys.toml"),
+            ROD + law.format(private, 1),
+            ROD + law.format(private, '"t"'),
+        ):
+            scene.write_text(text)
+            said = command("check", scene, code=2).err
+            packed = command("doctor", "--bundle", scene, "--out", tmp_path / "bundle.zip").out
+            assert f"left out: {private}" in packed
+            with zipfile.ZipFile(tmp_path / "bundle.zip") as archive:
+                content = b"".join(archive.read(one) for one in archive.namelist())
+            for word in ("BEGIN", "nobody"):
+                assert word not in said
+                assert word.encode() not in content
+
+
 def test_a_run_that_ends_otherwise_is_reported(scene: Path, tmp_path: Path, command: Command) -> None:
     path, _ = reproduction.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
     with zipfile.ZipFile(path) as archive:

@@ -50,6 +50,8 @@ def test_scenes_are_named_by_file_or_by_name(command: Command, root: Path):
         (["fly"], "fly: unknown command\n  hint: known: cache, check,"),
         (["a.toml"], "a.toml: is not a command\n  hint: a command comes first, as in: flexclear check a.toml"),
         (["run", "checks/pendulum", "--jbos", "2"], "--jbos: unknown option\n  hint: did you mean '--jobs'?"),
+        (["plan", "a", "--bugdet", "2s"], "--bugdet: unknown option\n  hint: did you mean '--budget'?"),
+        (["run", "a", "--bugdet", "2s"], "--bugdet: unknown option\n  hint: known: "),
         (["sweep", "a", "--jbos=3"], "--jbos: unknown option\n  hint: did you mean '--jobs'?"),
     ],
 )

@@ -13,8 +13,10 @@ from scipy.special import ellipk
 import flexclear as fc
 from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
+from flexclear.pipeline.core.artifacts.points import variable
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.sweep import read_sweep
 from flexclear.pipeline.core.scene.units import udunits
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
@@ -219,6 +221,10 @@ def test_members_give_mean_and_deviation(root: Path):
             "varied by 'a' already",
         ),
         ({"vary": {"time": [1.0]}}, "sweep", "another name"),
+        *(
+            ({"vary": {name: {"values": [1.0], "places": ["body.bob.mass"]}}}, "sweep", "cannot name a dimension")
+            for name in ("% of mass", "-m", " m", "m ", "a/b", "(m)", "m" * 257, "µ" * 129)
+        ),
         ({"vary": {"time.end": [1.0, 2.0]}, "keep": ["bob.position.series"]}, "keep", "time.end is varied"),
         ({"keep": ["bob.speed.largest"]}, "keep", "velocity"),
         ({"keep": ["bob.velocity"]}, "keep", "bob.velocity.largest"),
@@ -261,6 +267,20 @@ def test_a_force_at_some_points_that_is_a_torque_at_others_is_refused(root: Path
     vary = {"drive.turning.coordinate": ["rotation", "translation"]}
     with pytest.raises(InputError, match="a force at some points and a torque at others"):
         fc.sweep(root / "scenes/checks/spindle.toml", vary, ["turning.drive_force.rms"], workers=1)
+
+
+def test_quantities_and_parameters_of_any_name_can_be_written(tmp_path: Path):
+    """What a file cannot name begins with "_"; of parameters, names that NetCDF refuses are refused."""
+    owners = load_scene("scenes/checks/pendulum.toml").owners()
+    names = ["(bob.position.x - bob.position.y).final", "norm(bob.velocity).largest", "(bob.position.x / 2).final"]
+    kept = [variable(parse_recorded(name, owners), "values") for name in names]
+    given = ["µ", "2nd mass", "mass in %", "body.bob.mass", "m" * 256]
+    for name in given:
+        read_sweep(
+            {"scene": "a", "keep": ["q.position.final"], "vary": {name: {"values": [1.0], "places": ["c"]}}}, "x"
+        )
+    xr.Dataset({name: (given, np.zeros((1,) * len(given))) for name in kept}).to_netcdf(tmp_path / "a.nc")
+    assert kept[0].endswith("(bob.position.x - bob.position.y).final")
 
 
 def test_units_of_parameters_are_read_by_other_programs():

@@ -76,8 +76,9 @@ def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Poin
 
 
 def variable(one: Recorded, statistic: str) -> str:
-    """Return the name of a variable, with "÷" for "/", which names in files must not contain."""
-    return (one.name if statistic == "values" else f"{one.name}.{statistic}").replace("/", "÷")
+    """Return the name of a variable, as files allow it: with "÷" for "/", and "_" before a sign or a bracket."""
+    name = (one.name if statistic == "values" else f"{one.name}.{statistic}").replace("/", "÷")
+    return name if name[0].isalnum() else f"_{name}"
 
 
 def dataset(

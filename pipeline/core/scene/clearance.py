@@ -285,6 +285,8 @@ class BallOnPlane(_Contact):
 Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
 #: all types of contacts
 CONTACTS: tuple[Any, ...] = get_args(Clearance)
+#: types of joints with a hollow part, in which a pin or ball moves
+HOLLOW: tuple[Any, ...] = tuple(kind for kind in CONTACTS if issubclass(kind, _Clearance))
 
 #: sizes that the bearing of a joint may have, and those that it must have
 SIZES: dict[str, tuple[set[str], set[str]]] = {

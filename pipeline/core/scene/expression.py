@@ -180,6 +180,7 @@ _OPERATORS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mul
 
 def _as_python(text: str) -> tuple[list[str], list[re.Match[str]]]:
     """Return the words of an expression with its leaves replaced by names, ``_0`` the first, and the leaves."""
+    text = units.DEGREES.sub(" deg", text)
     words, leaves, place = list[str](), list[re.Match[str]](), 0
     while place < len(text):
         token = _TOKEN.match(text, place)

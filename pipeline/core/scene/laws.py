@@ -363,7 +363,8 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
     for number, row in enumerate(rows[1:] if header else rows, start=2 if header else 1):
         cells = [row[c].strip() if c < len(row) else "" for c in columns]
         if not all(_is_number(cell) for cell in cells):
-            raise ValueError(f"row {number} of {path.name} holds {cells}, not two numbers")
+            which = " and ".join(str(c + 1) for c in columns)
+            raise ValueError(f"row {number} of {path.name} has no numbers in columns {which}")
         points.append((quantity(f"{float(cells[0])!r} {unit}", "time"), quantity(float(cells[1]), "number")))
     return points
 
@@ -374,8 +375,11 @@ def _column(path: Path, header: list[str], rows: list[list[str]], requested: obj
             raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {requested}")
         return requested - 1
     if requested not in header:
-        known = ", ".join(header) or "it has no header; give the column's number"
-        raise ValueError(f"{path.name} has no column '{requested}'; known: {known}")
+        from difflib import get_close_matches  # here, since correct names do not need it
+
+        near = get_close_matches(str(requested), header, n=1)  # nothing else is quoted of a file that may be private
+        hint = f"did you mean '{near[0]}'?" if near else "give the column's number"
+        raise ValueError(f"{path.name} has no column '{requested}' in {'its' if header else 'a'} header; {hint}")
     return header.index(str(requested))
 
 

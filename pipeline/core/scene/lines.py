@@ -36,6 +36,15 @@ def located(error: InputError) -> InputError:
     return InputError(f"{error.place}, line {line}{other}", error.problem, error.remedy)
 
 
+def placed(error: InputError, path: Path | None) -> InputError:
+    """Return an error with the file before its place, where that is only a part of the file."""
+    if isinstance(error, InputErrors):
+        return InputErrors([placed(one, path) for one in error.errors])
+    if path is None or not error.place.startswith("["):
+        return error
+    return InputError(f"{path} {error.place}", error.problem, error.remedy)
+
+
 def where(error: InputError) -> tuple[Path, int] | None:
     """Return file and line of an error's key path, which may be written in a scene that the file extends."""
     match = _PLACE.match(error.place)
@@ -107,6 +116,8 @@ _PARTS = re.compile(
 
 def not_toml(path: Path, text: str, message: str) -> InputError:
     """Return the error for a file with this text, which the TOML reader refused with this message."""
+    if path.resolve().suffix != ".toml":  # a file that another one may name to have it quoted
+        return InputError(str(path), "is not TOML", "name a TOML file, which ends with .toml")
     match, lines = _NUMBER.search(message), text.splitlines()
     number = int(match[1]) if match else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""

@@ -10,12 +10,14 @@ from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.laws import Constant, Harmonic, Piecewise, Repeated, Spline, Step, Sum
 from flexclear.pipeline.core.scene.loads import Pid, SampledPid
 from flexclear.pipeline.core.scene.owners import turns
-from flexclear.pipeline.core.scene.parts import RigidBody
+from flexclear.pipeline.core.scene.parts import Ground, RigidBody
 from flexclear.pipeline.core.system.errors import InputError
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
+#: largest plausible ratio of a pin's radius or length to the size of the mechanism
+LARGE = 3.0
 #: largest plausible ratio of a body's radius of gyration to the extent of its frames: with kg m^2 for kg mm^2 the ratio
 #: is 1000 times larger, with a flywheel on a short crank ten times
 FAR = 30.0
@@ -33,7 +35,7 @@ UNITS = 'bare numbers are SI; with a unit they are text, as "0.2 mm" or "100 kg 
 
 def implausible(scene: Scene) -> list[InputError]:
     """Return implausible values, located as validation errors are; none of them is refused."""
-    checks = (_clearances, _inertias, _masses, _intervals, _angles, _gains)
+    checks = (_clearances, _pins, _bearings, _inertias, _masses, _intervals, _angles, _gains)
     return [warning for check in checks for warning in check(scene)]
 
 
@@ -43,6 +45,43 @@ def _clearances(scene: Scene) -> Iterator[InputError]:
             inner, sizes = joint.surfaces[1], (1e3 * joint.clearance, 1e3 * joint.radius)
             text = f"{sizes[0]:g} mm is more than the {inner}'s radius, {sizes[1]:g} mm"
             yield warning(scene, f"joint.{name}.clearance", text, UNITS)
+
+
+def _pins(scene: Scene) -> Iterator[InputError]:
+    """Yield pins and balls that are larger than the whole mechanism; frames of meshes are not known here."""
+    bodies = scene.rigid().values()
+    points = [point for body in scene.body.values() for point in _points(body, getattr(body, "pose", None))]
+    extents = [_extent([body.com, *(frame.position for frame in body.frames.values())]) for body in bodies]
+    extents += [sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass) for body in bodies]
+    size = max([*extents, _extent(points)], default=0.0)
+    for name, joint in scene.contacts().items():
+        for key in ("pin_radius", "ball_radius", "length") if size > 0.0 else ():
+            value = getattr(joint, key, None)
+            if value is not None and value > LARGE * size:
+                text = f"{value:g} m is more than the size of the mechanism, {size:.3g} m"
+                yield warning(scene, f"joint.{name}.{key}", text, UNITS)
+
+
+def _bearings(scene: Scene) -> Iterator[InputError]:
+    """Yield frames of a body without a pose that no part names, as another unused frame that a joint may have joined.
+
+    The other frame has the same name, or is the only unused one of the ground.
+    """
+    written = scene.model_dump_json(exclude={"body", "title", "description"}, exclude_none=True)
+    known = {name: body for name, body in scene.body.items() if isinstance(body, (Ground, RigidBody))}
+    unused = [
+        (name, frame) for name, body in known.items() for frame in body.frames if f"{name}.{frame}" not in written
+    ]
+    joined = [{frame.partition(".")[0] for frame in getattr(part, "between", ())} for part in scene.joint.values()]
+    lone = [(name, frame) for name, frame in unused if getattr(known[name], "pose", known[name]) is None]
+    for name, frame in lone if scene.joint else ():
+        others = [(other, its) for other, its in unused if other != name and {name, other} not in joined]
+        same = [(o, f) for o, f in others if f == frame] or [(o, f) for o, f in others if isinstance(known[o], Ground)]
+        if len(same) == 1 and (same[0][1] == frame or len(lone) == 1):
+            other = ".".join(same[0])
+            text = f"the frames '{other}' and '{name}.{frame}' are unused: is a joint missing?"
+            remedy = f'add a joint with between = ["{other}", "{name}.{frame}"], or remove the frames'
+            yield warning(scene, f"body.{name}.frames.{frame}", text, remedy)
 
 
 def _inertias(scene: Scene) -> Iterator[InputError]:

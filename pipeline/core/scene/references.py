@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from itertools import product
+from pathlib import Path
 from typing import Any
 
+from flexclear.pipeline.core.scene.load import is_file
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError
 
@@ -38,6 +40,7 @@ def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputE
             )
     for name, body in _tables(table.get("body")):
         errors += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
+        errors += _files(f"{path} [body.{name}.geometry", body)
     return errors
 
 
@@ -77,6 +80,15 @@ def _interfaces(where: str, body: Mapping[str, Any], frames: Collection[str] | N
         for key, name in named
         if name not in frames
     ]
+
+
+def _files(where: str, body: Mapping[str, Any]) -> Iterator[InputError]:
+    """Yield an error for every file of a body's shapes that does not exist."""
+    shapes = body.get("geometry")
+    for k, shape in enumerate(shapes if isinstance(shapes, (list, tuple)) else ()):
+        file = shape.get("file") if isinstance(shape, dict) else None
+        if isinstance(file, str) and not is_file(Path(file)):
+            yield InputError(f"{where}.{k}]", f"there is no file {file}", "paths are relative to the scene")
 
 
 def _texts(value: object) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,6 +22,8 @@ MOST_PARAMETERS, MOST_VALUES = 1000, 10_000_000
 Value = float | str
 #: dimensions and variables that results have besides the parameters
 RESERVED = ("point", "time", "section", "axis", "quat", "status", "reason", "evaluations", "key")
+#: names of dimensions that NetCDF takes, and their largest length [bytes]
+DIMENSION, LONGEST_DIMENSION = re.compile(r"[A-Za-z0-9_\x80-\U0010ffff]([^/]*[^/ ])?"), 256
 #: ways to give the values of a parameter, each by its keys
 WAYS = (("values",), ("from", "to"), ("mean", "deviation"))
 
@@ -175,8 +178,11 @@ class Sweep(Part):
         for name in self.vary:
             if name in RESERVED or name.startswith(self.keep):
                 raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
-            if not name.strip() or "/" in name or not name.isprintable():
-                raise ValueError(f"vary.{name}: cannot name a dimension; choose a name without slashes")
+            if not DIMENSION.fullmatch(name) or not name.isprintable() or len(name.encode()) > LONGEST_DIMENSION:
+                raise ValueError(
+                    f"vary.{name}: cannot name a dimension in a file; choose a name of at most {LONGEST_DIMENSION} "
+                    "bytes that begins with a letter, a digit or _, and has no slash"
+                )
             for where in self.places(name):
                 if where in varied_by:
                     raise ValueError(f"vary.{name}: '{where}' is varied by '{varied_by[where]}' already")

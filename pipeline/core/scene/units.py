@@ -13,6 +13,8 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import lru_cache
 
+from flexclear.pipeline.core.system.errors import InputError
+
 #: units that messages list
 COMMON = ("m", "mm", "s", "kg", "N", "N m", "rad", "deg", "rpm", "Hz", "Pa", "J")
 #: a quotient of two numbers
@@ -93,7 +95,9 @@ LARGEST_NUMBER = 1e50
 _BASE = ("kg", "m", "s", "rad")
 #: a unit and its power; powers with more digits have no physical meaning and would overflow
 _FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d(?:\.\d{1,3})?))?")
-_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
+_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg", "º": "deg"})
+#: signs for degrees
+DEGREES = re.compile(r"\s*[°º]")
 
 #: largest number of characters of a quantity
 LONGEST_QUANTITY = 200
@@ -202,6 +206,14 @@ def quantity(value: object, dimension: str) -> float:
     the number is not finite, too large or too small.
     """
     return _computable(_read(value, dimension), value)
+
+
+def quantity_at(place: str, value: object, dimension: str) -> float:
+    """Return `quantity` of a value; raise InputError at `place` where that raises ValueError."""
+    try:
+        return quantity(value, dimension)
+    except ValueError as error:
+        raise InputError(place, str(error)) from None
 
 
 def components(values: Iterable[object], dimension: str) -> list[float]:

@@ -39,7 +39,7 @@ CHOOSING = ("type", "law")
 BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 
 #: a message about a whole scene that opens with the key path of the error
-_NAMED = re.compile(r"([a-z_]+(?:\.[\w-]+)+): ")
+_NAMED = re.compile(r"([a-z_]+(?:\.[^.:\n]+)+): ")
 
 #: prefixes of pydantic's names, in an error's location, for alternatives that a validator reads from number or text
 VALIDATORS = ("function-", "constrained-", "literal[")
@@ -134,7 +134,7 @@ def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], lis
         elif any(_is_model(a) for a in alternatives) and not str(key).startswith(VALIDATORS):
             keys.append(key)
             known_keys, alternatives = _keys(alternatives), []
-    return keys, known_keys, [kind for a in alternatives for kind in _types(a)]
+    return keys, known_keys, list(dict.fromkeys(kind for a in alternatives for kind in _types(a)))
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:

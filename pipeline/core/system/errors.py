@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
 
+Result = TypeVar("Result")
 #: largest size of each piece of an error message, and of all errors of a file together [bytes]
 LONGEST_SHOWN, LONGEST_MESSAGE = 1000, 3500
 #: key that refusals name for a run's limit of evaluations, and what they name in trial runs, whose limits are lower
@@ -73,6 +75,38 @@ class InputErrors(InputError):  # noqa: N818 - a plural
                 break
             lines.append(str(error))
         FlexclearError.__init__(self, "\n".join(lines))
+
+
+def refuse(errors: Sequence[InputError]) -> None:
+    """Raise these errors: one as it is, several together; return where there are none."""
+    if errors:
+        raise errors[0] if len(errors) == 1 else InputErrors(list(errors))
+
+
+def together(makers: Iterable[Callable[[], Result]]) -> list[Result]:
+    """Return what the functions return; raise the input errors of all of them together, each once."""
+    results, errors = list[Result](), dict[str, InputError]()
+    for make in makers:
+        try:
+            results.append(make())
+        except InputError as error:
+            errors |= {str(one): one for one in errors_of(error)}
+    refuse(list(errors.values()))
+    return results
+
+
+def errors_from(checks: Iterable[Callable[[], object]]) -> list[InputError]:
+    """Return the input errors that the checks raise, each once."""
+    try:
+        together(checks)
+    except InputError as error:
+        return errors_of(error)
+    return []
+
+
+def errors_of(error: InputError) -> list[InputError]:
+    """Return the single errors that an error reports."""
+    return error.errors if isinstance(error, InputErrors) else [error]
 
 
 class SolverError(FlexclearError):

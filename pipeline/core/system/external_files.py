@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 COPIES = 5.0
 #: largest number of points of a structured grid: a header of a hundred bytes can announce any number
 MOST_POINTS = 2_000_000
+#: what a reader quotes of a file
+_QUOTED = re.compile(r"(['\"]).*?\1")
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
 #: bytes of the header of a VTK file that are examined
 HEADER = 2000
@@ -69,7 +71,8 @@ def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> 
     except MemoryError:
         raise ResourceError(f"{where}: '{path.name}' is damaged, or needs more memory than available") from None
     except Exception as error:
-        raise InputError(where, f"{problem}: {shown(str(error) or type(error).__name__)}", remedy) from None
+        reason = _QUOTED.sub("...", str(error)) or type(error).__name__  # the file may be private
+        raise InputError(where, f"{problem}: {shown(reason)}", remedy) from None
 
 
 def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | None = None) -> meshio.Mesh:

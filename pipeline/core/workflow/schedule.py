@@ -8,17 +8,26 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.store import MAIN, Record, Store
-from flexclear.pipeline.core.system.errors import INTERRUPTED, FlexclearError, ResourceError, StoppedError
+from flexclear.pipeline.core.scene import lines
+from flexclear.pipeline.core.system.errors import (
+    INTERRUPTED,
+    FlexclearError,
+    InputError,
+    ResourceError,
+    StoppedError,
+    errors_of,
+)
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import cores, stopping, workers
 from flexclear.pipeline.core.workflow.execute import execute, find, key_of
 from flexclear.pipeline.core.workflow.fingerprint import Sources, sources_of
 from flexclear.pipeline.core.workflow.progress import Monitor
-from flexclear.pipeline.core.workflow.task import Task, in_order
+from flexclear.pipeline.core.workflow.task import PATH, Task, in_order
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
@@ -91,6 +100,7 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     plan = _Plan(in_order(tasks), tuple(in_order(tasks)))
     _settle_fresh(plan, store, sources)
     if plan.waiting:
+        _fail_wrong(plan)
         for task in plan.waiting:
             if store.last(task.folder, task.label) is not None:
                 store.outdated(task.folder, task.label, UNFINISHED)
@@ -126,6 +136,24 @@ def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
             if record is not None:
                 plan.done[task] = record
                 plan.waiting.remove(task)
+
+
+def _fail_wrong(plan: _Plan) -> None:
+    """Fail the waiting tasks whose check raises, all that depend on them, and all that only these need."""
+    for task in list(plan.waiting):
+        module, _, function = task.check.partition(":")
+        try:
+            if module:
+                getattr(import_module(module), function)(task.params)
+        except InputError as error:
+            plan.waiting.remove(task)
+            plan.failed[task] = _failure(task, error)
+    plan.give_up_below_failures()
+    for task in reversed(plan.waiting if plan.failed else []):
+        users = [other for other in plan.tasks if task in other.inputs.values()]
+        if users and all(other in plan.failed for other in users):
+            plan.failed[task] = plan.failed[users[0]]
+            plan.waiting.remove(task)
 
 
 def _run_here(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
@@ -290,12 +318,21 @@ def attempt(
     except StoppedError as stopped:
         code, text = stopped.exit_code, _stopped_message(task, stopped, store)
     except FlexclearError as error:
-        code, text = error.exit_code, str(error)
+        return _failure(task, error)
     except MemoryError:
         code, text = ResourceError.exit_code, "the memory is full"
     except Exception:
         code, text = 1, f"unexpected error; please report it\n{traceback.format_exc()}"
     return Failure(task, code, f"{task.scene} {task.label}: {text}")
+
+
+def _failure(task: Task, error: FlexclearError) -> Failure:
+    """Return the failure of a task by an expected error; input errors of a scene with a file are located in it."""
+    if isinstance(error, InputError) and task.context.get(PATH):
+        error = lines.located(lines.placed(error, Path(task.context[PATH])))
+        if all(str(task.context[PATH]) in one.place for one in errors_of(error)):
+            return Failure(task, error.exit_code, str(error))
+    return Failure(task, error.exit_code, f"{task.scene} {task.label}: {error}")
 
 
 def _stopped_message(task: Task, stopped: StoppedError, store: Store) -> str:

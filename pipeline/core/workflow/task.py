@@ -16,6 +16,8 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources
 STORE = "flexclear.pipeline.core.artifacts.store"
 #: attribute of functions that `given_arrays` marks
 ARRAYS = "given_arrays"
+#: key of the context that holds the file of a task's scene, for messages
+PATH = "path"
 #: created once: `json.dumps` with options creates an encoder for every value
 _JSON = json.JSONEncoder(ensure_ascii=False, default=str)
 
@@ -44,6 +46,7 @@ class Task:
     met: modules that it reaches only if it meets an event (`encounters`), by the name of the event.
     folder: folder where its files are shown, below the results folder; empty: nowhere.
     names: file of the artifact -> name shown there; a file that is not listed keeps its name.
+    check: ``"module:function"``, called as ``check(params)`` before any task runs; it raises InputError.
     exclusive: whether no other task may run at the same time (measurements of time).
     """
 
@@ -60,6 +63,7 @@ class Task:
     exclusive: bool = False
     context: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
+    check: str = ""
 
     def roots(self, met: Iterable[str] | None = None) -> tuple[str, ...]:
         """Return the modules from which it reaches all others if it meets the named events, by default all."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import atan2
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +46,13 @@ class Coordinate:
     def part(self) -> str:
         """Joint type with this freedom alone, about or along its z axis."""
         return "revolute" if self.turning else "prismatic"
+
+    def value(self, F: Any, G: Any) -> float:
+        """Return the coordinate [rad in (-pi, pi], or m] at placements of the frames, with `p` (3,) and `R` (3, 3)."""
+        if self.turning:
+            R = F.R.T @ G.R
+            return atan2(R[self.sine], R[self.cosine])
+        return float((G if self.side else F).R[:, self.axis] @ (G.p - F.p))
 
     def along(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the coordinate's axis, shape (..., 3), at frames F and G: named fields of SITE_FRAMES, shape (...)."""

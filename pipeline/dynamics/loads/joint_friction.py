@@ -6,13 +6,15 @@ regularised coefficient.
 
 from __future__ import annotations
 
+from functools import partial
+
 from flexclear.pipeline.core.scene.loads import JointFriction
-from flexclear.pipeline.core.scene.units import quantity
+from flexclear.pipeline.core.system.errors import together
 from flexclear.pipeline.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, measure, number
-from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.loads.row import Row, numbers
 from flexclear.pipeline.dynamics.vectors import scale
 
 
@@ -30,15 +32,19 @@ def apply(d, k):
 
 def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:
     """Return the load's row: viscous coefficient [N s/m or N m s/rad], dry friction [N or N m] and its speeds."""
-    viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
+    speed, force = "angular velocity" if coordinate.turning else "velocity", coordinate.force
+    given = [partial(numbers, load, path, viscous="torsional damping" if coordinate.turning else "damping")]
+    if load.coulomb is not None:
+        dimensions = {"static": force, "dynamic": force, "v_static": speed, "v_dynamic": speed}
+        given.append(partial(numbers, load.coulomb, f"{path[:-1]}.coulomb]", **dimensions))
+    (viscous,), *dry_friction = together(given)
     if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
         raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
-    dry, kinks = (0.0, 0.0, 1.0, 2.0), (0.0, 0.0)
-    if load.coulomb is not None:
-        speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
-        forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
-        kinks = (quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
-        dry = (*forces, *kinks)
+    dry: tuple[float, ...] = (0.0, 0.0, 1.0, 2.0)
+    kinks: tuple[float, ...] = ()
+    if dry_friction:
+        dry = tuple(dry_friction[0])
+        kinks = dry[2:]
         if not 0.0 <= dry[1] <= dry[0]:
             raise ValueError(
                 "coulomb: dynamic must not be negative, nor exceed static; "
@@ -49,4 +55,4 @@ def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:
                 "coulomb: v_static must be positive and below v_dynamic; "
                 f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
             )
-    return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks if load.coulomb else (),))
+    return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks,))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import JointSpring
-from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, measure, number
-from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.loads.row import Row, numbers
 from flexclear.pipeline.dynamics.vectors import scale
 
 
@@ -24,11 +23,11 @@ def apply(d, k):
 def row(load: JointSpring, path: str, coordinate: Coordinate) -> Row:
     """Return the load's row: stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
     kind = "torsional " if coordinate.turning else ""
-    stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")
+    dimensions = {"stiffness": f"{kind}stiffness", "damping": f"{kind}damping", "rest": coordinate.dimension}
+    stiffness, damping, rest = numbers(load, path, **dimensions)
     if stiffness < 0.0 or damping < 0.0 or stiffness == damping == 0.0:
         raise ValueError(
             "stiffness and damping must not be negative, and not both be zero; "
             f"stiffness = {stiffness:.6g}, damping = {damping:.6g}"
         )
-    numbers = (stiffness, damping, quantity(load.rest, coordinate.dimension))
-    return Row(joint=load.joint, numbers=numbers, counts_turns=coordinate.turning)
+    return Row(joint=load.joint, numbers=(stiffness, damping, rest), counts_turns=coordinate.turning)

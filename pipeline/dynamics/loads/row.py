@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from flexclear.pipeline.core.scene.formulas import Formula
 from flexclear.pipeline.core.scene.laws import Polynomial
+from flexclear.pipeline.core.scene.units import quantity_at
+from flexclear.pipeline.core.system.errors import together
 
 #: the time itself, as a law
 TIME = Polynomial(type="polynomial", coefficients=(0.0, 1.0))
@@ -35,6 +38,12 @@ class Row:
     bends: tuple[tuple[float, ...], ...] = ()
     reads: tuple[tuple[str, str], ...] = ()
     located: bool = False
+
+
+def numbers(load: Any, path: str, **dimensions: str) -> list[float]:
+    """Return the numbers of these keys of a load in SI; raise the InputErrors of all that have another dimension."""
+    keys = dimensions.items()
+    return together(partial(quantity_at, f"{path[:-1]}.{key}]", getattr(load, key), of) for key, of in keys)
 
 
 def by_formula(formula: Formula, path: str, **acts: Any) -> Row:

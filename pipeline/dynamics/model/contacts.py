@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import FRICTION_LAWS, NORMAL_LAWS, SURFACES, Parts
 from flexclear.pipeline.dynamics.effects.stops.model import End, ends_an_angle
@@ -30,7 +31,7 @@ SitePairs = Sequence[tuple[int, int]]
 
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     """Return the normal law of each contact with its numbers; raise InputError for a law with impossible values."""
-    return tuple(_resolve(mechanism, contact) for contact in mechanism.contacts)
+    return tuple(together(partial(resolve_one, mechanism, contact) for contact in mechanism.contacts))
 
 
 def fill(
@@ -99,7 +100,8 @@ def bristle(name: str, joint: Any) -> float | None:
     return size
 
 
-def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
+def resolve_one(mechanism: Mechanism, contact: Contact) -> Resolved:
+    """Return the normal law of a contact; raise InputError for impossible values."""
     ends = () if isinstance(contact.joint, End) else (contact.outer, contact.inner)
     mass = _reduced_mass([mechanism.links[site.link].mass for site in ends])
     return resolved(contact.joint, mass, f"[{contact.place}.normal]")

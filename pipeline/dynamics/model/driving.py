@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.units import quantity
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics.effects import JOINTS
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
@@ -32,14 +31,6 @@ def joint_type(kind: str) -> Any:
     return lookup(JOINTS, kind, where="joint")
 
 
-def measured(value: Any, dimension: str, path: str) -> float:
-    """Return a number of a scene in SI; raise InputError at `path` for another dimension."""
-    try:
-        return quantity(value, dimension)
-    except ValueError as error:
-        raise InputError(path, str(error)) from None
-
-
 def label(joint: str, kind: str, k: int) -> str:
     """Return the name, in records and in ``[start.joint]``, of coordinate k of a joint of some type."""
     declared: tuple[Coordinate, ...] = joint_type(kind).COORDINATES
@@ -47,17 +38,17 @@ def label(joint: str, kind: str, k: int) -> str:
 
 
 def prescribed(scene: Scene) -> list[Prescribed]:
-    """Return all prescribed coordinates, in the order of the scene."""
-    coordinates = []
-    for name, drive in scene.drive.items():
-        if isinstance(drive, PathDrive):
-            for part, law in drive.components():
-                dimension = "length" if part.startswith("position") else "angle"
-                coordinates.append(Prescribed(f"{name}.{part}", law, dimension, f"[drive.{name}.{part}]"))
-        else:
-            _, _, coordinate = coordinate_of(scene, drive.joint, drive.coordinate, f"[drive.{name}]")
-            coordinates.append(Prescribed(name, drive.law, coordinate.dimension, f"[drive.{name}.law]"))
-    return coordinates
+    """Return all prescribed coordinates, in the order of the scene; raise InputError for those that do not exist."""
+    return [one for drive in together(partial(_prescribed, scene, name) for name in scene.drive) for one in drive]
+
+
+def _prescribed(scene: Scene, name: str) -> list[Prescribed]:
+    drive = scene.drive[name]
+    if not isinstance(drive, PathDrive):
+        coordinate = coordinate_of(scene, drive.joint, drive.coordinate, f"[drive.{name}]")[2]
+        return [Prescribed(name, drive.law, coordinate.dimension, f"[drive.{name}.law]")]
+    dimensions = {part: "length" if part.startswith("position") else "angle" for part, _ in drive.components()}
+    return [Prescribed(f"{name}.{p}", law, dimensions[p], f"[drive.{name}.{p}]") for p, law in drive.components()]
 
 
 def coordinate_of(scene: Scene, joint: str, name: str | None, path: str) -> tuple[str, int, Coordinate]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
@@ -33,8 +32,6 @@ INPUT_DIGITS = 1e-6
 WRONG = 0.05
 #: combinations of speeds that change rates by less than this fraction of the largest have no effect, as redundant rows
 REDUNDANT = 1e-9
-#: a spring shorter than this fraction of the mechanism's size has no direction
-SHORTEST_SPRING = 1e-9
 
 
 def start_state(model: Model) -> np.ndarray:
@@ -380,16 +377,3 @@ def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[in
     for follow in model.parts.functions("states"):
         states |= follow(model, sites, internal)
     return states
-
-
-def check_loads(model: Model, loads: np.ndarray) -> None:
-    """Raise InputError for a spring or damper of zero length: it has no direction; loads: rows of LOAD at the start."""
-    for (name, _), value in zip(model.loads, loads["value"], strict=True):
-        load = model.scene.load[name]
-        has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
-        if has_direction and value <= SHORTEST_SPRING * model.length:
-            raise InputError(
-                f"[load.{name}.between]",
-                "its two ends coincide at the start, so that its force has no direction",
-                "move an end; only a spring with free_length = 0 and without damping may start so",
-            )

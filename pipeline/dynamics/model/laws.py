@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
-from flexclear.pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.dynamics.model.driving import Prescribed, prescribed
 
+#: largest angle of a law [rad]; it is resolved to a radian or so
+LARGEST_ANGLE = 1e15
 #: no laws that replace the scene's
 NO_LAWS: Mapping[str, Pieces] = MappingProxyType({})
 
@@ -24,18 +27,21 @@ def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
     Raises InputError where a value has the wrong dimension, a law does not cover the run, or value or rate jump: no
     finite force could follow.
     """
-    laws = []
-    for one in prescribed(scene):
-        law = given[one.name] if one.name in given else checked_law(scene, one.law, one.dimension, one.place)
-        broken = None if one.name in given else jump(law, scene.time.start, scene.time.end)
-        if broken is not None:
-            raise InputError(
-                one.place,
-                f"the {broken[1]} of the prescribed motion jumps at {broken[0]:.6g} s",
-                "let value and rate continue without a jump; the second derivative may have one",
-            )
-        laws.append(law)
-    return laws
+    return together(partial(_drive_law, scene, one, given.get(one.name)) for one in prescribed(scene))
+
+
+def _drive_law(scene: Scene, one: Prescribed, given: Pieces | None) -> Pieces:
+    if given is not None:
+        return given
+    law = checked_law(scene, one.law, one.dimension, one.place)
+    broken = jump(law, scene.time.start, scene.time.end)
+    if broken is not None:
+        raise InputError(
+            one.place,
+            f"the {broken[1]} of the prescribed motion jumps at {broken[0]:.6g} s",
+            "let value and rate continue without a jump; the second derivative may have one",
+        )
+    return law
 
 
 def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
@@ -52,7 +58,22 @@ def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
             f"its points cover {low:.6g} s to {high:.6g} s, the run from {start:.6g} s to {end:.6g} s",
             "add points, or shorten the run",
         )
+    _refuse_unresolved(made, (start, end), dimension, path)
     return made
+
+
+def _refuse_unresolved(law: Pieces, run: tuple[float, float], dimension: str, path: str) -> None:
+    """Raise InputError for sines and angles of so many turns that no digit is left of the position within a turn."""
+    sines = [(abs(size), abs(rate)) for piece in law.pieces for size, rate, _ in piece.terms]
+    angles = [rate * (run[1] - run[0]) for _, rate in sines]
+    if dimension == "angle":
+        angles += [*(size for size, _ in sines), *(abs(law.value(t)) for t in run)]
+    if max(angles, default=0.0) > LARGEST_ANGLE:
+        raise InputError(
+            path,
+            f"reaches an angle of {max(angles):.3g} rad in the run; numbers of 16 digits resolve {LARGEST_ANGLE:g} rad",
+            "give a smaller amplitude or a lower frequency",
+        )
 
 
 def fill(laws: Sequence[Pieces]) -> dict[Any, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.effects import LOADS, load_kind
@@ -19,10 +20,13 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, named_coordinate
 from flexclear.pipeline.dynamics.model.gauges import Gauges
-from flexclear.pipeline.dynamics.model.laws import checked_law
+from flexclear.pipeline.dynamics.model.laws import NO_LAWS, checked_law
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
 from flexclear.pipeline.dynamics.model.merge import Placement, find_frame
 from flexclear.pipeline.dynamics.model.numbering import Numbering
+
+#: stands for the first site of a load on one frame, which acts between the world and that frame
+WORLD = -1
 
 
 class Load(NamedTuple):
@@ -66,19 +70,19 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     rows: list[tuple[int, ...]] = []
     bends, looks = list[tuple[float, ...]](), list[int]()
     numbers, laws = list[float](), list[Pieces]()
-    for name in names:
-        row, coordinate, measured = _describe(scene, name)
-        frames = row.frames if row.joint is None else tuple(scene.joint[row.joint].between)
+    described = together(partial(describe, scene, name, given) for name in names)
+    frames_of = together(
+        partial(acting_frames, mechanism, name, one.row) for name, one in zip(names, described, strict=True)
+    )
+    for name, frames, (row, coordinate, measured, its_laws) in zip(names, frames_of, described, strict=True):
         loads.append(Load(name, frames))
-        a, b = _sites(mechanism, numbering, loads[-1])
+        *first_site, b = [numbering.site(mechanism.site(frame)) for frame in frames]
+        a = first_site[0] if first_site else WORLD
         gauge = -1 if coordinate is None else gauges.add(a, b, coordinate, counts=row.counts_turns)
         look = -1 if measured is None else gauges.add(*numbering.sites_of(measured[0]), measured[1], counts=True)
         internal = gauges.states(row.states, a, b) if row.states else -1
         first = numbering.known + len(laws)
-        if f"load.{name}" in given:
-            laws.append(given[f"load.{name}"])
-        else:
-            laws += [checked_law(scene, law, dimension, path) for law, dimension, path in row.laws]
+        laws += its_laws
         rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows), len(looks), len(bends)))
         numbers += [*(mechanism.origin if row.located else ()), *row.numbers]
         looks += [_read_index(mechanism, numbering, gauges, *one) for one in row.reads]
@@ -107,11 +111,17 @@ def _read_index(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort
     return numbering.site(Site(i, place, None))
 
 
-def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[str, Coordinate] | None]:
-    """Return a load's row, its joint coordinate, and the coordinate that it measures with that joint's name.
+class Description(NamedTuple):
+    """A load's row, its joint coordinate, the coordinate that it measures with that joint's name, and its laws."""
 
-    Raises InputError for a load that cannot exist.
-    """
+    row: Row
+    coordinate: Coordinate | None
+    measured: tuple[str, Coordinate] | None
+    laws: list[Pieces]
+
+
+def describe(scene: Scene, name: str, given: Mapping[str, Pieces] = NO_LAWS) -> Description:
+    """Return the description of a load; raise InputError for one that cannot exist.  given: as in `model.tabulate`."""
     load: Any = scene.load[name]
     path = f"[load.{name}]"
     part = lookup(LOADS, load.type, where=path)
@@ -124,25 +134,26 @@ def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[st
         if load.measured is not None:
             measured = named_coordinate(scene, load.measured, f"[load.{name}.measured]")
     written = formula(scene, name)
-    given: list[Any] = [
+    entries: list[Any] = [
         *([written] if written else []),
         *([coordinate] if coordinate else []),
         *([measured[1]] if measured else []),
     ]
     try:
-        row: Row = part.row(load, path, *given)
+        row: Row = part.row(load, path, *entries)
     except ValueError as error:
         raise InputError(path, str(error)) from None
-    return row, coordinate, measured
+    if f"load.{name}" in given:
+        return Description(row, coordinate, measured, [given[f"load.{name}"]])
+    return Description(row, coordinate, measured, together(partial(checked_law, scene, *one) for one in row.laws))
 
 
-def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int, int]:
-    """Return the numbers of the load's sites a and b; a is -1 for a load between the world and b."""
-    path, frames = f"[load.{load.name}]", load.frames
+def acting_frames(mechanism: Mechanism, name: str, row: Row) -> tuple[str, ...]:
+    """Return the frames between which, or the one on which, a load acts; raise InputError where it has no effect."""
+    path, frames = f"[load.{name}]", row.frames if row.joint is None else mechanism.scene.joint[row.joint].between
     links = [mechanism.link_of[find_frame(mechanism.frames, frame, path).body] for frame in frames]
     if len(links) == 2 and links[0] == links[1]:
         raise InputError(path, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
     if links == [0]:
         raise InputError(path, f"{frames[0]} does not move, so that the load has no effect", "name a frame that moves")
-    sites = [numbering.site(mechanism.site(frame)) for frame in frames]
-    return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])
+    return frames

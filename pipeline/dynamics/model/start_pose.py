@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
+from flexclear.pipeline.core.scene.clearance import HOLLOW
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
@@ -19,7 +20,7 @@ from flexclear.pipeline.dynamics.model.driving import label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.placing import guess, targets
-from flexclear.pipeline.dynamics.model.plausibility import offsets
+from flexclear.pipeline.dynamics.model.plausibility import separations
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates
 
 if TYPE_CHECKING:
@@ -107,8 +108,8 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
 def _loose(mechanism: Mechanism) -> list[Gap]:
     """Return gaps of balls and pins that start outside their sockets."""
     result = []
-    for contact, away, inner in offsets(mechanism):
-        if np.linalg.norm(away) > 2.0 * contact.joint.clearance:
+    for contact, _, away, inner in separations(mechanism):
+        if isinstance(contact.joint, HOLLOW) and np.linalg.norm(away) > 2.0 * contact.joint.clearance:
             end = inner.p + mechanism.origin
             result.append(Gap(contact.name, end - away, end, 0.0))
     return result

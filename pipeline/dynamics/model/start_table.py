@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.scene.units import quantity_at
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import coordinate_of, measured
+from flexclear.pipeline.dynamics.model.driving import coordinate_of
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -44,22 +46,25 @@ def given_coordinates(scene: Scene) -> list[Given]:
 
     Raises InputError for unknown joints and coordinates, and for units that do not fit.
     """
-    rows = []
-    for joint, coordinates in (scene.start.joint if scene.start is not None else {}).items():
-        for name, start in coordinates.items():
-            path = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
-            _, number, coordinate = coordinate_of(scene, joint, name or None, path)
-            rate = "angular velocity" if coordinate.turning else "velocity"
-            values = [
-                None if getattr(start, key) is None else measured(getattr(start, key), dimension, f"{path[:-1]}.{key}]")
-                for key, dimension in (
-                    ("position", coordinate.dimension),
-                    ("near", coordinate.dimension),
-                    ("velocity", rate),
-                )
-            ]
-            rows.append(Given(joint, number, coordinate, path, *values))
-    return rows
+    joints = scene.start.joint if scene.start is not None else {}
+    return together(partial(_given, scene, joint, name) for joint, named in joints.items() for name in named)
+
+
+def _given(scene: Scene, joint: str, name: str) -> Given:
+    assert scene.start is not None
+    start = scene.start.joint[joint][name]
+    path = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
+    _, number, coordinate = coordinate_of(scene, joint, name or None, path)
+    rate = "angular velocity" if coordinate.turning else "velocity"
+    values = together(
+        partial(_value, f"{path[:-1]}.{key}]", getattr(start, key), dimension)
+        for key, dimension in (("position", coordinate.dimension), ("near", coordinate.dimension), ("velocity", rate))
+    )
+    return Given(joint, number, coordinate, path, *values)
+
+
+def _value(path: str, value: object, dimension: str) -> float | None:
+    return None if value is None else quantity_at(path, value, dimension)
 
 
 def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coordinate") -> dict[str, np.ndarray]:

@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.effects.stops.model import ends_an_angle
 from flexclear.pipeline.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.plausibility import missing_joints
+from flexclear.pipeline.dynamics.model.plausibility import doubts
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench, held_moments
@@ -151,7 +151,7 @@ def warnings(run: Run) -> list[str]:
     choice = [run.model.mechanism.choice] if run.model.mechanism.choice else []
     return [
         *choice,
-        *(f"{text} ({remedy})" for _, text, remedy in missing_joints(run.model.mechanism)),
+        *(f"{text} ({remedy})" for _, text, remedy in doubts(run.model.mechanism)),
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),

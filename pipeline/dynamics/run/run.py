@@ -15,7 +15,7 @@ from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError, StoppedError
+from flexclear.pipeline.core.system.errors import SolverError, StoppedError, refuse
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import meanwhile
 from flexclear.pipeline.dynamics import memory as m
@@ -25,6 +25,7 @@ from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
+from flexclear.pipeline.dynamics.model.plausibility import start_errors
 from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
@@ -111,6 +112,7 @@ def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
         requested = edited(moved, {"solver.integrator": name}) if name else moved
         with making:
             model = tabulate(build(requested, bundles), given)
+            refuse(start_errors(model.mechanism))
             if choice:  # the poses found no longer describe it
                 model = replace(model, mechanism=replace(model.mechanism, choice=choice))
             return prepare(model, tell)

@@ -266,7 +266,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
             if n[m.N_RECORDED] + waiting + few > len(tape.rows) or n[m.N_EVENTS] + few > len(tape.events):
                 tape.rows = np.concatenate([tape.rows, np.zeros_like(tape.rows)])
                 tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
-        elif status == m.SINGULAR_AHEAD:
+        elif status == m.SINGULAR_AHEAD and engine.model.closures:
             _pass_over(engine, tape)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
             if closure_rows.improve(engine, t):

@@ -12,12 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 from flexclear.pipeline.core.scene.loads import Pid
-from flexclear.pipeline.core.scene.units import quantity
+from flexclear.pipeline.core.scene.units import quantity_at
 from flexclear.pipeline.dynamics.gauge import counted, internal_rate
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, law, law_rate, measure, number
-from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.loads.row import Row, numbers
 from flexclear.pipeline.dynamics.vectors import scale
 
 #: represents a missing limit
@@ -45,16 +45,17 @@ def apply(d, k):
     act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
 
 
-def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[float, ...]:
+def settings(load: Any, path: str, coordinate: Coordinate, measured: Coordinate) -> tuple[float, ...]:
     """Return three gains, least and largest force, 1/tracking time [SI]; raise ValueError, in words, for bad values."""
-    names = ("proportional", "integral", "derivative")
-    dimensions = GAINS[coordinate.turning, measured.turning]
-    gains = [quantity(getattr(load, name), dimension) for name, dimension in zip(names, dimensions, strict=True)]
+    dimensions = zip(
+        ("proportional", "integral", "derivative"), GAINS[coordinate.turning, measured.turning], strict=True
+    )
+    gains = numbers(load, path, **dict(dimensions))
     if not any(gains):
         raise ValueError("a controller needs a gain: give proportional, integral or derivative; all are 0")
     low, high = (-UNLIMITED, UNLIMITED)
     if load.limits is not None:
-        low, high = (quantity(limit, coordinate.force) for limit in load.limits)
+        low, high = (quantity_at(f"{path[:-1]}.limits]", limit, coordinate.force) for limit in load.limits)
         if not low < high:
             raise ValueError(f"limits are the smallest and the largest force; {low:.6g} is not below {high:.6g}")
     tracking = load.tracking_time
@@ -66,6 +67,6 @@ def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[fl
 
 
 def row(load: Pid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
-    """Return the load's row: six numbers (`numbers`), the reference, and the integral part as state."""
+    """Return the load's row: six numbers (`settings`), the reference, and the integral part as state."""
     reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
-    return Row(joint=load.joint, laws=(reference,), numbers=numbers(load, coordinate, measured), states=1)
+    return Row(joint=load.joint, laws=(reference,), numbers=settings(load, path, coordinate, measured), states=1)

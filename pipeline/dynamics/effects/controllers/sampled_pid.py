@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import SampledPid
-from flexclear.pipeline.dynamics.effects.controllers.pid import numbers
+from flexclear.pipeline.dynamics.effects.controllers.pid import settings
 from flexclear.pipeline.dynamics.gauge import counted
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -35,9 +35,9 @@ def apply(d, k):
 
 
 def row(load: SampledPid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
-    """Return the load's row: six numbers (`pid.numbers`) and the period [s], the reference, three states."""
+    """Return the load's row: six numbers (`pid.settings`) and the period [s], the reference, three states."""
     reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
-    gains = (*numbers(load, coordinate, measured), load.period)
+    gains = (*settings(load, path, coordinate, measured), load.period)
     return Row(joint=load.joint, laws=(reference,), numbers=gains, states=3)
 
 

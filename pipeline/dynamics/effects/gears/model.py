@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.scene.units import quantity_at
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import measured, named_coordinate
+from flexclear.pipeline.dynamics.model.driving import named_coordinate
 from flexclear.pipeline.dynamics.model.merge import Placement
 
 if TYPE_CHECKING:
+    from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.model.filling import Filling
     from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
 
@@ -30,11 +32,7 @@ class Side:
 
     def value(self, poses: Sequence[Placement]) -> float:
         """Return the coordinate [rad in (-pi, pi], or m] at poses of the links."""
-        F, G = (poses[site.link].of(site.placement) for site in (self.a, self.b))
-        if self.coordinate.turning:
-            R = F.R.T @ G.R
-            return atan2(R[self.coordinate.sine], R[self.coordinate.cosine])
-        return float(self.along(poses) @ (G.p - F.p))
+        return self.coordinate.value(*(poses[site.link].of(site.placement) for site in (self.a, self.b)))
 
     def along(self, poses: Sequence[Placement]) -> np.ndarray:
         """Return the axis of the coordinate, shape (3,)."""
@@ -79,24 +77,34 @@ class Coupling:
 
 def couplings(mechanism: Mechanism) -> list[Coupling]:
     """Return the couplings of all gears of a scene; raise InputError for impossible ones."""
-    return [_coupling(mechanism, name) for name in mechanism.scene.gear]
+    return together(partial(_coupling, mechanism, name) for name in mechanism.scene.gear)
 
 
 def _coupling(mechanism: Mechanism, name: str) -> Coupling:
-    gear, path = mechanism.scene.gear[name], f"[gear.{name}]"
-    first, second = (_side(mechanism, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second"))
-    dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}
-    kinds = (first.coordinate.turning, second.coordinate.turning)
-    ratio = measured(gear.ratio, dimensions.get(kinds, "angle per length"), f"[gear.{name}.ratio]")
-    if ratio == 0.0:
-        raise InputError(path, "its ratio is 0, which would hold the second coordinate", "give a ratio, or drive it")
+    ratio, *named = coordinates_and_ratio(mechanism.scene, name)
+    keys = ("first", "second")
+    first, second = together(
+        partial(_side, mechanism, *n, f"[gear.{name}.{k}]") for k, n in zip(keys, named, strict=True)
+    )
     return Coupling(name, ratio, second, first)
 
 
-def _side(mechanism: Mechanism, text: str, path: str) -> Side:
-    scene = mechanism.scene
-    joint, coordinate = named_coordinate(scene, text, path)
-    frames = scene.joint[joint].between
+def coordinates_and_ratio(scene: Scene, name: str) -> tuple[float, tuple[str, Coordinate], tuple[str, Coordinate]]:
+    """Return a gear's ratio in SI, and joint and coordinate of both its sides; raise InputError for impossible ones."""
+    gear = scene.gear[name]
+    first, second = together(
+        partial(named_coordinate, scene, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second")
+    )
+    dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}
+    kinds, path = (first[1].turning, second[1].turning), f"[gear.{name}.ratio]"
+    ratio = quantity_at(path, gear.ratio, dimensions.get(kinds, "angle per length"))
+    if ratio == 0.0:
+        raise InputError(path, "its ratio is 0, which would hold the second coordinate", "give a ratio, or drive it")
+    return ratio, first, second
+
+
+def _side(mechanism: Mechanism, joint: str, coordinate: Coordinate, path: str) -> Side:
+    frames = mechanism.scene.joint[joint].between
     sites = [mechanism.site(frame) for frame in frames]
     if sites[0].link == sites[1].link:
         raise InputError(path, f"the bodies of joint '{joint}' move as one", "name another joint")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.core.scene.parts import Stop
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.scene.units import quantity_at
+from flexclear.pipeline.core.system.errors import InputError, together
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import coordinate_of, measured
+from flexclear.pipeline.dynamics.model.driving import coordinate_of
 
 #: type of a contact at an end of a stop
 STOP = "stop"
@@ -48,20 +50,19 @@ def ends(scene: Scene, lengths: Mapping[str, float]) -> list[tuple[str, End]]:
 
     lengths: size of the mechanism that each stopped joint belongs to [m].
     """
-    listed = []
-    for name, stop in scene.stop.items():
-        listed += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, lengths).items()]
-    return listed
+    pairs = together(partial(_both, scene, name, stop, lengths) for name, stop in scene.stop.items())
+    return [(f"{end.stop}.{side}", end) for pair in pairs for side, end in pair.items()]
 
 
 def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> dict[str, End]:
     path = f"[stop.{name}]"
     joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, path)
 
-    def read(key: str, dimension: str) -> float:
-        return measured(getattr(stop, key), dimension, f"[stop.{name}.{key}]")
+    def read(keys: Sequence[str], dimension: str) -> dict[str, float]:
+        given = [partial(quantity_at, f"[stop.{name}.{key}]", getattr(stop, key), dimension) for key in keys]
+        return dict(zip(keys, together(given), strict=True))
 
-    limits = {end: read(end, coordinate.dimension) for end in stop.ends}
+    limits = read(stop.ends, coordinate.dimension)
     if len(limits) == 2 and not limits["lower"] < limits["upper"]:
         raise InputError(
             path,
@@ -70,9 +71,7 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
         )
     far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else lengths[joint])
     speed = "angular velocity" if coordinate.turning else "velocity"
-    speeds: dict[str, float] = {
-        key: read(key, speed) for key in ("floor", "initial_approach_speed") if getattr(stop, key) is not None
-    }
+    speeds = read([key for key in ("floor", "initial_approach_speed") if getattr(stop, key) is not None], speed)
     for key, value in speeds.items():
         if not value > 0.0:
             raise InputError(f"[stop.{name}.{key}]", f"must be positive, not {value:.6g}")

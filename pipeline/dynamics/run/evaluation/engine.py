@@ -11,7 +11,7 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, SolverError, refuse
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.model.driving import coordinate_of
 from flexclear.pipeline.dynamics.model.initial import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
+from flexclear.pipeline.dynamics.model.plausibility import start_errors
 from flexclear.pipeline.dynamics.run.evaluation.specialised_code import SpecialisedCode, address, equations, made
 
 #: selections of closure rows with specialised steps, per integration
@@ -241,12 +241,10 @@ def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[
 
 def prepare(model: Model, progress: Progress) -> Engine:
     """Return the engine of a model, its kernels compiled or loaded. Raise SolverError for an impossible start."""
-    refuse_missed(model.mechanism)
+    refuse(start_errors(model.mechanism, final=False))
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
-    if mobility.singular_start and not may_start_singular(model):
-        raise SolverError(mobility.start_refusal)
-    _check_branch(model, mobility)
+    refuse_singular(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
     return assemble(model, entry, lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]"), mobility)
@@ -282,8 +280,11 @@ def may_start_singular(model: Model) -> bool:
     return not model.contacts and (moved or any(moves(model, name) for name in model.drives))
 
 
-def _check_branch(model: Model, mobility: Mobility) -> None:
-    """Raise InputError when `[start] branch` is given without a choice, or names an unknown coordinate."""
+def refuse_singular(model: Model, mobility: Mobility) -> None:
+    """Raise SolverError for a start whose branch is not determined, and InputError when `[start] branch` is given
+    without a choice, or names an unknown coordinate."""
+    if mobility.singular_start and not may_start_singular(model):
+        raise SolverError(mobility.start_refusal)
     if model.scene.start is None or not model.scene.start.branch:
         return
     for choice in model.scene.start.branch:

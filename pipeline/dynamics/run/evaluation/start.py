@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from flexclear.pipeline.core.scene.drives import PathDrive
-from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, SolverError, together
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.given_start import corrected_starts
@@ -42,9 +43,8 @@ def consistent_start(engine: Engine) -> np.ndarray:
     if model.loads or model.arrays.size(m.N_INTERNAL):
         _look(engine, y)
         y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
-        initial.check_loads(model, engine.table(m.LOAD))
-    for c, depth in overlapping(engine, y).items():
-        refuse_depth(model.scene, model.contacts[c], depth)
+    depths = overlapping(engine, y).items()
+    together(partial(refuse_depth, model.scene, model.contacts[c], depth) for c, depth in depths)
     return y
 
 

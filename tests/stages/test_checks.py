@@ -1,0 +1,188 @@
+"""What a run refuses before it starts, `check` reports: the same errors, all at once, each with file and line."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.stages.conftest import Command
+from tests.stages.typical_mistakes import LOAD
+
+#: a slider-crank of rigid bodies with a loose pin, which starts as its ideal mechanism does
+LOOSE = """title = "Slider-crank"
+time.end = "10 ms"
+[load.gravity]
+type = "gravity"
+acceleration = [0, "-9.81 m/s^2", 0]
+[body.ground]
+type = "ground"
+frames.O = {}
+frames.guide = { axis = [1, 0, 0] }
+[body.crank]
+type = "rigid"
+mass = 1
+inertia = [1e-4, 1e-3, 1e-3]
+frames.O = {}
+frames.A = { position = ["50 mm", 0, 0] }
+[body.rod]
+type = "rigid"
+mass = 0.5
+inertia = [1e-4, 2e-3, 2e-3]
+frames.A = {}
+frames.B = { position = ["200 mm", 0, 0] }
+[body.slider]
+type = "rigid"
+mass = 0.8
+inertia = [1e-3, 1e-3, 1e-3]
+frames.B = {}
+frames.guide = { axis = [1, 0, 0] }
+[joint.O]
+type = "revolute"
+between = ["ground.O", "crank.O"]
+[joint.A]
+type = "revolute"
+between = ["crank.A", "rod.A"]
+[joint.guide]
+type = "prismatic"
+between = ["ground.guide", "slider.guide"]
+[joint.B]
+type = "clearance-revolute"
+between = ["rod.B", "slider.B"]
+clearance = "0.1 mm"
+pin_radius = "8 mm"
+length = "16 mm"
+normal = { law = "flores", restitution = 0.8, stiffness = 1e9 }
+[drive.motor]
+joint = "O"
+law = { type = "polynomial", coefficients = ["40 deg", "300 rpm"] }
+[start]
+at = "ideal"
+joint.guide.near = "230 mm"
+"""
+PID = '[load.{}]\ntype = "pid"\njoint = "{}"\nreference = 0\n{}\n'
+#: changes of that scene, what is added to it -> key, line and words of each error
+WRONG = {
+    "drive and spring of a loose pin": (
+        {'joint = "O"': 'joint = "B"'},
+        LOAD.format("joint-spring", "B", "stiffness = 1"),
+        {
+            "drive.motor.joint": ('joint = "B"\nlaw', "the clearance-revolute joint 'B' has no coordinate"),
+            "load.l.joint": ('joint = "B"\nstiff', "the clearance-revolute joint 'B' has no coordinate"),
+        },
+    ),
+    "start beyond a stop": (
+        {},
+        '[stop.end]\njoint = "guide"\nupper = "0.1 m"\nnormal = { law = "hertz", stiffness = 1e9 }\n',
+        # the guide starts at 50 mm cos 40 deg + sqrt((200 mm)^2 - (50 mm sin 40 deg)^2) = 235.7 mm
+        {"stop.end": ("[stop.end]", "the coordinate starts 0.136 m beyond 0.1 m")},
+    ),
+    "spring and damper without length": (
+        {},
+        '[load.s]\ntype = "spring-damper"\nbetween = ["crank.A", "rod.A"]\nstiffness = 100\nfree_length = 0.01\n'
+        '[load.d]\ntype = "spring-damper"\nbetween = ["rod.A", "crank.A"]\ndamping = 1\n',
+        {
+            "load.s.between": ('between = ["crank.A", "rod.A"]\nstiff', "its two ends coincide at the start"),
+            "load.d.between": ('between = ["rod.A", "crank.A"]', "its two ends coincide at the start"),
+        },
+    ),
+    "pin outside of its slot": (
+        {},
+        '[joint.slot]\ntype = "clearance-slot"\nbetween = ["ground.O", "crank.A"]\ntravel = "300 mm"\n'
+        'clearance = "0.1 mm"\npin_radius = "8 mm"\nlength = 0.01\nnormal = { law = "hertz", stiffness = 1e9 }\n',
+        # 50 mm sin 40 deg
+        {"joint.slot.between": ('between = ["ground.O", "crank.A"]', "the pin ('crank.A') starts 32.14 mm from")},
+    ),
+    "wrong units": (
+        {},
+        PID.format("p", "O", 'proportional = "10 N"')
+        + PID.format("i", "A", 'integral = "10 N m"')
+        + LOAD.format("joint-spring", "guide", 'stiffness = "4 N m/rad"\ndamping = "3 kg"'),
+        {
+            "load.p.proportional": ('proportional = "10 N"', "'10.0 N' is a force"),
+            "load.i.integral": ('integral = "10 N m"', "'10.0 N m' is a torque"),
+            "load.l.stiffness": ('stiffness = "4 N m/rad"', "'4.0 N m/rad' is a torsional stiffness"),
+            "load.l.damping": ('damping = "3 kg"', "'3.0 kg' is a mass"),
+        },
+    ),
+    "law of a loose pin that loses all": (
+        {'"flores", restitution = 0.8': '"lankarani-nikravesh", delivered_restitution = 0.01'},
+        "",
+        {"joint.B.normal": ('normal = { law = "lank', "the law 'lankarani-nikravesh' delivers no restitution below")},
+    ),
+    "shape without a file": (
+        {"[body.slider]\n": '[body.slider]\ngeometry = [{ type = "file", file = "no.stl", unit = "1 mm" }]\n'},
+        "",
+        {"body.slider.geometry.0": ("geometry = ", "there is no file")},
+    ),
+    "units of the parts next to one with an unknown key": (
+        {},
+        PID.format("p", "O", "propotional = 10") + LOAD.format("joint-spring", "guide", 'stiffness = "4 N m/rad"'),
+        {
+            "load.p.propotional": ("propotional", "unknown key"),
+            "load.l.stiffness": ('stiffness = "4 N m/rad"', "'4.0 N m/rad' is a torsional stiffness"),
+        },
+    ),
+    "angle without digits": (
+        {'"polynomial", coefficients = ["40 deg", "300 rpm"]': '"harmonic", amplitude = 1, frequency = "1e30 Hz"'},
+        "",
+        # 2 pi 1e30 Hz 10 ms
+        {"drive.motor.law": ("law = { type", "reaches an angle of 6.28e+28 rad in the run")},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_check_and_run_report_the_same_errors_with_file_and_line(
+    name: str, tmp_path: Path, command: Command, fresh: Path
+) -> None:
+    edits, more, expected = WRONG[name]
+    scene, text = tmp_path / "own.toml", LOOSE + more
+    for old, new in edits.items():
+        assert old in text
+        text = text.replace(old, new)
+    scene.write_text(text)
+    for verb in ("check", "run"):
+        said = command(verb, scene, code=2).err
+        for key, (written, words) in expected.items():
+            assert f"{scene} [{key}], line {text[: text.index(written)].count(chr(10)) + 1}: {words}" in said
+        assert said.count(f"{scene} [") == len(expected)
+
+
+@pytest.mark.parametrize(
+    "old, new, warning",
+    [
+        (
+            'pin_radius = "8 mm"',
+            "pin_radius = 8",
+            "[joint.B.pin_radius], line 41: 8 m is more than the size of the mech",
+        ),
+        (
+            '[0, "-9.81 m/s^2", 0]',
+            "[0, 0, -9.81]",
+            "[load.gravity.acceleration], line 5: [0.0, 0.0, -9.81] m/s^2 is along",
+        ),
+        (
+            '[joint.O]\ntype = "revolute"\nbetween = ["ground.O", "crank.O"]\n',
+            "",
+            "[body.crank.frames.O], line 14: the frames 'ground.O' and 'crank.O' are unused: is a joint missing?",
+        ),
+    ],
+)
+def test_what_is_possible_but_hardly_meant_is_a_warning(
+    old: str, new: str, warning: str, tmp_path: Path, command: Command
+) -> None:
+    text = LOOSE.replace('joint = "O"', 'joint = "A"') if not new else LOOSE
+    (tmp_path / "own.toml").write_text(text.replace(old, new))
+    assert f"warning: {tmp_path / 'own.toml'} {warning}" in command("check", tmp_path / "own.toml").err
+
+
+def test_a_load_on_a_flexible_body_that_is_clamped_to_the_ground_is_no_error(tmp_path: Path, command: Command) -> None:
+    recipe = Path(__file__).parents[2] / "meshes" / "actuated_rod.toml"
+    end = list(tomllib.loads(recipe.read_text())["frames"])
+    (tmp_path / "own.toml").write_text(
+        'title = "Cantilever"\ntime.end = 1\nstart.at = "equilibrium"\n[body.ground]\ntype = "ground"\nframes.O = {}\n'
+        f'[body.rod]\ntype = "flexible"\nmesh = "{recipe}"\nmodes = {{ reference = "craig-bampton", count = 13 }}\n'
+        f'[joint.wall]\ntype = "fixed"\nbetween = ["ground.O", "rod.{end[0]}"]\n'
+        f'[load.tip]\ntype = "point-force"\nframe = "rod.{end[-1]}"\nforce = [0, 0, -1]\n'
+    )
+    assert "no error" in command("check", tmp_path / "own.toml").out
