@@ -35,8 +35,8 @@ CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
 EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
 #: owners of quantities that exist only with these effects: contacts, ends of stops, modes and stresses of bodies
 OWNED = {CLEARANCE: ("contact", "worn"), "stop": ("contact",), FLEXIBILITY: ("mode", "section", "gauge")}
-#: joint with clearance -> ideal joint that connects the same frames; slots and planes have none
-WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
+#: joint with clearance -> ideal joint that connects the same frames; a ball on a plane has none
+WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical", "clearance-slot": "slot"}
 #: keys of a flexible body that a rigid one from the same recipe also has
 SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
 #: settings that follow the parts: quantities of removed parts are no longer requested or shown
@@ -126,7 +126,7 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
 
 
 def loose(scene: Scene) -> dict[str, Clearance]:
-    """Return joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
+    """Return joints with clearance that have an ideal counterpart, by name: all but balls on planes."""
     return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
 
 

@@ -2,8 +2,8 @@
 
 The ideal scene has ideal joints instead of pins and balls with clearance. The force of such a joint at the
 start presses the pin onto one side of its socket, to the penetration at which the contact carries that force. Flexible
-bodies start deformed by the loads at the start, so that they do not spring into their shape. Slots and planes
-have no ideal counterpart: they, and the bodies that touch them, stay where the poses put them.
+bodies start deformed by the loads at the start, so that they do not spring into their shape. A ball on a plane
+has no ideal counterpart: it, and the bodies that touch it, stay where the poses put them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.parts import IdealJoint
@@ -34,6 +35,8 @@ from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 REACHED, PIN_PASSES = 1e-9, 20
 #: forces below this fraction of the weight press nothing: the pin stays in the middle
 NO_FORCE = 1e-9
+#: axes of the outer frame along which an ideal joint holds a pin in the middle; others: all
+ACROSS: dict[str, tuple[int, ...]] = {"clearance-revolute": (0, 1), "clearance-slot": (1,)}
 #: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
 SETTLED, LOADINGS = 1e-9, 10
 #: step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
@@ -144,31 +147,35 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
     modal = y[_modes(engine)]
     for _ in range(PIN_PASSES):
         closure_rows.evaluate(engine, y, engine.start)
-        sites, missing = engine.table(m.SITE_FRAMES), []
+        sites, missing, held = engine.table(m.SITE_FRAMES), [], []
         for row, contact, law, pin in zip(contacts, model.contacts, model.laws, pins, strict=True):
             if not pin:
                 continue  # the end of a stop may move, too: held fixed, it would hold the pins back
             outer, inner = sites[row["outer"]], sites[row["inner"]]
-            force, offset = forces[contact.name], inner["origin"] - outer["origin"]
-            if contact.joint.type == "clearance-revolute":
-                axis = outer["axes"][:, 2]
-                force, offset = force - axis * (axis @ force), offset - axis * (axis @ offset)
+            across = outer["axes"][:, ACROSS.get(contact.joint.type, (0, 1, 2))].T
+            force, offset = across @ forces[contact.name], across @ (inner["origin"] - outer["origin"])
             size = float(np.linalg.norm(force))
             depth = (size / law.numbers.stiffness) ** (1.0 / law.numbers.exponent)
             target = -force / size * (contact.joint.clearance + depth) if size > NO_FORCE * weight else 0.0 * force
             missing.append(target - offset)
+            held.append(across)
         least = min(joint.clearance for joint in loose(model.scene).values())
-        if np.max(np.abs(missing)) <= REACHED * least:
+        offsets = np.concatenate(missing)
+        if np.max(np.abs(offsets)) <= REACHED * least:
             return y
-        y = _move_pins(engine, y, pins, np.concatenate(missing), modal)
+        y = _move_pins(engine, y, block_diag(*held) @ offset_jacobian(engine, y)[np.repeat(pins, 3)], offsets, modal)
     raise SolverError(
         f"at t = {engine.start:.6g} s: the pins cannot reach their pressed positions; give "
         "poses and velocities instead of [start] at = 'ideal'"
     )
 
 
-def _move_pins(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, modal: np.ndarray) -> np.ndarray:
-    """Return the state with pins moved by `offsets` (3 each) [m] and modal coordinates as close to `modal` as possible.
+def _move_pins(
+    engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray, modal: np.ndarray
+) -> np.ndarray:
+    """Return the state with pins moved by `offsets` [m] and modal coordinates as close to `modal` as possible.
+
+    jacobian: of the offsets by the speeds.
 
     The least motion alone would bend rods by part of the clearance, and the run would begin with the impact of their
     springing back: a stiff rod would carry kilonewtons.
@@ -176,7 +183,6 @@ def _move_pins(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndar
     engine.select_pieces_after(engine.start)
     nq, modes = engine.model.nq, _modes(engine)
     ways = per_speed(engine, y, lambda rates: rates[:nq])
-    jacobian = offset_jacobian(engine, y)[np.repeat(pins, 3)]
     speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=SINGULAR_ROUNDING)
     if modes:
         free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that do not move the pins

@@ -32,7 +32,7 @@ SLENDER = 2.5
 #: largest half extent of a body without separate joints, as a fraction of the mechanism's size
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
-TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")
+TURNING = ("revolute", "clearance-revolute", "slot", "clearance-slot", "planar")
 SLIDING = ("prismatic", "cylindrical")
 BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
 #: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits
