@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import Start
 from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
-from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.record.motion import Motions
@@ -46,7 +46,7 @@ SINGULAR_ROUNDING = 1e-9
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
-    """Return the scene with the start of its ideal mechanism (without clearance: its own), and how that was assembled.
+    """Return the scene with the start of its ideal mechanism, and how that was assembled.
 
     Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be moved to
     their pressed positions.
@@ -56,7 +56,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     y = _deform_statically(engine, y)
     forces = _forces(scene, engine, y)
     concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
-    if not scene.contacts():
+    if not loose(scene):
         return concentric, choice
     engine, y = _started(concentric, bundles, progress)
     y = _press_pins(engine, y, forces)
@@ -64,16 +64,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
 
 def placed(scene: Scene) -> Scene:
-    """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart.
-
-    Raises InputError when the scene has contacts but none of them has a counterpart.
-    """
-    if scene.contacts() and not loose(scene):
-        raise InputError(
-            "[start.at]",
-            f"is 'ideal', but none of {', '.join(scene.contacts())} has an ideal counterpart, as pins and balls have",
-            "remove it, and give poses or [start.joint]",
-        )
+    """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart."""
     joints = scene.joint | {
         name: IdealJoint.model_validate({"type": WITHOUT_CLEARANCE[joint.type], "between": joint.between})
         for name, joint in loose(scene).items()

@@ -17,7 +17,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.effect_size import REAL, Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.effect_sizes import cell, listed
+from flexclear.pipeline.post.answers.effect_sizes import MEANING_NOT_COMPARABLE, NOT_COMPARABLE, cell, listed
 from flexclear.pipeline.post.overview.curves import measured, rounded, size_of
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -160,9 +160,10 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     requested: accuracies of the scene by quantity, in SI units; without them three levels are answered.
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
-    undone = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
+    last = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
+    last += filter(None, [result.attrs.get("staying", "")])
     if not single.sizes["effect"]:
-        return " ".join(undone) or "The scene has no effect that can be removed."
+        return " ".join(last) or "The scene has no effect that can be removed."
     levels = [(f"errors below {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
     if requested:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
@@ -183,7 +184,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     if unchanged:
         sentences.append(f"For {listed(unchanged)}, no {'further ' if named else ''}effect is needed.")
     sentences += [] if requested else [PERCENTAGES]
-    return " ".join(sentences + undone)
+    return " ".join(sentences + last)
 
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
@@ -208,6 +209,7 @@ def table(result: xr.Dataset) -> Table:
         rows.append((words, *cells, str(members) if members else "one run"))
     notes = ["Largest change of each quantity without the effect; the number after ± may be due to chance."]
     notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
+    notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     return Table(
         "Effect sizes",
         ("without", *(str(q) for q in result["quantity"].values), "members"),

@@ -12,7 +12,9 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.scene.variants import staying
 from flexclear.pipeline.post.answers.effect_ranking import in_words
+from flexclear.pipeline.post.answers.effect_sizes import stay
 from flexclear.pipeline.post.answers.stability import ENERGY, lost_energy
 from flexclear.pipeline.post.overview.curves import impacts, measured
 from flexclear.pipeline.post.single_run.series import parameters, sentence
@@ -35,15 +37,17 @@ def answer(
     """
     sentences = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
-        lacks = "Slots, planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
+        lacks = "Balls on planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
         sentences.append(f"{lacks}, so there is no idealised run to compare it with.")
     if run is not None:
         sentences += [*_impacts(run), *_horizon(run, members), *_trust(run)]
     if warnings:
         many = "one warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
         sentences.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
-    head = "" if compared is None else "<p>Compared with the same mechanism with ideal joints and rigid bodies:</p>"
-    return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"
+    head = "Compared with the same mechanism with ideal joints and rigid bodies"
+    keeps = [] if run is None else staying({n: j["type"] for n, j in parameters(run).get("joint", {}).items()})
+    head += f" ({html.escape(stay(keeps)).rstrip('.')}):" if keeps else ":"
+    return f"{'' if compared is None else f'<p>{head}</p>'}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
