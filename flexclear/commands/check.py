@@ -142,6 +142,7 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
     for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
         findings.errors += mesh_of(Path(mesh))[1].errors
     for scene in loaded:
+        findings.errors += scenes.unrecorded(scene)
         findings.attempt(partial(Graph(scene).up_to, "post"), path)
         for check in _laws(scene):
             findings.attempt(check, path)

@@ -17,8 +17,8 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.effect_size import REAL, Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.effect_sizes import MEANING_NOT_COMPARABLE, NOT_COMPARABLE, cell, listed
-from flexclear.pipeline.post.overview.curves import measured, rounded, size_of
+from flexclear.pipeline.post.answers.effect_sizes import MEANING_NOT_COMPARABLE, NOT_COMPARABLE, cell, listed, written
+from flexclear.pipeline.post.overview.curves import in_unit, rounded, size_of
 from flexclear.pipeline.post.plotting.table import Table
 
 #: effect of clearance and flexibility together: the scene against the ideal mechanism
@@ -130,22 +130,28 @@ def in_words(
     def percent(value: float) -> str:
         return f" ({rounded(100.0 * value / scale, 2)} % of its {size_of(unit)} in {of})"
 
-    means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
-    bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
-        return f"does not change: the runs agree within {bound}"
-    part = percent(change.difference) if change.difference < LARGE * scale else ""
+        return f"does not change: the runs agree within <b class='n'>{in_unit(change.most, unit)}</b>"
+    noticed = change.uncertainty > 1e-3 * change.difference
+    means = f", as means of {members} runs" if members and noticed else ""
+    if noticed and not members:
+        means = f"; the runs themselves err by up to {in_unit(change.uncertainty, unit, 2)}"
+    part = percent(change.difference or change.uncertainty) if change.difference < LARGE * scale else ""
+    up_to = "by up to" if change.difference else "by less than"
+    value = written(change.difference, change.uncertainty if members else 0.0, unit)
+    if not change.difference:
+        value = in_unit(change.uncertainty, unit, 2)
+    amount = f"{up_to} <b class='n'>{value}</b>{part}"
     if not decided(change, scale) and spread > SLIGHT * scale:
-        value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and percent(spread)}"
-        return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
-    if not decided(change, scale):
-        more = f"; about {needed(change, scale, members)} runs would decide" if members else ""
-        return f"changes by {bound} at most{part and percent(change.most)}{means}{more}"
-    if change.difference > 0.0:
-        slightly = "slightly, " if change.difference < SLIGHT * scale else ""
-        value = measured(change.difference, change.uncertainty or np.nan, unit)
-        return f"changes {slightly}by up to <b class='n'>{value}</b>{part}{means}"
-    return f"changes by less than {bound}{part and percent(change.most)}{means}"
+        apart = f"<b class='n'>{in_unit(spread, unit, 2)}</b>{part and percent(spread)}"
+        return (
+            f"is not predictable: {members} runs from slightly different starts differ by {apart} (standard deviation);"
+            f" their mean changes {amount}"
+        )
+    if not decided(change, scale) and members:
+        means += f"; about {needed(change, scale, members)} runs would decide"
+    slightly = "slightly, " if 0.0 < change.difference < SLIGHT * scale else ""
+    return f"changes {slightly}{amount}{means}"
 
 
 def needed(change: Influence, scale: float, members: int) -> int:
@@ -207,7 +213,7 @@ def table(result: xr.Dataset) -> Table:
         cells = [cell(result, "dropped", (i, k), str(unit)) for k, unit in enumerate(result["unit"].values)]
         members = int(result["members"][i])
         rows.append((words, *cells, str(members) if members else "one run"))
-    notes = ["Largest change of each quantity without the effect; the number after ± may be due to chance."]
+    notes = ["Largest change of each quantity without the effect. The number after ± or < may be due to chance."]
     notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     return Table(
