@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.parts import IdealJoint
@@ -27,7 +26,6 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, per_speed, project
-from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.run import maker
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
@@ -132,29 +130,34 @@ def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray
 
 def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the nearest state in which every pin is where the force on it presses it."""
-    model, contacts = engine.model, engine.model.arrays.table(m.CONTACTS)
+    model, table = engine.model, engine.model.arrays.table(m.CONTACTS)
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
-    pins = [contact.name in loose(model.scene) for contact in model.contacts]
-    modal = y[_modes(engine)]
+    # the end of a stop may move, too: held fixed, it would hold the pins back
+    pins = [pin for pin in zip(table, model.contacts, model.laws, strict=True) if pin[1].name in loose(model.scene)]
+    modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
+
+    def along(row: np.void, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the axes that hold a pin, its offset [m], and the rate of that [m/s] along the axes."""
+        outer, inner = (engine.table(m.SITE_FRAMES)[row[side]] for side in ("outer", "inner"))
+        across, away = outer["axes"][:, ACROSS.get(kind, (0, 1, 2))].T, inner["origin"] - outer["origin"]
+        return across, across @ away, across @ (inner["velocity"] - outer["velocity"] - np.cross(outer["omega"], away))
+
     for _ in range(PIN_PASSES):
         closure_rows.evaluate(engine, y, engine.start)
-        sites, missing, held = engine.table(m.SITE_FRAMES), [], []
-        for row, contact, law, pin in zip(contacts, model.contacts, model.laws, pins, strict=True):
-            if not pin:
-                continue  # the end of a stop may move, too: held fixed, it would hold the pins back
-            outer, inner = sites[row["outer"]], sites[row["inner"]]
-            across = outer["axes"][:, ACROSS.get(contact.joint.type, (0, 1, 2))].T
-            force, offset = across @ forces[contact.name], across @ (inner["origin"] - outer["origin"])
+        missing = []
+        for row, contact, law in pins:
+            across, offset, _ = along(row, contact.joint.type)
+            force = across @ forces[contact.name]
             size = float(np.linalg.norm(force))
             depth = (size / law.numbers.stiffness) ** (1.0 / law.numbers.exponent)
             target = -force / size * (contact.joint.clearance + depth) if size > NO_FORCE * weight else 0.0 * force
             missing.append(target - offset)
-            held.append(across)
-        least = min(joint.clearance for joint in loose(model.scene).values())
         offsets = np.concatenate(missing)
         if np.max(np.abs(offsets)) <= REACHED * least:
             return y
-        y = _move_pins(engine, y, block_diag(*held) @ offset_jacobian(engine, y)[np.repeat(pins, 3)], offsets, modal)
+        engine.select_pieces_after(engine.start)
+        rates = per_speed(engine, y, lambda _: np.concatenate([along(row, one.joint.type)[2] for row, one, _ in pins]))
+        y = _move_pins(engine, y, rates, offsets, modal)
     raise SolverError(
         f"at t = {engine.start:.6g} s: the pins cannot reach their pressed positions; give "
         "poses and velocities instead of [start] at = 'ideal'"
@@ -166,7 +169,7 @@ def _move_pins(
 ) -> np.ndarray:
     """Return the state with pins moved by `offsets` [m] and modal coordinates as close to `modal` as possible.
 
-    jacobian: of the offsets by the speeds.
+    jacobian: rates of the offsets per speed.
 
     The least motion alone would bend rods by part of the clearance, and the run would begin with the impact of their
     springing back: a stiff rod would carry kilonewtons.

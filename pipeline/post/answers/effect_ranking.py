@@ -146,7 +146,7 @@ def in_words(
         apart = f"<b class='n'>{in_unit(spread, unit, 2)}</b>{part and percent(spread)}"
         return (
             f"is not predictable: {members} runs from slightly different starts differ by {apart} (standard deviation);"
-            f" their mean changes {amount}"
+            f" their mean differs from the ideal mechanism {amount}"
         )
     if not decided(change, scale) and members:
         means += f"; about {needed(change, scale, members)} runs would decide"
