@@ -257,17 +257,22 @@ def compare(
     return compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
 
 
-def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
+def effects(
+    scene: Scene | str | Path, budget: str | float | None = None, *, of: Sequence[str] | str = ()
+) -> xr.Dataset:
     """Return the size of each effect on each quantity, removed and added, alone and in pairs.
 
     Variables and meanings: `pipeline.post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
     `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is removed alone, the most important
     ones first, with as many members as decide the change (`pipeline.post.answers.effect_ranking`); a notebook shows the
-    answer first.  Raises FlexclearError.
+    answer first.  of: effects or parts to examine, ``"joint.pin"``, ``"load.spring"``; without it those that plans
+    examine, which leave out bushings (against an ideal joint), springs, forces, gears and balls on planes.  Raises
+    FlexclearError.
     """
+    places = (of,) if isinstance(of, str) else tuple(of)
     if budget is not None:
-        return answers.dataset("effects", _loaded(scene), budget)
-    return effects_command.bring(_loaded(scene), open_workplace()).dataset()
+        return answers.dataset("effects", _loaded(scene), budget, of=places)
+    return effects_command.bring(_loaded(scene), open_workplace(), of=places).dataset()
 
 
 def plan(

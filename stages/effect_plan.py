@@ -104,9 +104,11 @@ def _static(body: FlexibleBody) -> int | None:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Return ``plan.nc`` with all decisions, its table and its chart; inputs are bundles, as in `task`."""
     from flexclear.pipeline.post.answers import plan as shown
-    from flexclear.pipeline.post.answers.effect_sizes import chart
+    from flexclear.pipeline.post.answers.effect_sizes import chart, stay
 
     dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
+    types = {name: joint["type"] for name, joint in params["simulate"]["scene"]["joint"].items()}
+    dataset.attrs["staying"] = stay(variants.staying(types))
     progress(None, "chart")
     requested = dict(zip(dataset["quantity"].values.tolist(), dataset["requested"].values.tolist(), strict=True))
     result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.scene.variants import Effect
+from flexclear.pipeline.core.scene.variants import Effect, staying
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.plotting.table import files
 
@@ -30,10 +30,11 @@ def task(
 ) -> Task:
     """Return the task of all effect sizes. variants, watched: scenes and their tasks, by the effects that they lack."""
     params = {
-        "effects": [[effect.name, effect.kind, effect.within] for effect in effects],
+        "effects": [[effect.name, effect.kind, effect.within, effect.joint] for effect in effects],
         "variants": [sorted(gone) for gone in watched],
         "owners": [_owners(variant) for variant in variants.values()],
         "members": members,
+        "staying": _staying(scene, [effect.name for effect in effects]),
     }
     return _task("effects", scene, chosen, params, {f"variant{k}": made for k, made in enumerate(watched.values())})
 
@@ -58,6 +59,7 @@ def ranking(
         "pairs": dict(pairs),
         "owners": {name: _owners(made) for name, made in variants.items()},
         "undone": ", ".join(undone),
+        "staying": _staying(scene, pairs),
     }
     used = sorted({("", members) for members in pairs.values()} | set(pairs.items()))
     return _task(
@@ -81,6 +83,11 @@ def _task(
     )
 
 
+def _staying(scene: Scene, effects: Collection[str]) -> list[str]:
+    names = staying({name: joint.type for name, joint in scene.joint.items()})
+    return [name for name in names if f"joint.{name}" not in effects]
+
+
 def _owners(scene: Scene) -> dict[str, list[str]]:
     return {kind: list(names) for kind, names in scene.owners().items()}
 
@@ -91,7 +98,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     from flexclear.pipeline.core.artifacts.effect_size import watched
     from flexclear.pipeline.post.answers import effect_sizes
 
-    all_effects = [Effect(*three) for three in params["effects"]]
+    all_effects = [Effect(*text) for text in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
     points = {
         frozenset(gone): watched(inputs[f"variant{k}"], params["owners"][k], chosen)
@@ -99,6 +106,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     }
     progress(None, "comparing")
     dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"])
+    dataset.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
     return result | effect_sizes.chart("effects", dataset, f"Effect sizes: {params['title']}")
 
@@ -116,6 +124,7 @@ def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], 
 
     pairs = {name: ranked.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
     results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
+    results.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": results} | files("effect_ranking", ranked.table(results))
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
     shown = listed.assign_coords(effect=listed["words"].values)

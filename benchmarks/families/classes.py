@@ -272,6 +272,27 @@ def meshed_loop() -> Scene:
     return _scene(1.0, body=bodies, joint=joint, drive={"motor": {"joint": "o0", "law": law}})
 
 
+def quick_return() -> Scene:
+    """Return a driven crank whose pin slides in the slot of a rocker, the slot without clearance."""
+    bodies = {"ground": _ground(o={}, p={"position": [0.0, -0.2, 0.0]})}
+    bodies["crank"] = _body({"o": {}, "pin": {"position": [0.08, 0.0, 0.0]}})
+    pose = {"position": [0.0, -0.2, 0.0], "rotation_vector": [0.0, 0.0, float(np.arctan2(0.2, 0.08))]}
+    bodies["rocker"] = _body({"p": {}, "slot": {"position": [0.2, 0.0, 0.0]}}, pose=pose)
+    pins = {"o": ("ground.o", "crank.o"), "p": ("ground.p", "rocker.p"), "slot": ("rocker.slot", "crank.pin")}
+    joint = {n: {"type": "slot" if n == "slot" else "revolute", "between": [*pair]} for n, pair in pins.items()}
+    drive = {"motor": {"joint": "o", "law": {"type": "polynomial", "coefficients": [0.0, 10.0]}}}
+    return _scene(1.0, body=bodies, joint=joint, drive=drive)
+
+
+def _sliding(scene: Scene) -> float:
+    """Return the error of the pin's way along the slot, as a fraction of the crank."""
+    found = run(scene)
+    angle = 10.0 * found.time.values
+    way = np.hypot(0.08 * np.cos(angle), 0.2 + 0.08 * np.sin(angle)) - 0.2
+    slid = found.joint_position.sel(coordinate="slot.translation").values
+    return float(np.abs(slid - way).max() / 0.08)
+
+
 def _ledger(scene: Scene) -> float:
     found = run(scene)
     return float(np.abs(found.energy_error).max() / np.abs(found.kinetic).max())
@@ -313,6 +334,7 @@ CASES = {
         lambda: small_bounce(1e-6), "speeds of closings, the same in metres", _as_in_metres(1e-6), 1e-6
     ),
     "loop of a meshed body": HardCase(meshed_loop, "loops, per length", _opening, 1e-10),
+    "pin in a slot without clearance": HardCase(quick_return, "sliding, closed form", _sliding, 1e-9),
 }
 
 

@@ -77,11 +77,13 @@ def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     return ShownAnswer("Which effects matter", text, "effect_ranking.png", caption, table)
 
 
-def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
+def dataset(
+    name: str, scene: Scene, budget: str | float | None, *, models: bool = False, of: Sequence[str] = ()
+) -> xr.Dataset:
     """Return one of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
 
-    budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study. Raises as
-    `answer_of`.
+    budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study.  of: as of
+    `Answers`. Raises as `answer_of`.
     """
     from flexclear.pipeline.post.answers.answered import answered
 
@@ -90,18 +92,18 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool
     if name == "cost":
         name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET, models=models)
     else:
-        answer = answer_of(name, scene, workplace, given)
+        answer = answer_of(name, scene, workplace, given, of)
     words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
     return answered(answer.dataset(), words.text, picture, words.table)
 
 
-def answer_of(name: str, scene: Scene, workplace: Workplace, budget: float | None) -> Made:
-    """Return the answer called stability or effects, for the whole budget of processor time [s].
+def answer_of(name: str, scene: Scene, workplace: Workplace, budget: float | None, of: Sequence[str] = ()) -> Made:
+    """Return the answer called stability or effects, for the whole budget of processor time [s]; of: as of `Answers`.
 
     Raises InputError for a scene without effects or watched quantities.
     """
-    answer: Made | None = getattr(Answers(scene, workplace, budget, questions=1), name)
+    answer: Made | None = getattr(Answers(scene, workplace, budget, 1, of), name)
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that can be removed, or [view] watch is empty")
     return answer
@@ -112,19 +114,21 @@ class Answers:
     """The three answers about a scene, each computed at its first use.
 
     seconds: processor time of the runs; by default TIMES that of the scene's own run, and at least LEAST. questions:
-    number of answers that divide it, the costs of accuracy and the effects; 0: only stability is judged.
+    number of answers that divide it, the costs of accuracy and the effects; 0: only stability is judged. of: names of
+    effects or parts, as of `variants.effects_of`.
     """
 
     scene: Scene
     workplace: Workplace
     seconds: float | None = None
     questions: int = 2
+    of: Sequence[str] = ()
 
     @cached_property
     def kernels(self) -> dict[tuple[str, ...], Task]:
         """Return tasks that compile kernels of the effects' variants while the scene's own run leaves a processor idle;
         by what runs on them (`kernels.shared`)."""
-        effects, tasks = variants.effects(self.scene), dict[tuple[str, ...], Task]()
+        effects, tasks = variants.effects_of(self.scene, self.of, "of"), dict[tuple[str, ...], Task]()
         ideal = [effect for effect in effects if effect.kind in (CLEARANCE, FLEXIBILITY)]
         for effect in ideal if len(ideal) > 1 else ():  # without the only one: the ideal scene, which is run
             gone = [other for other in effects if effect.name in (other.name, other.within)]
@@ -178,7 +182,7 @@ class Answers:
     @cached_property
     def effects(self) -> Made | None:
         """Return which effects matter (`stages.effect_study`); None for a scene without effects or watches."""
-        effects, chosen = variants.effects(self.scene), self.scene.watched()
+        effects, chosen = variants.effects_of(self.scene, self.of, "of"), self.scene.watched()
         if not effects or not chosen:
             return None
         self.workplace.bring(list(self.kernels.values()))
@@ -239,8 +243,8 @@ class _Comparison:
     def _removed(self) -> Mapping[str, frozenset[str]]:
         """Return the effects that go with each one: first all clearances and flexible bodies, then single effects."""
         single = {e.name: self._closed({e.name}) for e in self.effects}
-        ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
-        both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
+        ideal = {e.name for e in variants.effects(self.scene) if e.kind in (CLEARANCE, FLEXIBILITY)}
+        both = {IDEAL: self._closed(ideal)} if ideal and ideal <= set(single) else {}
         order = sorted(self.effects, key=lambda effect: effect.kind not in (CLEARANCE, FLEXIBILITY))
         return both | {effect.name: single[effect.name] for effect in order}
 

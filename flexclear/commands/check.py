@@ -158,6 +158,7 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
     for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
         findings.errors += mesh_of(Path(mesh))[1].errors
     for scene in loaded:
+        findings.errors += scenes.unrecorded(scene)
         complete = findings.attempt(partial(Graph(scene).up_to, "post"), path) and not findings.errors
         findings.attempt(partial(simulation.check_parts, simulation.params(scene)), path)
         unplaced = any(part in str(error) for error in findings.errors for part in PLACING)

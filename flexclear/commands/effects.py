@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from flexclear.commands.answers import answer_of, shown_answer
@@ -31,6 +32,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help=f"number of starts of each variant that has contacts (default {watched_quantities.MEMBERS}); "
         "more of them resolve smaller differences; --budget chooses them itself",
     )
+    parser.add_argument(
+        "--of",
+        nargs="+",
+        default=(),
+        metavar="PLACE",
+        help="examine only these, by name or part: joint.pin, load.spring, gear.pair; only so the effects of bushings "
+        "(against an ideal joint), springs, forces, gears and balls on planes",
+    )
 
 
 def command(options: argparse.Namespace) -> None:
@@ -42,9 +51,10 @@ def command(options: argparse.Namespace) -> None:
     datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
         if budget is None:
-            name, made = "effects", bring(graph.scene, workplace, options.members or watched_quantities.MEMBERS)
+            members = options.members or watched_quantities.MEMBERS
+            name, made = "effects", bring(graph.scene, workplace, members, options.of)
         else:
-            name, made = "effect_ranking", answer_of("effects", graph.scene, workplace, budget)
+            name, made = "effect_ranking", answer_of("effects", graph.scene, workplace, budget, options.of)
         if options.json:
             datasets[graph.scene.name] = made.dataset()
             continue
@@ -57,10 +67,13 @@ def command(options: argparse.Namespace) -> None:
         print(as_json(datasets))
 
 
-def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.MEMBERS) -> Made:
+def bring(
+    scene: Scene, workplace: Workplace, members: int = watched_quantities.MEMBERS, of: Sequence[str] = ()
+) -> Made:
     """Run all variants; return effect sizes over (effect, other, quantity), and their page.
 
-    Raises InputError for a scene without effects or watched quantities.
+    of: names of effects or parts, as of `variants.effects_of`.  Raises InputError for a scene without effects or
+    watched quantities.
     """
     from flexclear.pipeline.post.answers.effect_sizes import variants as requested
 
@@ -68,12 +81,12 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
         raise InputError(
             "--members", f"must be at least 2 (got {members})", "the scatter cannot be estimated from one start"
         )
-    present, chosen = variants.effects(scene), scene.watched()
+    present, chosen = variants.effects_of(scene, of, f"{scene.name} --of"), scene.watched()
     if not present:
         raise InputError(
             str(scene.path or scene.name),
             "has no effect that can be removed: no clearance, flexible body, friction, gravity or stop",
-            "compare it with another scene: flexclear compare A B",
+            "name parts, as --of load.spring, or compare it with another scene: flexclear compare A B",
         )
     if not chosen:
         raise InputError(str(scene.path or scene.name), "no quantity is watched", "name quantities in [view] watch")
@@ -85,6 +98,7 @@ def bring(scene: Scene, workplace: Workplace, members: int = watched_quantities.
         Part("chart", "Chart", pictures(made, {"effects.png": ("Each effect alone",)})),
         Part("table", "Table", tables(made, "effects.md")),
     ]
-    lead = "Every effect of the scene removed and added, alone and in pairs."
+    which = "Every effect of the scene" if not of else f"Effects of {', '.join(of)}"
+    lead = f"{which}, removed and added, alone and in pairs."
     publish(made.folder / "index.html", page(f"Effects: {scene.title}", lead, parts))
     return made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import sys
 import tomllib
@@ -22,6 +23,7 @@ from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, overridden, read_toml, scene_name
 from flexclear.pipeline.core.scene.plausibility import implausible
+from flexclear.pipeline.core.scene.quantity import KINDS, parse
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
@@ -37,6 +39,7 @@ from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 from flexclear.stages import simulation
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
+from flexclear.stages.meshing import kind_of
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
 
 if TYPE_CHECKING:
@@ -331,7 +334,27 @@ def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
 def require_names(scene: Scene) -> None:
     """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
-    refuse(dangling(table, recipe_frames, str(scene.path or scene.name)))
+    where = str(scene.path or scene.name)
+    refuse([*dangling(table, recipe_frames, where), *unrecorded(scene)])
+
+
+def unrecorded(scene: Scene) -> Iterator[InputError]:
+    """Yield an error for each requested stress that the body's recipe does not give."""
+    requested = [(f"accuracy.{name}", name) for name in (scene.accuracy.quantities if scene.accuracy else ())]
+    requested += [("view.watch", name) for name in (scene.view and scene.view.watch) or ()]
+    for place, name in requested:
+        for term in parse(name, scene.owners()).terms():
+            body, kind = term.owner.partition(".")[0], KINDS[term.kind]
+            if kind.owner not in ("section", "gauge") or body not in scene.flexible():
+                continue
+            with suppress(InputError):  # a recipe that cannot be read is reported elsewhere
+                recipe = Path(scene.flexible()[body].mesh)
+                solid, outlines = kind_of(recipe) == "solid", '"type": "general"' not in json.dumps(read_toml(recipe))
+                if (kind.owner == "section" and solid) or (kind.variable.endswith("stress") and not outlines):
+                    lacks = "a solid, which has no sections" if solid else "a rod with sections of unknown outline"
+                    remedy = f"request {body}.peak_von_mises" if solid else f"request {body}.section_force"
+                    where = f"{scene.path or scene.name} [{place}]"
+                    yield InputError(where, f"'{name}' is not recorded: '{body}' is {lacks}", remedy)
 
 
 def recipe_frames(mesh: str) -> list[str] | None:

@@ -21,7 +21,7 @@ from tests.processes import copied, printed, python
 #: example -> folder that its module is put in
 PLACES = {
     "kutta3": "pipeline/dynamics/integrate",
-    "pin_in_slot": "pipeline/dynamics/joints",
+    "oldham": "pipeline/dynamics/joints",
     "safaeifar_farshidianfar": "pipeline/dynamics/contact/normal",
     "ball_in_tube": "pipeline/dynamics/contact/surfaces",
     "smooth_coulomb": "pipeline/dynamics/contact/friction",
@@ -89,18 +89,13 @@ def test_an_integrator(tree: Path) -> None:
 
 
 def test_a_joint_with_two_freedoms(tree: Path) -> None:
-    """Nothing pushes the mass centre sideways, and the energy gives the speed at each angle below the horizontal."""
-    run = ran(tree, "pin_in_slot")
-    mass, arm, inertia, g = 2.0, 0.5, 0.03, 9.81
-    place = run["frame_position"].sel(frame="bob.pin").values
-    centre, omega = run["position"].values[:, 0], run["angular_velocity"].values[:, 0, 2]
-    drop = -centre[:, 1] / arm
-    assert drop.max() > 0.9
-    known = 2.0 * mass * g * arm * drop / (inertia + mass * arm**2 * (1.0 - drop**2))
-    # the integrator's tolerance is 1e-10, of omega^2 up to 650 rad^2/s^2: it leaves 6e-8 there
-    np.testing.assert_allclose(centre[:, 0], arm, rtol=0.0, atol=1e-8)
-    np.testing.assert_allclose(omega**2, known, rtol=0.0, atol=1e-6)
-    np.testing.assert_allclose(place[:, 1:], 0.0, rtol=0.0, atol=1e-12)
+    """Parallel shafts turn together, by 10 t^2, and the drive speeds up both."""
+    run = ran(tree, "oldham")
+    turn = 10.0 * run["time"].values ** 2
+    known = np.stack([np.cos(0.5 * turn), 0.0 * turn, 0.0 * turn, np.sin(0.5 * turn)], axis=1)
+    # prescribed motion is evaluated, not integrated: the loop is closed to 1e-12 or so
+    np.testing.assert_allclose(run["quaternion"].sel(body="follower").values, known, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(run["drive_force"].values[:, 0], (0.02 + 0.03) * 20.0, rtol=1e-9)
 
 
 def test_a_normal_law(tree: Path) -> None:

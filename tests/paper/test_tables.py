@@ -238,12 +238,12 @@ def test_costs_are_judged_in_each_of_the_ways_of_table_10():
     words = "Clearance makes the ideal model twenty times as dear"
     timing = everything()["sps4:timing"]
     like_paper = {
-        f"{way}_integration_seconds": timing[f"{way}_integration_seconds"] * 0.0
-        + xr.where(timing.scene == "sps4/csj", 19.95, 1.0)
-        for way in ("equal", "step", "tolerance")
+        f"{way}_evaluations": xr.where(timing.scene == "sps4/csj", 19.95, 1.0) for way in ("equal", "step", "tolerance")
     }
     assert judged(of_scene("sps4:timing", **like_paper))[words]["verdict"] == "holds"
-    failing = like_paper | {"step_integration_seconds": like_paper["step_integration_seconds"] * np.nan}
+    slow = {"equal_integration_seconds": timing["equal_integration_seconds"] * timing["scene"].astype(str).str.len()}
+    assert judged(of_scene("sps4:timing", **like_paper, **slow))[words]["verdict"] == "holds"  # whatever the machine
+    failing = like_paper | {"step_evaluations": like_paper["step_evaluations"] * np.nan}
     found = judged(of_scene("sps4:timing", **failing))[words]
     assert found["verdict"] == "in part"
     assert "at the paper's step: CSJ fails" in found["numbers"]

@@ -17,6 +17,7 @@ from flexclear.pipeline.post.answers.effect_ranking import (
     table,
     undecided,
 )
+from flexclear.pipeline.post.answers.effect_sizes import chart, stay
 
 VELOCITY = Quantity("slider", "velocity")
 TIME = np.linspace(0.0, 1.0, 201)
@@ -81,13 +82,41 @@ def test_the_summary_says_what_changes_by_how_much_and_how_sure_it_is():
     (same,) = ideal_sentences(study(ideal=Pair(point(0.0), point(0.0), 0)))
     assert "does not change" in same
     (open_,) = ideal_sentences(study(ideal=Pair(point(0.0, 5e-3), point(0.0), 4)))
-    assert "at most" in open_
+    # Student's t of 6 degrees of freedom at 1e-3 times 5 mm/s over the root of 4 runs: 15 mm/s, all of it chance
+    assert "changes by less than <b class='n'>15 mm/s</b>" in open_
     assert "runs would decide" in open_
 
 
 def test_runs_that_scatter_about_an_undecided_mean_are_not_predictable():
     (said,) = ideal_sentences(study(ideal=Pair(point(0.0, 0.5), point(0.0), 4)))
-    assert "4 runs scatter by <b class='n'>500 mm/s</b> (50 % of its largest value in the scene)" in said
+    assert "4 runs from slightly different starts differ by <b class='n'>500 mm/s</b> (50 % of its largest" in said
+    assert "their mean differs from the ideal mechanism by less than <b class='n'>1.5 m/s</b>" in said
+
+
+def test_summary_table_and_chart_have_one_number_for_one_question():
+    """A change of 0.3 m/s with a chance of 0.4 m/s, and one that is all chance."""
+    likely, chance = Pair(point(0.0, 0.1), point(0.5, 0.1), 4), Pair(point(0.0, 0.1), point(0.0, 0.11), 4)
+    made = study(ideal=likely, other=chance)
+    (said,) = ideal_sentences(made)
+    rows = {row[0]: row[1] for row in table(made).rows}
+    assert f"<b class='n'>{rows[IDEAL]}</b>" in said
+    assert "±" in rows[IDEAL]
+    limit = rows["other"]
+    assert limit.startswith("< ")
+    drawn = chart("c", made, "t")["c.svg"].decode()
+    assert f"<!-- {limit.replace('<', '&lt;')} -->" in drawn
+    assert "<!-- none -->" not in drawn
+
+
+def test_a_quantity_that_goes_with_the_effect_is_called_not_comparable():
+    gone = Point({}, {}, {}, 100)
+    assert [row[1] for row in table(study(clearance=Pair(point(0.0), gone, 0))).rows] == ["not comparable"]
+
+
+def test_a_contact_that_no_ideal_joint_replaces_is_named_in_the_answer():
+    made = study(weak=Pair(point(0.0), point(5e-3), 0)).assign_attrs(staying=stay(["floor"]))
+    assert "floor stays in every variant, as a ball on a plane has no ideal counterpart" in sentence(made, {})
+    assert stay([]) == ""
 
 
 def test_effects_that_the_budget_did_not_reach_are_named_last():

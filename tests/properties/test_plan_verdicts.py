@@ -1,15 +1,19 @@
 """Verdicts on plans: what is met, missed and not decided, before and beyond the horizon, and with how many members."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from flexclear.commands import plan
+from flexclear.commands.new import write
 from flexclear.pipeline.core.artifacts.effect_size import POOLED, Agreement, agreement, same_starts
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.dynamics.plan import search
 from flexclear.pipeline.post.answers.plan import _verdict, until_decided, verdict
 
 
@@ -32,6 +36,16 @@ def test_an_undecided_verdict_says_how_far_single_runs_scatter():
     assert _verdict(compared.assign(horizon=("quantity", [1.0])), 0) == "not decided: 400 members would decide"
     assert _verdict(compared.assign(error=("quantity", [8.0])), 0) == "missed, 8 times the allowed error"
     assert _verdict(compared.assign(chance=("quantity", [0.1])), 0).startswith(f"met to the horizon: {beyond}, and the")
+
+
+def test_a_stress_that_no_rigid_body_has_is_planned_by_its_size_in_the_flexible_mechanism(tmp_path: Path):
+    scene = load_scene(write("slider-crank", tmp_path)[0])
+    stress = {"output.stress": ["rod"], "accuracy": {"rod.von_mises": "1 %"}}
+    scene = edited(scene, stress)
+    stressed = Point({"rod.von_mises.series": np.full((3, 1), 5e6), "rod.von_mises.largest": np.array(5e6)}, {}, {}, 1)
+    without, unused = (lambda: Point({}, {}, {}, 1)), lambda: pytest.fail("the full scene need not be run")
+    asked = search._requested(scene, scene.requested(), (without, without, lambda: stressed, unused), watched=True)
+    assert asked == {"rod.von_mises": pytest.approx(5e4)}
 
 
 def _scattered(mean: np.ndarray, scatter: np.ndarray | float) -> Point:

@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexclear.commands.cost_design import Setting, neighbours
 from flexclear.commands.new import write
 from flexclear.pipeline.core.artifacts.effect_size import chance, influence, recorded
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.scene.quantity import KINDS, WORDS, Quantity
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.answers.effect_sizes import closed
 from flexclear.pipeline.post.answers.effect_sizes import variants as needed
@@ -40,6 +42,88 @@ def test_friction_of_ideal_joints_is_an_effect_of_its_own(crank: Path):
     found = {effect.name: effect for effect in variants.effects(scene)}
     assert found["joint.main.friction"].within == ""
     assert variants.without(scene, [found["joint.main.friction"]]).joint["main"].friction is None
+
+
+def with_parts(crank: Path) -> Scene:
+    """The crank with a bushing, a spring, a brake, a gear, and a ball on a plane with friction."""
+    scene = load_scene(crank)
+    friction = {"law": "ambrosio", "dynamic": 0.1, "v0": 0.0, "v1": 0.01}
+    bushing = {"type": "bushing", "between": ["ground.main", "crank.main"], "stiffness": [1e6, 1e6, 1e6, 1e3, 1e3, 1.0]}
+    floor = {"type": "ball-on-plane", "between": ["ground.main", "slider.pin"], "ball_radius": 0.01}
+    parts = {
+        "load.bush": bushing,
+        "load.spring": {"type": "joint-spring", "joint": "guide", "stiffness": 10.0},
+        "load.brake": {"type": "joint-friction", "joint": "guide", "viscous": 1.0},
+        "joint.floor": {**floor, "normal": {"law": "hertz", "stiffness": 1e6}, "friction": friction},
+    }
+    return edited(scene, parts)
+
+
+def test_other_parts_are_effects_on_request(crank: Path):
+    scene = with_parts(crank)
+    assert {"load.spring", "load.bush", "joint.floor"}.isdisjoint(e.name for e in variants.effects(scene))
+    found = variants.effects_of(scene, ["load.spring", "load.bush", "joint.floor", "joint.pin", "load.brake"], "of")
+    assert {e.name: e.within for e in found} == {
+        "load.spring": "",
+        "load.bush": "",
+        "load.brake": "",
+        "joint.floor": "",
+        "joint.floor.friction": "joint.floor",
+        "joint.pin.clearance": "",
+        "joint.pin.friction": "joint.pin.clearance",
+    }
+    by_name = {e.name: e for e in found}
+    assert by_name["load.bush"].words == "bushing of bush instead of a revolute joint"
+    assert by_name["load.brake"].kind == "friction"
+    (alone,) = variants.effects_of(scene, ["joint.pin.friction"], "of")
+    assert alone.within == ""
+    assert variants.effects_of(scene, (), "of") == variants.effects(scene)
+    with pytest.raises(InputError, match=r"(?s)of load\.sprin: .*did you mean 'load\.spring'"):
+        variants.effects_of(scene, ["load.sprin"], "of")
+
+
+def test_a_part_that_goes_takes_its_quantities_with_it(crank: Path):
+    scene = edited(
+        with_parts(crank), {"view": {"watch": ["spring.force", "bush.bushing_displacement", "slider.position"]}}
+    )
+    gone = variants.without(scene, variants.effects_of(scene, ["load.spring", "load.bush", "joint.floor"], "of"))
+    assert set(gone.load) == {"gravity", "brake"}
+    assert "floor" not in gone.joint
+    assert (gone.joint["bush"].type, gone.joint["bush"].between) == ("revolute", ("ground.main", "crank.main"))
+    assert gone.view.watch == ("slider.position",)
+
+
+@pytest.mark.parametrize(
+    "stiffness, held",
+    [
+        ([1, 1, 1, 0, 0, 0], "spherical"),
+        ([1, 1, 0, 1, 1, 0], "cylindrical"),
+        ([1, 1, 1, 1, 1, 1], "revolute"),
+        ([1, 0, 1, 1, 1, 1], ""),
+    ],
+)
+def test_a_bushing_is_compared_with_the_joint_that_holds_what_it_holds(crank: Path, stiffness: list[int], held: str):
+    scene = edited(with_parts(crank), {"load.bush.stiffness": [1e6 * one for one in stiffness]})
+    (effect,) = variants.effects_of(scene, ["load.bush"], "of")
+    assert effect.joint == held
+
+
+def test_any_watched_quantity_leaves_every_variant(crank: Path):
+    """Those of the whole mechanism, too, that only some parts have: what a variant lacks it no longer requests."""
+    scene = with_parts(crank)
+    flexible = [name for name, body in scene.flexible().items()]
+    scene = edited(scene, {"output.stress": flexible})
+    owners = scene.owners()
+    names = [
+        f"{part}.{word}" for word, kinds in WORDS.items() for key in kinds for part in owners[KINDS[key].owner] if part
+    ]
+    names = [*dict.fromkeys(names), *owners[""]]
+    watched = {name: edited(scene, {"view": {"watch": [name]}}) for name in names if variants._has(name, owners)}
+    assert len({key for name in watched for key in [name.rpartition(".")[2]]}) > 40
+    for one in watched.values():
+        variants.ideal(one)
+        for setting in (Setting("dop853", 1e-7), Setting("rk4", 1e-7, 1e-4)):
+            neighbours(one, setting)
 
 
 def test_modes_of_a_body_that_becomes_rigid_are_asked_for_no_more(crank: Path):

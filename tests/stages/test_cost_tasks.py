@@ -120,7 +120,7 @@ def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Stud
     found = study.drawn().dataset()
     text = sentences(found)
     assert "dop853 at rtol 1e-06" in text
-    assert "Its largest error at the outputs is" in text
+    assert "The integration errs at the outputs" in text
     assert "of a quantity's size" in text
     assert "One more digit costs" in text
     assert found.attrs["own_evaluations"] > 0

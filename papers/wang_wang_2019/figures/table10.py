@@ -96,6 +96,13 @@ def ratios(timing: xr.Dataset, setting: str) -> dict[str, float]:
     return {scene: float(np.median(own) / np.median(base)) for scene, own in times.items() if own.size}
 
 
+def evaluations(timing: xr.Dataset, setting: str) -> dict[str, float]:
+    """Return evaluations over the ideal model's, for the models in the paper's table; on every machine the same."""
+    counts = timing[f"{setting}_evaluations"]
+    known = [scene for scene in TABLE10 if scene in timing.scene.values]
+    return {scene: float(counts.sel(scene=scene) / counts.sel(scene=REFERENCE)) for scene in known}
+
+
 def _notes(timing: xr.Dataset) -> tuple[str, ...]:
     facts = timing.attrs
     notes = [

@@ -13,7 +13,7 @@ from flexclear.papers.wang_wang_2019 import models as paper
 from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
 from flexclear.papers.wang_wang_2019.figures import Data, drawn
 from flexclear.papers.wang_wang_2019.figures.errors import NOISE
-from flexclear.papers.wang_wang_2019.figures.table10 import ratios
+from flexclear.papers.wang_wang_2019.figures.table10 import evaluations
 from flexclear.papers.wang_wang_2019.models import mode_set
 from flexclear.papers.wang_wang_2019.published import TABLE10
 from flexclear.pipeline.core.artifacts.paths import TREE
@@ -45,7 +45,8 @@ def verdicts(data: Data) -> Table:
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
-        f"{SEPARATION:g} standard deviations. Costs agree within a factor of {NEAR:g}. In brackets: numbers of the "
+        f"{SEPARATION:g} standard deviations. Costs agree where evaluations, which do not depend on the "
+        f"machine, are within a factor of {NEAR:g} of the paper's ratio of times. In brackets: numbers of the "
         "layout assumed before one was identified from Table 8; the verdict is on the others. The prismatic joint is "
         "at the rod's lower end here; [reference-conditions.md](reference-conditions.md) judges mode sets at other "
         "positions, over layouts of the mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a "
@@ -227,15 +228,15 @@ def _enlarged(data: Data) -> Outcome:
 
 
 def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
-    """Judge whether costs over the ideal model's are the paper's, at each setting of Table 10."""
+    """Judge whether evaluations over the ideal model's are as the paper's times, at each setting of Table 10."""
     tests, words = [], []
     for setting, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
-        costs = {m: ratios(data["sps4:timing"], setting).get(m.scene, np.nan) for m in models}
+        costs = {m: evaluations(data["sps4:timing"], setting).get(m.scene, np.nan) for m in models}
         tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
         texts_by_model = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
         words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in texts_by_model.items()))
     printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
-    return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
+    return _verdict(*tests), f"printed times {printed}; evaluations at {'; at '.join(words)}"
 
 
 def _becomes_chaotic(data: Data) -> Outcome:

@@ -103,6 +103,8 @@ _OPERATORS: dict[str, Callable[..., np.ndarray]] = {
 
 def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
     kind = KINDS[quantity.kind]
+    if kind.variable not in run:
+        raise InputError(f"quantity '{quantity.name}'", f"the run has no variable '{kind.variable}'")
     values: np.ndarray = run[kind.variable].values
     if kind.owner == "section":  # at each time the section of the body with the largest value
         of_body = values[:, run["section_body"].values == quantity.owner].reshape(len(values), -1, 3 if kind.dim else 1)

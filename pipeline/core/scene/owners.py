@@ -15,6 +15,7 @@ COORDINATES: Mapping[str, Mapping[str, bool]] = {
     "revolute": {"rotation": True},
     "prismatic": {"translation": False},
     "cylindrical": {"rotation": True, "translation": False},
+    "slot": {"translation": False, "rotation": True},
     "planar": {"x": False, "y": False, "rotation": True},
     "universal": {"first": True, "second": True},
 }

@@ -260,10 +260,11 @@ Body = Annotated[
 class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, and the axis of the joint is z.
 
-    A free joint constrains nothing, so that a body flies. The motion of each type is in `pipeline.dynamics.joints`.
+    A pin in a slot slides along x and turns about z. A free joint constrains nothing, so that a body flies. The motion
+    of each type is in `pipeline.dynamics.joints`.
     """
 
-    type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
+    type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "slot", "planar", "fixed", "free"]
     """relative motion that the joint leaves free"""
     between: tuple[FrameName, FrameName]
     """first frame, whose axes are those of motion, and second frame, each as body.FRAME"""

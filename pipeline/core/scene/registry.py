@@ -27,6 +27,7 @@ ELSEWHERE = (
     (("ball", "ball-joint"), "spherical", ""),
     (("weld", "rigid-joint"), "fixed", ""),
     (("cardan", "hooke"), "universal", ""),
+    (("pin-in-slot", "point-on-line", "inline"), "slot", ""),
     (("spring", "damper"), "spring-damper", "it acts between two points; 'joint-spring' acts along a joint"),
     (("force", "torque"), "law", "a drive prescribes a motion; a force along a joint is a load of type 'joint-force'"),
     (("motor", "torque"), "joint-force", "it acts along a joint; a drive prescribes a motion"),

@@ -5,8 +5,9 @@ and gears couple the bodies and joints that they name; the fixed world couples n
 itself.
 
 An effect has the name of its key path: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
-``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by
-replaced and removed parts only, so that a file can state it by extending the scene's.
+``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant without effects differs from
+its scene by replaced and removed parts only, so that a file can state it by extending the scene's. Other parts, such as
+springs, are effects on request: their names are those of the parts. An ideal joint takes the place of a bushing.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ import json
 import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.clearance import CONTACTS, Clearance
 from flexclear.pipeline.core.scene.load import FAMILIES, SETTINGS, edited
+from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.registry import suggestion
@@ -33,10 +35,11 @@ OF_THE_WORLD = ("gravity", "joint-friction")
 CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
 #: effects that an ideal mechanism lacks, and the name of a scene without them
 EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
-#: owners of quantities that exist only with these effects: contacts, ends of stops, modes and stresses of bodies
-OWNED = {CLEARANCE: ("contact", "worn"), "stop": ("contact",), FLEXIBILITY: ("mode", "section", "gauge")}
-#: joint with clearance -> ideal joint that connects the same frames; slots and planes have none
-WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
+#: kinds of effects on request: of these types of loads, others are forces
+KINDS = {"bushing": "bushing", "spring-damper": "spring", "joint-spring": "spring"}
+KINDS |= {"pid": "controller", "sampled-pid": "controller"}
+#: joint with clearance -> ideal joint that connects the same frames; a ball on a plane has none
+WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical", "clearance-slot": "slot"}
 #: keys of a flexible body that a rigid one from the same recipe also has
 SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
 #: settings that follow the parts: quantities of removed parts are no longer requested or shown
@@ -47,11 +50,12 @@ BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 @dataclass(frozen=True, slots=True)
 class Effect:
     """One effect of a scene. name: its key path. kind: kind of effect. within: effect that this one depends on, as
-    friction depends on its clearance; else empty."""
+    friction depends on its clearance; else empty. joint: type of the ideal joint in the place of a bushing."""
 
     name: str
     kind: str
     within: str = ""
+    joint: str = ""
 
     @property
     def owner(self) -> str:
@@ -61,7 +65,8 @@ class Effect:
     @property
     def words(self) -> str:
         """Description in words."""
-        return self.owner if self.kind == "gravity" else f"{self.kind} of {self.owner}"
+        instead = f" instead of a {self.joint} joint" if self.joint else ""
+        return self.owner if self.kind == "gravity" else f"{self.kind} of {self.owner}{instead}"
 
 
 def effects(scene: Scene) -> tuple[Effect, ...]:
@@ -87,6 +92,47 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
     return tuple(listed)
 
 
+def effects_of(scene: Scene, places: Collection[str], where: str) -> tuple[Effect, ...]:
+    """Return the effects with these names, and all those of parts with these names, such as ``load.spring``.
+
+    Without names, those of `effects`. Raises InputError, at `where`, for a name that is neither, and lists the nearest.
+    """
+    usual = effects(scene)
+    if not places:
+        return usual
+    known = {effect.name: effect for effect in (*_on_request(scene), *usual)}
+    names = {name: {name, ".".join(name.split(".")[:2])} for name in known}
+    every, asked = set().union(*names.values()), set(places)
+    for place in sorted(asked - every):
+        raise InputError(f"{where} {place}", "is no effect and no removable part", suggestion(place, sorted(every)))
+    chosen = [name for name in known if names[name] & asked]
+    within = {name: {known[name].within, *names[name]} & set(chosen) - {name} for name in chosen}
+    return tuple(replace(known[name], within="".join(within[name])) for name in chosen)
+
+
+def _on_request(scene: Scene) -> Iterator[Effect]:
+    """Yield parts whose effect is examined on request only: contacts without ideal counterpart, loads, gears."""
+    for name in scene.contacts():
+        if name not in loose(scene):
+            yield Effect(f"joint.{name}", "contact")
+    for name, load in scene.forces().items():
+        joint = _joint_for(load) if isinstance(load, Bushing) else ""
+        yield Effect(f"load.{name}", KINDS.get(load.type, "force"), joint=joint)
+    for name in scene.gear:
+        yield Effect(f"gear.{name}", "gear")
+
+
+def _joint_for(bushing: Bushing) -> str:
+    """Return the type of the ideal joint that holds what a bushing holds; empty where it carries nothing across z.
+
+    It turns about z of the bushing's frame, about all axes where the bushing turns freely.
+    """
+    x, y, z, *turning = (bushing.stiffness[k][k] for k in range(6))
+    if not (x and y):
+        return ""
+    return "cylindrical" if not z else "revolute" if any(turning) else "spherical"
+
+
 def named(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
     """Return the effects with these names; raise InputError, with the nearest name, for an unknown one."""
     known = {effect.name: effect for effect in effects(scene)}
@@ -103,7 +149,11 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
     """
     if not gone:
         return scene
-    result = edited(scene, dict(_changes(scene, gone)) | _settings(scene, gone) | _owned(scene, gone))
+    changes = dict(_changes(scene, gone)) | _settings(scene, gone)
+    requests = {key: None for key in ("accuracy", "view", "ensemble") if getattr(scene, key) is not None}
+    result = edited(scene, changes | requests)
+    if requests:
+        result = edited(scene, changes | _requests(scene, result))
     result._name = f"{scene.name} without {', '.join(sorted(effect.name for effect in gone))}"
     return result
 
@@ -125,35 +175,33 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
     return result
 
 
+def staying(types: Mapping[str, str]) -> list[str]:
+    """Return the names of contacts that an ideal mechanism keeps, as no ideal joint has their place.
+
+    types: type of each joint, by name.
+    """
+    contacts = {get_args(one.model_fields["type"].annotation)[0] for one in CONTACTS} - set(WITHOUT_CLEARANCE)
+    return [name for name, kind in types.items() if kind in contacts]
+
+
 def loose(scene: Scene) -> dict[str, Clearance]:
-    """Return joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
+    """Return joints with clearance that have an ideal counterpart, by name: all but balls on planes."""
     return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
 
 
-def _owned(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
-    """Return edits that remove requests for quantities of removed effects."""
+def _requests(scene: Scene, bare: Scene) -> dict[str, Any]:
+    """Return edits that remove requests for quantities which `bare`, the scene without some effects, does not have."""
     keys: dict[str, Any] = {}
-    owners = scene.owners()
-    lost = {of: {e.owner for e in gone if of in OWNED.get(e.kind, ())} for of in sum(OWNED.values(), ())}
-    if any(lost.values()):
-        owners |= {
-            of: {n: turns for n, turns in owners[of].items() if n.partition(".")[0] not in names}
-            for of, names in lost.items()
-        }
-        if not owners["contact"]:
-            keys["ensemble"] = None
-        if scene.accuracy is not None:
-            requested = {
-                n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
-            }
-            rest = scene.accuracy.model_dump(exclude={"quantities"}, exclude_none=True)
-            keys["accuracy"] = {**rest, "quantities": requested} if requested else None
-        if scene.view is not None and scene.view.watch is not None:
-            watched = [name for name in scene.view.watch if _has(name, owners)]
-            keys["view.watch"] = watched or None
-            if not watched:
-                keys["view"] = None
-                del keys["view.watch"]
+    owners = bare.owners()
+    if scene.ensemble is not None and not owners["contact"]:
+        keys["ensemble"] = None
+    if scene.accuracy is not None and scene.accuracy.quantities:
+        table = scene.accuracy.model_dump(exclude_none=True)
+        table["quantities"] = {n: w for n, w in table["quantities"].items() if _has(n, owners)}
+        keys["accuracy"] = table if table["quantities"] else None
+    if scene.view is not None and scene.view.watch is not None:
+        watched = [name for name in scene.view.watch if _has(name, owners)]
+        keys |= {"view.watch": watched} if watched else {"view": None}
     return keys
 
 
@@ -186,7 +234,10 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
             continue
         family, name = effect.name.split(".")[:2]
         part = getattr(scene, family)[name]
-        if effect.kind == CLEARANCE:
+        if effect.joint:
+            joint = name if name not in scene.joint else f"{name}_ideal"
+            changes |= {effect.name: None, f"joint.{joint}": {"type": effect.joint, "between": list(part.between)}}
+        elif effect.kind == CLEARANCE:
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
         elif effect.kind == FLEXIBILITY:
             unchanged = part.model_dump(mode="json", include=set(SHARED_KEYS), exclude_none=True)

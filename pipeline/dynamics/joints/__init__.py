@@ -21,7 +21,7 @@ from flexclear.pipeline.core.scene.registry import module_name
 KIND = "joint type"
 #: prescribed paths alone create a joint type that no scene can name, the rotation vector
 NAMES = {name: module_name(name) for name in (*IDEAL, "rotation-vector")}
-NAMES |= {n: f"turn_and_slide:{n.upper()}" for n in ("fixed", "revolute", "prismatic", "cylindrical", "planar")}
+NAMES |= {n: f"turn_and_slide:{n.upper()}" for n in ("fixed", "revolute", "prismatic", "cylindrical", "slot", "planar")}
 #: joints that are always one link; others may become chains of joints in CHAIN (see `model.chain`)
 WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
 CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")

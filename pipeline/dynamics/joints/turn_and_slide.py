@@ -61,4 +61,6 @@ def joint(*coordinates: Coordinate) -> Joint:
 #: in the tree only where one of the two bodies is flexible
 FIXED = joint()
 REVOLUTE, PRISMATIC, CYLINDRICAL = joint(ROTATION), joint(TRANSLATION), joint(ROTATION, TRANSLATION)
+#: a pin in a slot along x
+SLOT = joint(Coordinate("translation", False, axis=0), ROTATION)
 PLANAR = joint(Coordinate("x", False, axis=0), Coordinate("y", False, axis=1), ROTATION)

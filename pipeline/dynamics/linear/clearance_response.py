@@ -131,7 +131,7 @@ class OpeningMap:
     def clearance(self, name: str, rows: np.ndarray) -> float:
         """Return the largest motion that an adjoint solution gives per metre of separation of a joint's points."""
         constraint, range_of_rows, _ = self.joints[name]
-        count = 2 if constraint.edge.kind == "revolute" else 3
+        count = {"revolute": 2, "slot": 1}.get(constraint.edge.kind, 3)
         first = rows[:, range_of_rows][:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
 

@@ -75,8 +75,7 @@ class Mobility:
 
     def text(self) -> str:
         """Return mobility and redundancy as a sentence for the user."""
-        says = "condition follows" if self.redundant == 1 else "conditions follow"
-        more = f", {self.redundant} closure {says} from the others" if self.redundant else ""
+        more = f"; conditions of closed loops that repeat others: {self.redundant}" if self.redundant else ""
         return f"free motions in addition to the drives: {self.mobility}{more}"
 
 

@@ -114,5 +114,5 @@ def too_much(upper: Mapping[str, float], requested: Mapping[str, float]) -> str:
     """Return the reason why an effect stays: its largest possible change, in words."""
     name = max(requested, key=lambda n: upper[n] / requested[n])
     if not np.isfinite(upper[name]):
-        return f"without it {name} cannot be determined, or has other events"
+        return f"without it {name} cannot be determined, or has another number of impacts"
     return f"without it {name} may change by {upper[name] / requested[name]:.2g} times the requested accuracy"

@@ -76,7 +76,8 @@ def plan(
     runs.must_run((), BEGINNING, 0)
     loose, soft = ([effect for effect in runs.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
     ideal = runs.point([*loose, *soft], rtol=RTOL)
-    search = Search(runs, _requested(scene, quantities, ideal, lambda: runs.point(soft), watched))
+    simpler = (lambda: ideal, lambda: runs.point(soft), lambda: runs.point(loose), lambda: runs.point(()))
+    search = Search(runs, _requested(scene, quantities, simpler, watched))
     runs.chosen = [q for q in quantities if q.name in search.requested]
     rigid = _rigid(search, [*loose, *soft]) if loose or soft else None
     _clearances(search, loose, soft, rigid)
@@ -89,12 +90,13 @@ def plan(
 
 
 def _requested(
-    scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point], watched: bool
+    scene: Scene, quantities: Sequence[Quantity], simpler: Sequence[Callable[[], Point]], watched: bool
 ) -> dict[str, float]:
     """Return the requested accuracy by quantity [SI]; relative ones refer to the size in the ideal mechanism. For
     quantities of contacts the size is that with rigid bodies, half of it where bodies are flexible.
 
-    rigid: runs the scene with clearance and rigid bodies.  watched: quantities that never change are left out.
+    simpler: run the ideal mechanism, that with clearance, that with flexible bodies, and the full one: the first that
+    has a quantity says its size.  watched: quantities that never change are left out.
     Raises InputError where a quantity never changes (with `watched`: where none changes), or all requested errors
     exceed the quantities' sizes; SolverError where the mechanism with rigid bodies cannot be run.
     """
@@ -103,9 +105,12 @@ def _requested(
     assert scene.accuracy is not None
     for q in quantities:
         of_contact = any(KINDS[term.kind].owner in OF_CLEARANCE for term in q.terms())
-        point = rigid() if of_contact else ideal
-        if point.refused:
-            raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")
+        for run in simpler[of_contact:]:
+            point = run()
+            if point.refused:
+                raise SolverError(f"{scene.name}: a simpler mechanism cannot be run: {point.refused}")
+            if _has(point, q):
+                break
         sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
         want = scene.accuracy.quantities[q.name]
         if want.absolute is None and sizes[q.name] <= effect_size.rounding(point, q):
@@ -122,8 +127,9 @@ def _requested(
     sizes = {name: sizes[name] for name in accuracies}
     if all(accuracies[name] >= size for name, size in sizes.items()):
         # forces and rates may come from impacts alone
-        more = rigid() if scene.contacts() or scene.stop else ideal
-        sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else effect_size.size(more, q)) for q in quantities}
+        more = simpler[1 if scene.contacts() or scene.stop else 0]()
+        there = {q.name: effect_size.size(more, q) for q in quantities if _has(more, q)}
+        sizes = {name: max(size, there.get(name, 0.0)) for name, size in sizes.items()}
     if all(accuracies[name] >= size for name, size in sizes.items()):
         q = quantities[0]
         raise InputError(
@@ -133,6 +139,10 @@ def _requested(
             "request an accuracy below the change of the quantity",
         )
     return accuracies
+
+
+def _has(point: Point, quantity: Quantity) -> bool:
+    return any(name.rpartition(".")[0] == quantity.name for name in point.values)
 
 
 def _rigid(search: Search, dropped: Sequence[Effect]) -> Run:

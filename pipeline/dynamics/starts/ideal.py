@@ -2,8 +2,8 @@
 
 The ideal scene has ideal joints instead of pins and balls with clearance. The force of such a joint at the
 start presses the pin onto one side of its socket, to the penetration at which the contact carries that force. Flexible
-bodies start deformed by the loads at the start, so that they do not spring into their shape. Slots and planes
-have no ideal counterpart: they, and the bodies that touch them, stay where the poses put them.
+bodies start deformed by the loads at the start, so that they do not spring into their shape. A ball on a plane
+has no ideal counterpart: it, and the bodies that touch it, stay where the poses put them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, per_speed, project
-from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.run import maker
 from flexclear.pipeline.dynamics.starts.snapshot import held, moving, resting
 
@@ -39,6 +38,8 @@ from flexclear.pipeline.dynamics.starts.snapshot import held, moving, resting
 REACHED, PIN_PASSES = 1e-9, 20
 #: forces below this fraction of the weight press nothing: the pin stays in the middle
 NO_FORCE = 1e-9
+#: axes of the outer frame along which an ideal joint holds a pin in the middle; others: all
+ACROSS: dict[str, tuple[int, ...]] = {"clearance-revolute": (0, 1), "clearance-slot": (1,)}
 #: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
 SETTLED, LOADINGS = 1e-9, 10
 #: step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
@@ -48,7 +49,7 @@ SINGULAR_ROUNDING = 1e-9
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
-    """Return the scene with the start of its ideal mechanism (without clearance: its own), and how that was assembled.
+    """Return the scene with the start of its ideal mechanism, and how that was assembled.
 
     Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be moved to
     their pressed positions.
@@ -58,7 +59,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     y = _deform_statically(engine, y)
     forces = _forces(scene, engine, y)
     concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
-    if not scene.contacts():
+    if not loose(scene):
         return concentric, choice
     exact = concentric.model_copy(update={"drive": _exact_drives(ideal_scene, loose(scene), engine, y)})
     try:
@@ -93,16 +94,7 @@ def _pressed(
 
 
 def placed(scene: Scene) -> Scene:
-    """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart.
-
-    Raises InputError when the scene has contacts but none of them has a counterpart.
-    """
-    if scene.contacts() and not loose(scene):
-        raise InputError(
-            "[start.at]",
-            f"is 'ideal', but none of {', '.join(scene.contacts())} has an ideal counterpart, as pins and balls have",
-            "remove it, and give poses or [start.joint]",
-        )
+    """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart."""
     joints = scene.joint | {
         name: IdealJoint.model_validate({"type": WITHOUT_CLEARANCE[joint.type], "between": joint.between})
         for name, joint in loose(scene).items()
@@ -170,37 +162,46 @@ def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray
 
 def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the nearest state in which every pin is where the force on it presses it."""
-    model, contacts = engine.model, engine.model.arrays.table(m.CONTACTS)
+    model, table = engine.model, engine.model.arrays.table(m.CONTACTS)
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
-    pins = [contact.name in loose(model.scene) for contact in model.contacts]
-    modal = y[_modes(engine)]
+    # the end of a stop may move, too: held fixed, it would hold the pins back
+    pins = [pin for pin in zip(table, model.contacts, model.laws, strict=True) if pin[1].name in loose(model.scene)]
+    modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
+
+    def along(row: np.void, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the axes that hold a pin, its offset [m], and the rate of that [m/s] along the axes."""
+        outer, inner = (engine.table(m.SITE_FRAMES)[row[side]] for side in ("outer", "inner"))
+        across, away = outer["axes"][:, ACROSS.get(kind, (0, 1, 2))].T, inner["origin"] - outer["origin"]
+        return across, across @ away, across @ (inner["velocity"] - outer["velocity"] - np.cross(outer["omega"], away))
+
     for _ in range(PIN_PASSES):
         closure_rows.evaluate(engine, y, engine.start)
-        sites, missing = engine.table(m.SITE_FRAMES), []
-        for row, contact, law, pin in zip(contacts, model.contacts, model.laws, pins, strict=True):
-            if not pin:
-                continue  # the end of a stop may move, too: held fixed, it would hold the pins back
-            outer, inner = sites[row["outer"]], sites[row["inner"]]
-            force, offset = forces[contact.name], inner["origin"] - outer["origin"]
-            if contact.joint.type == "clearance-revolute":
-                axis = outer["axes"][:, 2]
-                force, offset = force - axis * (axis @ force), offset - axis * (axis @ offset)
+        missing = []
+        for row, contact, law in pins:
+            across, offset, _ = along(row, contact.joint.type)
+            force = across @ forces[contact.name]
             size = float(np.linalg.norm(force))
             pressed = contact.joint.clearance + law.depth(size)
             target = -force / size * pressed if size > NO_FORCE * weight else 0.0 * force
             missing.append(target - offset)
-        least = min(joint.clearance for joint in loose(model.scene).values())
-        if np.max(np.abs(missing)) <= REACHED * least:
+        offsets = np.concatenate(missing)
+        if np.max(np.abs(offsets)) <= REACHED * least:
             return y
-        y = _move_pins(engine, y, pins, np.concatenate(missing), modal)
+        engine.select_pieces_after(engine.start)
+        rates = per_speed(engine, y, lambda _: np.concatenate([along(row, one.joint.type)[2] for row, one, _ in pins]))
+        y = _move_pins(engine, y, rates, offsets, modal)
     raise SolverError(
         f"at t = {engine.start:.6g} s: the pins cannot reach their pressed positions; give "
         "poses and velocities instead of [start] at = 'ideal'"
     )
 
 
-def _move_pins(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, modal: np.ndarray) -> np.ndarray:
-    """Return the state with pins moved by `offsets` (3 each) [m] and modal coordinates as close to `modal` as possible.
+def _move_pins(
+    engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray, modal: np.ndarray
+) -> np.ndarray:
+    """Return the state with pins moved by `offsets` [m] and modal coordinates as close to `modal` as possible.
+
+    jacobian: rates of the offsets per speed.
 
     The least motion alone would bend rods by part of the clearance, and the run would begin with the impact of their
     springing back: a stiff rod would carry kilonewtons.
@@ -208,7 +209,6 @@ def _move_pins(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndar
     engine.select_pieces_after(engine.start)
     nq, modes = engine.model.nq, _modes(engine)
     ways = per_speed(engine, y, lambda rates: rates[:nq])
-    jacobian = offset_jacobian(engine, y)[np.repeat(pins, 3)]
     speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=SINGULAR_ROUNDING)
     if modes:
         free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that do not move the pins

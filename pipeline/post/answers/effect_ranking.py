@@ -17,8 +17,8 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.effect_size import REAL, Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.effect_sizes import cell, listed
-from flexclear.pipeline.post.overview.curves import measured, rounded, size_of
+from flexclear.pipeline.post.answers.effect_sizes import MEANING_NOT_COMPARABLE, NOT_COMPARABLE, cell, listed, written
+from flexclear.pipeline.post.overview.curves import in_unit, rounded, size_of
 from flexclear.pipeline.post.plotting.table import Table
 
 #: effect of clearance and flexibility together: the scene against the ideal mechanism
@@ -130,22 +130,28 @@ def in_words(
     def percent(value: float) -> str:
         return f" ({rounded(100.0 * value / scale, 2)} % of its {size_of(unit)} in {of})"
 
-    means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
-    bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
-        return f"does not change: the runs agree within {bound}"
-    part = percent(change.difference) if change.difference < LARGE * scale else ""
+        return f"does not change: the runs agree within <b class='n'>{in_unit(change.most, unit)}</b>"
+    noticed = change.uncertainty > 1e-3 * change.difference
+    means = f", as means of {members} runs" if members and noticed else ""
+    if noticed and not members:
+        means = f"; the runs themselves err by up to {in_unit(change.uncertainty, unit, 2)}"
+    part = percent(change.difference or change.uncertainty) if change.difference < LARGE * scale else ""
+    up_to = "by up to" if change.difference else "by less than"
+    value = written(change.difference, change.uncertainty if members else 0.0, unit)
+    if not change.difference:
+        value = in_unit(change.uncertainty, unit, 2)
+    amount = f"{up_to} <b class='n'>{value}</b>{part}"
     if not decided(change, scale) and spread > SLIGHT * scale:
-        value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and percent(spread)}"
-        return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
-    if not decided(change, scale):
-        more = f"; about {needed(change, scale, members)} runs would decide" if members else ""
-        return f"changes by {bound} at most{part and percent(change.most)}{means}{more}"
-    if change.difference > 0.0:
-        slightly = "slightly, " if change.difference < SLIGHT * scale else ""
-        value = measured(change.difference, change.uncertainty or np.nan, unit)
-        return f"changes {slightly}by up to <b class='n'>{value}</b>{part}{means}"
-    return f"changes by less than {bound}{part and percent(change.most)}{means}"
+        apart = f"<b class='n'>{in_unit(spread, unit, 2)}</b>{part and percent(spread)}"
+        return (
+            f"is not predictable: {members} runs from slightly different starts differ by {apart} (standard deviation);"
+            f" their mean differs from the ideal mechanism {amount}"
+        )
+    if not decided(change, scale) and members:
+        means += f"; about {needed(change, scale, members)} runs would decide"
+    slightly = "slightly, " if 0.0 < change.difference < SLIGHT * scale else ""
+    return f"changes {slightly}{amount}{means}"
 
 
 def needed(change: Influence, scale: float, members: int) -> int:
@@ -160,9 +166,10 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     requested: accuracies of the scene by quantity, in SI units; without them three levels are answered.
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
-    undone = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
+    last = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
+    last += filter(None, [result.attrs.get("staying", "")])
     if not single.sizes["effect"]:
-        return " ".join(undone) or "The scene has no effect that can be removed."
+        return " ".join(last) or "The scene has no effect that can be removed."
     levels = [(f"errors below {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
     if requested:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
@@ -183,7 +190,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     if unchanged:
         sentences.append(f"For {listed(unchanged)}, no {'further ' if named else ''}effect is needed.")
     sentences += [] if requested else [PERCENTAGES]
-    return " ".join(sentences + undone)
+    return " ".join(sentences + last)
 
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
@@ -206,8 +213,9 @@ def table(result: xr.Dataset) -> Table:
         cells = [cell(result, "dropped", (i, k), str(unit)) for k, unit in enumerate(result["unit"].values)]
         members = int(result["members"][i])
         rows.append((words, *cells, str(members) if members else "one run"))
-    notes = ["Largest change of each quantity without the effect; the number after ± may be due to chance."]
+    notes = ["Largest change of each quantity without the effect. The number after ± or < may be due to chance."]
     notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
+    notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     return Table(
         "Effect sizes",
         ("without", *(str(q) for q in result["quantity"].values), "members"),

@@ -27,6 +27,11 @@ FEW = 30.0
 LEGEND = {"dropped": "removed", "added": "added alone"}
 #: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
 WHISKER = 0.9
+#: words for an infinite effect size, and their meaning
+NOT_COMPARABLE = "not comparable"
+MEANING_NOT_COMPARABLE = (
+    "Not comparable: the quantity exists only with the effect, or the runs differ in their number of impacts."
+)
 #: variables of the dataset, and their meaning
 MEANINGS = {
     "dropped": "change of the quantity when the effect, or both effects, are removed from the full scene",
@@ -144,6 +149,8 @@ def table(dataset: xr.Dataset) -> Table:
         "For runs with contacts, the number after ± may be due to chance (Student's t of the members' means).",
     ]
     notes += [f"Refused: {line}" for line in filter(None, dataset.attrs["refused"].split("\n"))]
+    notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
+    notes += filter(None, [dataset.attrs.get("staying")])
     columns = ("quantity", "effect", "dropped", "added", "interaction", "with")
     return Table("Effect sizes", columns, tuple(rows), tuple(notes))
 
@@ -161,21 +168,39 @@ def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
 def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...], unit: str) -> str:
     """Format an effect size of a dataset with its uncertainty."""
     value, uncertainty = (float(dataset[part].values[at]) for part in (name, f"{name}_uncertainty"))
+    return _cell(value, uncertainty, unit)
+
+
+def _cell(value: float, uncertainty: float, unit: str) -> str:
     return "none" if value == uncertainty == 0.0 else written(value, uncertainty, unit)
 
 
 def written(value: float, uncertainty: float, unit: str) -> str:
-    """Format a difference with its uncertainty by chance, in a fitting unit."""
+    """Format a difference with its uncertainty by chance, in a fitting unit; one that is all chance as a limit."""
     if np.isnan(value):
         return "–"
     if np.isinf(value):
-        return "other events"
+        return NOT_COMPARABLE
+    if value == 0.0 < uncertainty:
+        return f"< {in_unit(uncertainty, unit, 2)}"
     return measured(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
 
 
 def listed(names: Sequence[str]) -> str:
     """Return names with commas and a final `and`."""
     return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
+
+
+def stay(names: Sequence[str]) -> str:
+    """Return a sentence on the contacts that an ideal mechanism keeps, with these names; empty without any."""
+    if not names:
+        return ""
+    places = " ".join(f"joint.{name}" for name in names)
+    verb = "stays" if len(names) == 1 else "stay"
+    return (
+        f"{listed(names)} {verb} in every variant, as a ball on a plane has no ideal counterpart "
+        f"(its own effect: flexclear effects --of {places})."
+    )
 
 
 def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
@@ -197,20 +222,18 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         figure, axes = style.panels(len(chosen), min(2, len(chosen)), 10.0, 1.1, 0.9 + 0.3 * len(names), sharey=True)
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
-                values = dataset[kind].values[:, k]
+                values, unit = dataset[kind].values[:, k], str(dataset["unit"].values[k])
+                by_chance = np.nan_to_num(dataset.get(f"{kind}_uncertainty", 0.0 * dataset[kind]).values[:, k])
                 rows = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(rows, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
-                if f"{kind}_uncertainty" in dataset:
-                    uncertainty = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
-                    below = np.minimum(uncertainty, WHISKER * shown)
-                    drawn = np.isfinite(shown) & (uncertainty > 0.0)
-                    ends = [below[drawn], uncertainty[drawn]]
-                    panel.errorbar(
-                        shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
-                    )
-                for y, value in zip(rows, values, strict=True):
-                    text = "none" if value == 0.0 else "not examined" if np.isnan(value) else "not comparable"
+                drawn = np.isfinite(shown) & (by_chance > 0.0)
+                ends = [np.minimum(by_chance, WHISKER * shown)[drawn], by_chance[drawn]]
+                panel.errorbar(
+                    shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
+                )
+                for y, value, chance in zip(rows, values, by_chance, strict=True):
+                    text = "not examined" if np.isnan(value) else _cell(value, chance, unit)
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")

@@ -172,13 +172,16 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
 def words(planned: xr.Dataset) -> str:
     """Return the plan in a sentence or two, for a designer."""
     needed, unseen, gone = _sorted(planned)
+    keeps = f" {planned.attrs['staying']}" if planned.attrs.get("staying") else ""
     asked = " and ".join(str(name) for name in planned["quantity"].values)
     if not needed and not unseen:
-        return f"For the requested accuracy of {asked} the ideal mechanism suffices: {listed(gone)} may be omitted."
+        return (
+            f"For the requested accuracy of {asked} the ideal mechanism suffices: {listed(gone)} may be omitted.{keeps}"
+        )
     left = f"{listed(gone)} may be omitted" if gone else "nothing may be omitted" if not unseen else ""
     parts = [f"{listed(needed)} must be modelled" if needed else "", left]
     parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} modelled unexamined" if unseen else ""]
-    return f"For the requested accuracy of {asked}: {'; '.join(filter(None, parts))}."
+    return f"For the requested accuracy of {asked}: {'; '.join(filter(None, parts))}.{keeps}"
 
 
 MET, MET_TO_HORIZON, MISSED, UNDECIDED = "met", "met to the horizon", "missed", "not decided"
@@ -258,7 +261,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
             rows.append((level, "–", "–", "–", "–", result.splitlines()[0]))
             continue
         text = json.loads(result.attrs["planned"])
-        constant |= dict.fromkeys(_constant(text))
+        constant |= dict.fromkeys([*_constant(text), *filter(None, [result.attrs.get("staying")])])
         needed, unseen, gone = _sorted(result)
         modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
         method = f"{text['integrator']}, rtol {text['rtol']:.0e}" if "integrator" in text else "as the scene"

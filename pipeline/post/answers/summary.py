@@ -12,9 +12,11 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.scene.variants import staying
 from flexclear.pipeline.post.answers.effect_ranking import in_words
+from flexclear.pipeline.post.answers.effect_sizes import stay
 from flexclear.pipeline.post.answers.stability import ENERGY, lost_energy
-from flexclear.pipeline.post.overview.curves import impacts, measured
+from flexclear.pipeline.post.overview.curves import impacts, in_unit
 from flexclear.pipeline.post.single_run.series import parameters, sentence
 
 NEITHER = "The scene has neither clearance nor flexible bodies"
@@ -35,15 +37,18 @@ def answer(
     """
     sentences = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
-        lacks = "Slots, planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
+        lacks = "Balls on planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
         sentences.append(f"{lacks}, so there is no idealised run to compare it with.")
     if run is not None:
         sentences += [*_impacts(run), *_horizon(run, members), *_trust(run)]
     if warnings:
         many = "one warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
         sentences.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
-    head = "" if compared is None else "<p>Compared with the same mechanism with ideal joints and rigid bodies:</p>"
-    return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"
+    head = "Compared with the same mechanism with ideal joints and rigid bodies"
+    keeps = [] if run is None else staying({n: j["type"] for n, j in parameters(run).get("joint", {}).items()})
+    head += "; after ±, what may be due to chance" if any("±" in text for text in changes) else ""
+    head += f" ({html.escape(stay(keeps)).rstrip('.')}):" if keeps else ":"
+    return f"{'' if compared is None else f'<p>{head}</p>'}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
@@ -53,7 +58,7 @@ def _effects(compared: xr.Dataset) -> list[str]:
         difference, error = float(last["difference"][j]), float(first["error"][j]) + float(last["error"][j])
         if np.isfinite(difference):
             unit = str(compared["unit"].values[j])
-            text = f"differs by <b class='n'>{measured(difference, np.nan, unit)}</b>; its error is unknown"
+            text = f"differs by <b class='n'>{in_unit(difference, unit)}</b>; its error is unknown"
             if np.isfinite(error):
                 size = float(first["largest"][j])
                 text = in_words(Influence(difference, error), size, unit, of="the ideal mechanism")
@@ -70,7 +75,7 @@ def _impacts(run: xr.Dataset) -> list[str]:
         closed = float(np.mean(run["contact_gap"].sel(contact=name).values < 0.0))
         sentences.append(
             f"<b>{html.escape(name)}</b>: {impacts(len(count), closed)}; the contact "
-            f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{measured(float(peak[0]), np.nan, unit)}</b>."
+            f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{in_unit(float(peak[0]), unit)}</b>."
         )
     return sentences
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.cost.causes import CAUSES, dominant
+from flexclear.pipeline.post.cost.causes import CAUSES, OTHER, dominant
 from flexclear.pipeline.post.cost.study import methods, recording, resolved
 from flexclear.pipeline.post.cost.work_precision import LOOKS
 from flexclear.pipeline.post.overview.curves import size_of
@@ -44,8 +44,8 @@ def _own(study: xr.Dataset) -> str:
     whole = horizon == "none" or horizon >= study.attrs["end"]
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
-        return f"{took} Its error is unknown: other runs{until} have another number of impacts."
-    return f"{took} Its largest error at the outputs{until} is {error:.1e} of the {of}."
+        return f"{took} The integration's error is unknown: other runs{until} have another number of impacts."
+    return f"{took} The integration errs at the outputs{until} by {error:.1e} of the {of} at most."
 
 
 def _digit(study: xr.Dataset) -> str:
@@ -75,14 +75,14 @@ def _cause(study: xr.Dataset) -> str:
     if not known:
         return ""
     first = max(known, key=lambda cause: known[cause])
-    others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first and value > 0.0)
-    size = f"{known[first]:.0e} of a quantity's size" if np.isfinite(known[first]) else "other impacts"
+    others = ", ".join(f"{cause} {value:.1e}" for cause, value in known.items() if cause != first and value > 0.0)
+    size = f"{known[first]:.1e} of a quantity's size" if np.isfinite(known[first]) else OTHER
     rest = f"; {others}" if others else ""
     missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
     unseen = f" Not examined: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
     helps = ", which the root finder bounds" if first == "event location" else f"; remedy: {_remedy(study, first)}"
     helps = ", which is rounding" if known[first] < ROUNDING else helps
-    return f"The largest cause of error is {first} ({size}{rest}){helps}.{unseen}"
+    return f"Of all causes of error the largest is {first} ({size}{rest}){helps}.{unseen}"
 
 
 def _remedy(study: xr.Dataset, cause: str) -> str:
@@ -116,7 +116,7 @@ def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
             panel.plot(study.attrs["own_seconds"], error, "*", color="#222222", ms=13, label="this scene", zorder=5)
         uncertain = float(study["reference_uncertainty"].max())
         if np.isfinite(uncertain) and uncertain > 0.0:
-            panel.axhline(uncertain, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
+            panel.axhline(uncertain, color="#6b6b6b", lw=0.9, ls=":", label="difference of the two most accurate runs")
         panel.set(xscale="log", yscale=style.scale_of(panel), xlabel="processor time of the integration (s)")
         panel.set_ylabel("largest relative error")
         style.plain(panel.xaxis)

@@ -27,7 +27,7 @@ CAUSES = {
     "ensemble spread": "more members",
 }
 #: words for an infinite error
-OTHER = "other impacts"
+OTHER = "another number of impacts"
 #: letters that fit next to a bar
 LETTERS = 52
 COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")

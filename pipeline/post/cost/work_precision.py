@@ -123,7 +123,7 @@ def _panel(
     ax.set(xscale="log", yscale=scale_of(ax), title=name)
     plain(ax.xaxis)
     if np.isinf(bound):
-        text = "cannot be determined: reference and\nconfirmation have other impacts"
+        text = "cannot be determined: reference and confirmation\ndiffer in their number of impacts"
         ax.set(yscale="linear", yticks=[])  # no errors to scale
         ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
     elif bound > 0.0:

@@ -18,7 +18,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, in_unit, measured, scaled
+from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, in_unit, scaled
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
@@ -159,8 +159,8 @@ def table(compared: xr.Dataset) -> Table:
     notes = [
         "Own error: the largest difference between this run and the same run at a 100 times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "
-        "times that both have; for forces and velocities also that of their peaks between output times. The number "
-        "after ± is the sum of both runs' own errors."
+        "times that both have; for forces and velocities also that of their peaks between output times. It is "
+        "as uncertain as both runs' own errors together, and with impacts that of two single runs, not of means."
     ]
     end = float(compared["time"].values[-1])
     notes += [
@@ -195,10 +195,7 @@ def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str
         return "–"
     if np.isinf(value):
         return "other number of impacts"
-    error = float(compared["error"][run, quantity]) + float(compared["error"][0, quantity])
-    if np.isnan(error):  # one of the two runs has no known error
-        return in_unit(value, unit).replace(" ", " ± ? ", 1)
-    return measured(value, error, unit)
+    return in_unit(value, unit)
 
 
 def _own(error: float, unit: str) -> str:

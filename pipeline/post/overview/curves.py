@@ -155,16 +155,14 @@ def in_unit(value: float, unit: str, digits: int = 4) -> str:
 def measured(value: float, error: float, unit: str) -> str:
     """Format a value [SI] with its error, in a readable unit, to the second digit of the error.
 
-    A nan error is left out; an error far below the value's fourth digit does not set the number of digits.
+    An error that is not known, or below the value's fourth digit, is left out.
     """
-    if np.isnan(error):
+    if not np.isfinite(error) or error <= 1e-4 * abs(value):
         return in_unit(value, unit)
-    factor, written = scaled(max(value, error) if np.isfinite(error) else value, unit)
+    factor, written = scaled(max(value, error), unit)
     value, error = factor * value, factor * error
-    if error <= 0.0 or np.isinf(error):
-        return f"{rounded(value, 4)} ± {error:g} {written}"
     decimals = 1 - int(np.floor(np.log10(error)))
-    if decimals > 6 or error < 1e-4 * abs(value):
+    if decimals > 6:
         return f"{rounded(value, 4)} ± {rounded(error, 2)} {written}"
     shown = max(decimals, 0)
     return f"{round(value, decimals):.{shown}f} ± {round(error, decimals):.{shown}f} {written}"

@@ -17,7 +17,7 @@ from flexclear.pipeline.post.overview.curves import (
     by_unit,
     curves,
     impacts,
-    measured,
+    in_unit,
     noise,
     turned_by,
     without_noise,
@@ -199,7 +199,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         row[2].set_title(f"{pushes} ({unit})", pad=16)
         # a separate line: next to the title it would be cut off
         closed = "" if "hardly" in count else f", {fraction:.0%} of the time in contact"
-        text = f"{count}, peak {measured(peak, np.nan, unit)}{closed}"
+        text = f"{count}, peak {in_unit(peak, unit)}{closed}"
         row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
     kinds = dict.fromkeys("joints with clearance" if names[k] in joints else "stops" for k in chosen)
     style.heading(figure, f"{' and '.join(kinds).capitalize()}{_rest(len(names), CONTACTS)}")

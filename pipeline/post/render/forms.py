@@ -32,7 +32,7 @@ SLENDER = 2.5
 #: largest half extent of a body without separate joints, as a fraction of the mechanism's size
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
-TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")
+TURNING = ("revolute", "clearance-revolute", "slot", "clearance-slot", "planar")
 SLIDING = ("prismatic", "cylindrical")
 BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
 #: frames on a body at which a load acts, and at which nothing does

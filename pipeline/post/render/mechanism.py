@@ -231,13 +231,14 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
                 yield at.seated(first, _floor(at, joint, size), GROUND_COLOR)
             else:
                 yield at.seated(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
-        elif "revolute" in kind or kind == "clearance-slot":
+        elif "revolute" in kind or "slot" in kind:
             radius = float(joint.get("pin_radius", PIN * size))
             long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # the links would hide shorter ones
             yield at.seated(second, surfaces.cylinder(radius, long), color, contact)
-            if kind == "clearance-slot":
-                half = np.array([[-0.5 * joint["travel"], 0.0], [0.5 * joint["travel"], 0.0]])
-                rim = surfaces.prism(surfaces.hull(half, SOCKET * radius), 0.5 * long)
+            if "slot" in kind:
+                half = 0.5 * joint.get("travel", 0.0)
+                low, high = (-half, half) if half else travel(at.run, name)
+                rim = surfaces.prism(surfaces.hull(np.array([[low, 0.0], [high, 0.0]]), SOCKET * radius), 0.5 * long)
                 yield at.seated(first, rim, SOCKET_COLOR, opacity=0.5)
             elif kind == "clearance-revolute":
                 yield at.seated(first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, opacity=0.35)

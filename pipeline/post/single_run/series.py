@@ -314,7 +314,7 @@ def sentence(horizon: float, end: float, members: float | None = None) -> str:
     neighbour = f"A run whose contacts start {100.0 * PERTURBATION:g} % of their clearance elsewhere"
     difference = f"{100.0 * SEPARATED:g} % of each body's largest motion"
     if horizon >= end:
-        text = f"{neighbour} does not diverge from this one: differences above {difference} do not persist."
+        text = f"{neighbour} stays close to this one: they differ by more than {difference} for moments at most."
     else:
         whole = f"the run lasts {1e3 * end:.4g} ms"
         text = f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."
