@@ -36,7 +36,7 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, per
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.pieces import digest
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.pipeline.dynamics.run.run import engines, follow, observed, require_shallow
+from flexclear.pipeline.dynamics.run.run import engines, follow, judged, observed, require_shallow
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
     rows = np.searchsorted(trajectory.time, regular)
     seen = observed(engine, trajectory)
     require_shallow(model, trajectory, seen)
-    require_closed(model, trajectory, seen)
+    require_closed(model, *judged(engine, trajectory, seen))
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     return {
         **{name: values[rows] for name, (_, values) in series.items()},

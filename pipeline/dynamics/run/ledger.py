@@ -21,6 +21,9 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 #: roundings of the largest energies, which may cancel in the balance
 BALANCE_ROUNDING = 1e-12
+#: roundings of the work that the largest force does over the size of the mechanism: a force that holds it at rest does
+#: work by the rounding of its positions
+WORK_ROUNDING = 1e-14
 #: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
 NO_ENERGY = 1e-30
 #: no contact law is known to a thousandth of its energy; a larger error of a run with adaptive steps has another cause.
@@ -136,11 +139,12 @@ def balances(model: Model, seen: Observed) -> list[Balance]:
     """
     count = len(model.mechanism.components.lengths)
     if count == 1 or INTEGRATORS[model.scene.solver.integrator].long_steps:
-        return [_balance(model, seen, None)]
-    return [_balance(model, seen, component) for component in range(count)]
+        return [balance(model, seen)]
+    return [balance(model, seen, component) for component in range(count)]
 
 
-def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
+def balance(model: Model, seen: Observed, component: int | None = None) -> Balance:
+    """Return the energy balance of an independent mechanism, by number, or of all bodies, in observed rows."""
     totals = {name: values for name, (_, values) in series(model, seen, component).items()}
     exchanging = [
         n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in totals
@@ -152,7 +156,10 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
         mechanism = model.mechanism
         body = next(n for n in mechanism.moving_bodies if mechanism.components.of(mechanism.link_of[n]) == component)
         of = f" of body {body} and what it is connected to"
-    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, max(BALANCE_ROUNDING * largest, NO_ENERGY))
+    forces = (seen.link_wrenches["force"], seen.loads["force"], seen.touch["force"])
+    work = model.length * max(float(np.abs(one).max(initial=0.0)) for one in forces)
+    rounding = max(BALANCE_ROUNDING * largest, WORK_ROUNDING * work, NO_ENERGY)
+    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, rounding)
 
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:
