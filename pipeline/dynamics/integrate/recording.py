@@ -5,7 +5,7 @@ step, also when its end changes one.
 
 Outputs may meet a motion where it is always the same, as a vibration once per period. So rows between them are stored
 as well, at the end of the array: wherever a part of the state is so much further from the start than in any earlier row
-that energies and speeds may be larger. There are few of these, and users do not receive them.
+that energies and speeds may be larger. Of these, the last few count, and users do not receive them.
 """
 
 from __future__ import annotations
@@ -23,8 +23,11 @@ from flexclear.pipeline.dynamics.kernels import kernel
 RECORD_SHARE, MOST_SHARE, LOOSER_FACTOR = 1e-3, 0.1, 1e3
 #: growth of the square of an error group's distance from the start after which a row is stored
 LARGER = 2.0
-#: steps over many vibrations are examined inside, too, at fractions that the golden ratio spreads evenly
-GOLDEN = 0.6180339887498949
+#: largest number of rows between outputs, for which the array has room at its end: the last ones are those that count
+BETWEEN = 128
+#: steps over many vibrations are examined inside, too: the first ones, then one of so many, at fractions that the
+#: golden ratio spreads evenly
+FIRST_STEPS, SOME_STEPS, GOLDEN = 32, 8, 0.6180339887498949
 
 
 class Record(NamedTuple):
@@ -100,8 +103,8 @@ def keep_largest(d, rows, t, y):
         if group.now > LARGER * group.largest:
             group.largest, further = group.now, True
     if further:
+        put_row(d, rows[rows.shape[0] - 1 - d.n_between % BETWEEN], t, y)
         d.n_between += 1
-        put_row(d, rows[rows.shape[0] - d.n_between], t, y)
 
 
 @kernel
@@ -130,7 +133,7 @@ def make_record_outputs(extend: Callable, interpolate: Callable, long: bool) -> 
                 interpolate(d, (t_output - t) / step, d.at_y_stage)
                 snapshot(d, rows, t_output, d.at_y_stage)
             d.next_output += 1
-        if long:
+        if long and (d.steps <= FIRST_STEPS or d.steps % SOME_STEPS == 0):
             if not ready:
                 extend(d, step)
             inside = (GOLDEN * d.steps) % 1.0

@@ -17,6 +17,7 @@ from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, await_rates, make_at_once, make_attempt
 from flexclear.pipeline.dynamics.integrate.norms import finite
 from flexclear.pipeline.dynamics.integrate.recording import (
+    BETWEEN,
     hold_modes,
     keep_largest,
     make_record_outputs,
@@ -193,7 +194,7 @@ def make_advance(
             d.status = m.AT_SINGULAR
         elif d.last_pivot < d.least_pivot:
             d.status = m.WORN_ROWS
-        elif d.n_recorded + d.n_between + waiting + room > rows.shape[0] or d.n_events + room > events.shape[0]:
+        elif d.n_recorded + waiting + room + BETWEEN > rows.shape[0] or d.n_events + room > events.shape[0]:
             d.status = m.FULL
         else:
             return False

@@ -36,7 +36,8 @@ Selections = tuple[tuple[float, np.ndarray], ...]
 class Tape:
     """The arrays of one integration; rows and events may be replaced by larger ones.
 
-    rows: the record from the first row on, and rows between from the last one backwards (`integrate.recording`).
+    rows: the record from the first row on, and those between outputs from the last one backwards (see
+        `integrate.recording`).
     doubted: flexible bodies with a warning that they left the range of linear modes.
     looks: samples of the progress rate, the first at the start.
     """

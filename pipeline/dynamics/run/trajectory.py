@@ -208,7 +208,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     n[m.CAP] = solver.evaluations
     engine.modes[:], engine.latched[:] = 0, 0.0
     room = EVENT_ROWS if contacts else m.ROOM
-    rows = recording.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
+    rows = recording.empty_record(len(outputs) + room + m.ROOM + recording.BETWEEN, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
     return Tape(outputs, rows, events, [(t, _select(engine, y, t))])
 
@@ -267,8 +267,9 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
             return False
         if status == m.FULL:
             waiting = len(tape.outputs) - n[m.NEXT_OUTPUT]
-            stored = n[m.N_RECORDED] + n[m.N_BETWEEN]
-            if stored + waiting + few > len(tape.rows) or n[m.N_EVENTS] + few > len(tape.events):
+            if n[m.N_RECORDED] + waiting + few + recording.BETWEEN > len(tape.rows) or n[m.N_EVENTS] + few > len(
+                tape.events
+            ):
                 tape.rows = tape.wider(n[m.N_RECORDED], np.zeros_like(tape.rows))
                 tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
         elif status == m.SINGULAR_AHEAD:
@@ -371,5 +372,8 @@ def _collect(engine: Engine, tape: Tape) -> Trajectory:
     in_order = events[np.argsort(events["time"], kind="stable")]
     drift, rate_drift, steepest = (float(engine.control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
     laid = tuple(tape.collocations), tuple(tape.passes)
-    rows = _so_far(engine, tape), by_time(tape.rows[len(tape.rows) - n[m.N_BETWEEN] :], contacts)
+    rows = (
+        _so_far(engine, tape),
+        by_time(tape.rows[len(tape.rows) - min(n[m.N_BETWEEN], recording.BETWEEN) :], contacts),
+    )
     return Trajectory(*rows, in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid)
