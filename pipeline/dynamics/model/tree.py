@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.model.merge import Frame, find_frame
 
 #: kind of an edge for a frame's pose in the world, prescribed in part or whole, instead of a joint of the scene
 PATH = "path"
-#: mass, as a fraction of the heaviest one in the mechanism, below which a group bears no closure, since the closure's
+#: mass, as a fraction of the heaviest one in the scene, below which a group bears no closure, since the closure's
 #: multipliers would lose as many digits as the ratio has
 NEGLIGIBLE = 1e-4
 
@@ -109,7 +109,8 @@ def span(masses: Sequence[float], joints: list[Edge]) -> tuple[list[Branch], lis
     branches = [Branch(0, -1, None)]
     link_of = {0: 0}
     depth = [0]
-    left, light = list(joints), _light(masses, joints)
+    left = list(joints)
+    light = {group for group in range(1, len(masses)) if masses[group] < NEGLIGIBLE * max(masses)}
 
     def order(e: Edge) -> tuple[bool, bool, int, int]:
         return (
@@ -141,17 +142,6 @@ def span(masses: Sequence[float], joints: list[Edge]) -> tuple[list[Branch], lis
                 "remove a drive",
             )
     return branches, left
-
-
-def _light(masses: Sequence[float], joints: Sequence[Edge]) -> set[int]:
-    """Return the moving groups whose mass is negligible next to the heaviest one that joints connect them with."""
-    heaviest, before = list(masses), list[float]()
-    while heaviest != before:
-        before = list(heaviest)
-        for e in (*joints, *reversed(joints)):
-            if e.a and e.b:
-                heaviest[e.a] = heaviest[e.b] = max(heaviest[e.a], heaviest[e.b])
-    return {g for g in range(1, len(masses)) if masses[g] < NEGLIGIBLE * heaviest[g]}
 
 
 def _freedom(edge: Edge) -> int:

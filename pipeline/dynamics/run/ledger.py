@@ -156,10 +156,24 @@ def balance(model: Model, seen: Observed, component: int | None = None) -> Balan
         mechanism = model.mechanism
         body = next(n for n in mechanism.moving_bodies if mechanism.components.of(mechanism.link_of[n]) == component)
         of = f" of body {body} and what it is connected to"
-    forces = (seen.link_wrenches["force"], seen.loads["force"], seen.touch["force"])
-    work = model.length * max(float(np.abs(one).max(initial=0.0)) for one in forces)
-    rounding = max(BALANCE_ROUNDING * largest, WORK_ROUNDING * work, NO_ENERGY)
+    rounding = max(BALANCE_ROUNDING * largest, WORK_ROUNDING * _largest_work(model, seen, component), NO_ENERGY)
     return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, rounding)
+
+
+def _largest_work(model: Model, seen: Observed, component: int | None) -> float:
+    """Return the work that the largest force in a joint, load or contact does over the size of its mechanism [J]."""
+    parts, loads = model.mechanism.components, model.arrays.table(m.LOADS)
+    length = model.length if component is None else parts.lengths[component]
+    of_link = np.array(parts.of_link)
+    of_site = np.append(of_link[model.arrays.table(m.SITES)["link"]], -1)  # of site -1, the world
+    of_contact = np.array([parts.of(contact.outer.link, contact.inner.link) for contact in model.contacts], int)
+    wrenches = (seen.link_wrenches, of_link), (seen.loads, np.maximum(of_site[loads["a"]], of_site[loads["b"]]))
+    works = [
+        (np.abs(one["moment"]).max(axis=2) + length * np.abs(one["force"]).max(axis=2), of) for one, of in wrenches
+    ]
+    works.append((length * seen.touch["normal_force"], of_contact))
+    mine = [work if component is None else work[:, of == component] for work, of in works]
+    return max(float(work.max(initial=0.0)) for work in mine)
 
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:

@@ -57,7 +57,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
         return concentric, choice
     engine, y = _started(concentric, bundles, progress)
     y = _press_pins(engine, y, forces)
-    return resting(moving(concentric, engine, y, t), loose(scene)), choice
+    return resting(moving(concentric, engine, y, t), loose(scene), {}), choice
 
 
 def placed(scene: Scene) -> Scene:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 Vector = tuple[float, float, float]
-NO_STOPS: Mapping[str, Stop] = MappingProxyType({})
 
 
 def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
@@ -65,7 +63,7 @@ def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
     return still.model_copy(update={"body": bodies, "start": start})
 
 
-def resting(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str, Stop] = NO_STOPS) -> Scene:
+def resting(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str, Stop]) -> Scene:
     """Return the scene with those of these contacts and stops at rest that are closed at the start."""
 
     def at_rest(parts: Mapping[str, Any]) -> dict[str, Any]:
