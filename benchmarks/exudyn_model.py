@@ -370,7 +370,7 @@ def polynomials(law: Pieces, order: int) -> tuple[list[float], list[list[float]]
 
     Raise ValueError for laws with harmonics.
     """
-    if law.harmonic:
+    if law.harmonics.any():
         raise ValueError("laws with harmonics have no polynomials")
     starts = [piece.start for piece in law.pieces]
     return starts, [polyder(piece.coefficients, order)[::-1].tolist() for piece in law.pieces]

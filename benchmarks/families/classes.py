@@ -302,6 +302,69 @@ def _opening(scene: Scene) -> float:
     return float(run(scene).constraint_error.max()) / 0.2
 
 
+# Scenes that say too little about themselves --------------------------------------------------------------------------
+
+
+def strobed(solver: Table) -> Scene:
+    """Return a mass on a spring, 20 rad/s, whose outputs are a period apart."""
+    period = 2.0 * np.pi / 20.0
+    return _scene(
+        10.0 * period,
+        body={"ground": _ground(o={}), "mass": _body({"o": {}}, pose={"position": [0.0, 0.0, 0.01]})},
+        joint={"rail": {"type": "prismatic", "between": ["ground.o", "mass.o"]}},
+        load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": 400.0}},
+        output={"interval": period},
+        solver=solver,
+    )
+
+
+def _exchange(scene: Scene) -> float:
+    """Return what is missing of the 0.02 J that go to and fro, as far as the steps meet them."""
+    return max(0.0, 1.0 - float(run(scene).attrs["exchanged_energy"]) / 0.02)
+
+
+def resting_on_a_stop() -> Scene:
+    """Return a lever that its weight holds on a stop of 1e6 N m/rad, at its equilibrium."""
+    turned = {"axes": {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}}
+    return _scene(
+        0.01,
+        body={"ground": _ground(o=turned), "lever": _body({"o": turned}, com=[0.5, 0.0, 0.0])},
+        joint={"hinge": {"type": "revolute", "between": ["ground.o", "lever.o"]}},
+        load={"weight": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
+        stop={"end": {"joint": "hinge", "upper": 0.0, "normal": {"law": "hertz", "exponent": 1, "stiffness": 1e6}}},
+        start={"at": "equilibrium"},
+    )
+
+
+def _torque(scene: Scene) -> float:
+    return float(np.abs(run(scene).contact_normal_force / (9.81 * 0.5) - 1.0).max())
+
+
+def block_without_mass(mass: float = 1e-9) -> Scene:
+    """Return a slider-crank whose weight moves it, and whose block has a negligible mass [kg]."""
+    along = {"axes": {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}}
+    bodies = {
+        "ground": _ground(o={}, guide=along),
+        "crank": _body({"a": {}, "b": {"position": [0.5, 0.0, 0.0]}}),
+        "rod": _body({"a": {}, "b": {"position": [1.0, 0.0, 0.0]}}, com=[0.5, 0.0, 0.0]),
+        "block": _body({"a": {}, "guide": along}, mass, mass),
+    }
+    for name in ("crank", "rod", "block"):
+        del bodies[name]["pose"]
+    pins = {"main": ("ground.o", "crank.a"), "pin": ("crank.b", "rod.a"), "wrist": ("rod.b", "block.a")}
+    joint = {name: {"type": "revolute", "between": list(ends)} for name, ends in pins.items()}
+    joint["guide"] = {"type": "prismatic", "between": ["ground.guide", "block.guide"]}
+    weight = {"type": "gravity", "acceleration": [0.0, -9.81, 0.0]}
+    start = {"main": {"position": 1.0}, "guide": {"near": 1.2}}
+    return _scene(1.0, body=bodies, joint=joint, load={"weight": weight}, start={"joint": start})
+
+
+def _as_heavier(scene: Scene) -> float:
+    """Return the difference of the crank's angle from that with a block of 1 mg, in units of 1 rad."""
+    angles = [run(one).joint_position.sel(coordinate="main").values for one in (scene, block_without_mass(1e-6))]
+    return float(np.abs(angles[1] - angles[0]).max())
+
+
 #: the cases by name
 CASES = {
     "unbalanced rotor above its critical speed": HardCase(
@@ -335,6 +398,14 @@ CASES = {
     ),
     "loop of a meshed body": HardCase(meshed_loop, "loops, per length", _opening, 1e-10),
     "pin in a slot without clearance": HardCase(quick_return, "sliding, closed form", _sliding, 1e-9),
+    "vibration with an output per period": HardCase(
+        lambda: strobed({}), "exchanged energy, closed form", _exchange, 0.5
+    ),
+    "the same with long steps": HardCase(
+        lambda: strobed({"integrator": "exponential"}), "exchanged energy, closed form", _exchange, 0.5
+    ),
+    "at rest on a stop": HardCase(resting_on_a_stop, "torque of the stop, closed form", _torque, 1e-6),
+    "block without mass in a loop": HardCase(block_without_mass, "angle, with a block of 1 mg", _as_heavier, 1e-4),
 }
 
 

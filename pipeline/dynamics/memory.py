@@ -339,7 +339,7 @@ WATCH = work(
     "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1",
     "n_contacts",
 )
-GUARDED = work("start:3 end:3", "n_guards")  # watched values of guards, at the start and at the end of the step
+GUARDED, EXCURSION = work("start:3 end:3", "n_guards"), work("now largest", "n_groups")  # see `guards`, `recording`
 (CONTROL,) = _stretches("control")
 
 # Tables of effects ---------------------------------------------------------------------------------------------------
@@ -392,13 +392,13 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # step's stage, where its state and rates are, and a flag for dense output of a step whose events have been resolved
 _INTEGERS = _numbered(
     "evaluation active mode state abridged together status evaluations steps rejected next_output n_recorded n_events "
-    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited "
-    "rates_in extended"
+    "n_between budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage "
+    "awaited rates_in extended"
 )
 # fmt: off
 (
     EVALUATION, ACTIVE, MODE, STATE, ABRIDGED, TOGETHER,
-    STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
+    STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, N_BETWEEN, BUDGET, CAP, FRESH, IMMEDIATE,
     PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, STAGE, AWAITED, RATES_IN, EXTENDED,
 ) = _INTEGERS.values()
 # fmt: on

@@ -198,3 +198,27 @@ def test_a_run_without_contacts_has_no_perturbed_run():
     ideal = run("sps4/ideal")
     assert "horizon" not in ideal
     assert "separation" not in ideal
+
+
+def test_the_horizon_does_not_depend_on_where_in_a_bounce_outputs_meet_the_motion():
+    """A ball falls 5 cm on a plane without loss: T = 2 sqrt(2 h / g) and its contact, of half a sine at sqrt(K h / m).
+
+    At the top of each tenth bounce it rests. Neighbours part by a shift in time, which grows with the square of time.
+    """
+    mass, height, stiffness, power, g = 0.2, 0.05, 1e7, 1.5, 9.81
+    speed = np.sqrt(2.0 * g * height)
+    # a Hertzian impact, Johnson (1985), Contact Mechanics, sec. 11.4: 2.94 d / v with the largest depth d
+    depth = (0.5 * (power + 1.0) * mass * speed**2 / stiffness) ** (1.0 / (power + 1.0))
+    bounce = 2.0 * speed / g + 2.94 * depth / speed
+    bodies = {"ground": {"type": "ground", "frames": {"f": {}}}, "b": rigid(mass, 1e-4, {"c": {}})}
+    bodies["b"]["pose"] = {"position": [0.0, 0.0, height + 0.02]}
+    floor = {"ball_radius": 0.02, "normal": {"law": "hertz", "stiffness": stiffness}}
+    plane = {"f": joint("ball-on-plane", "ground.f", "b.c", **floor)}
+    loads = {"g": {"type": "gravity", "acceleration": [0.0, 0.0, -g]}}
+    found = []
+    for interval in (10.0 * bounce, 5.0 * bounce, 0.0371):
+        table = scene(bodies, plane, 600.0 * bounce, 1e-10, load=loads, output={"interval": interval})
+        found.append(float(dynamics.simulate(Scene.model_validate(table), {}, silent).horizon))
+    # one comparison of 180 apart
+    assert np.ptp(found) < 600.0 * bounce / 90.0
+    assert min(found) > 5.0

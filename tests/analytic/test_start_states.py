@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.optimize import brentq
 
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
@@ -16,7 +17,8 @@ from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.pipeline.dynamics.starts import ideal, snapshot
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import simulated
+from tests.properties import mechanisms
+from tests.properties.mechanisms import joint, rigid, scene, simulated
 from tests.properties.test_assembly import loose
 from tests.properties.test_dynamics_start import angles
 
@@ -139,6 +141,62 @@ def test_a_beam_held_at_an_angle_sags_and_is_let_go_from_there() -> None:
 def test_what_rounding_leaves_of_a_state_is_zero_in_the_scene_that_begins_there() -> None:
     """Scenes take no number below 1e-50: a modal rate of 5e-79 comes of rounding alone."""
     assert snapshot._given(np.array([5e-79, -3e-60, 1e-20, -2.0])) == [0.0, 0.0, 1e-20, -2.0]
+
+
+# On a stop, at rest ---------------------------------------------------------------------------------------------------
+
+
+def lever(**stop: Any) -> xr.Dataset:
+    """A lever of 3 kg whose weight at 0.5 m and whose spring press it on its stop, at its equilibrium."""
+    turned = {"axes": {"z": [0, 1, 0], "x": [1, 0, 0]}}
+    bodies = {
+        "ground": {"type": "ground", "frames": {"O": turned}},
+        "lever": rigid(3.0, [1e-2, 0.1, 0.1], {"O": turned}, com=[0.5, 0.0, 0.0]),
+    }
+    spring = {"type": "joint-spring", "joint": "O", "stiffness": 10.0, "rest": 0.5}
+    end = {"joint": "O", "upper": 0.01, "normal": {"law": "hertz", "exponent": 1, "stiffness": 1e6}} | stop
+    loads = {"g": {"type": "gravity", "acceleration": [0, 0, -G]}, "spring": spring}
+    hinge = {"O": joint("revolute", "ground.O", "lever.O")}
+    return mechanisms.simulate(scene(bodies, hinge, 0.01, load=loads, stop={"O": end}, start={"at": "equilibrium"}))
+
+
+@pytest.mark.parametrize("stop", [{}, {"initial_approach_speed": 0}])
+def test_a_lever_begins_at_rest_on_its_stop(stop: dict[str, Any]) -> None:
+    run = lever(**stop)
+
+    def torque(angle: float) -> float:
+        return 3.0 * G * 0.5 * np.cos(angle) + 10.0 * (0.5 - angle)
+
+    angle = brentq(lambda angle: 1e6 * (angle - 0.01) - torque(angle), 0.01, 0.02, xtol=1e-15)
+    assert run.contact_normal_force.values[:, 0] == pytest.approx(torque(angle), rel=1e-8)
+    weight = np.linalg.norm(run.joint_force.values[:, 0], axis=1)
+    assert weight == pytest.approx(3.0 * G, rel=1e-8)
+    assert np.abs(run.velocity.values).max() < 1e-9
+
+
+def test_a_stop_takes_no_negative_speed_at_the_start() -> None:
+    with pytest.raises(InputError, match="must be positive or 0, not -1"):
+        lever(initial_approach_speed=-1.0)
+
+
+def test_a_block_yanked_off_a_damped_end_loses_what_the_end_takes() -> None:
+    """The end's law contains no mass. At rest it bears the weight; the force ends before the surfaces separate."""
+    bodies = {"ground": {"type": "ground", "frames": {"O": {}}}, "block": rigid(1.0, 1e-3, {"O": {}})}
+    pull = {"type": "step", "start": 0.01, "end": 0.0101, "change": 500.0}
+    loads = {
+        "g": {"type": "gravity", "acceleration": [0, 0, -G]},
+        "pull": {"type": "joint-force", "joint": "rail", "force": pull},
+    }
+    end = {"joint": "rail", "lower": 0, "normal": {"law": "kelvin-voigt", "stiffness": 1e4, "damping": 300.0}}
+    rail, begin = {"rail": joint("prismatic", "ground.O", "block.O")}, {"at": "equilibrium"}
+    run = mechanisms.simulate(scene(bodies, rail, 0.1, 1e-10, load=loads, stop={"floor": end}, start=begin))
+    force = run.contact_normal_force.values[:, 0]
+    assert force[0] == pytest.approx(1.0 * G, rel=1e-9)
+    assert float(run.contact_penetration[0, 0]) == pytest.approx(G / 1e4, rel=1e-9)
+    assert force[-1] == 0.0
+    assert np.isnan(float(run.contact_delivered_restitution[0]))
+    gained = float(run.kinetic[-1] + run.potential[-1] - run.potential[0])
+    assert np.abs(run.energy_error).max() < 1e-9 * gained
 
 
 # Clearance as without ------------------------------------------------------------------------------------------------

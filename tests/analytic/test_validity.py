@@ -20,6 +20,7 @@ from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
 from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.post.answers.stability import lost_energy
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate, simulated
 
@@ -196,6 +197,87 @@ def test_a_run_that_closes_warns_of_nothing() -> None:
     closed = bounce({"integrator": "dop853"})
     assert closed.attrs["warnings"] == ""
     assert np.abs(closed.energy_error).max() < 1e-6 * 1.96
+
+
+SPRING = {"type": "joint-spring", "joint": "p", "stiffness": 400.0}
+
+
+@pytest.mark.parametrize(
+    "solver", [{}, {"rtol": 1e-6}, {"integrator": "radau", "rtol": 1e-7}, {"integrator": "exponential"}]
+)
+@pytest.mark.parametrize("interval", [2.0 * np.pi / 20.0, np.pi / 20.0])
+def test_a_vibration_that_is_recorded_once_a_period_exchanges_its_energy(
+    solver: dict[str, Any], interval: float
+) -> None:
+    """A mass of 1 kg on a spring, 20 rad/s, let go at 1 cm: 0.02 J go to and fro, of which no output knows."""
+    bodies = {"ground": {"type": "ground", "frames": {"o": {}}}, "b": rigid(1.0, 0.01, {"o": {}})}
+    bodies["b"]["pose"] = {"position": [0.0, 0.0, 0.01]}
+    rail = {"p": joint("prismatic", "ground.o", "b.o")}
+    more = {"load": {"s": SPRING}, "output": {"interval": interval}, "solver": solver}
+    found = simulate(scene(bodies, rail, 20.0 * 2.0 * np.pi / 20.0, **more))
+    # where the steps meet the motion: 0.02 J, or less by the square of what lies between two of them
+    assert 0.015 < found.attrs["exchanged_energy"] < 0.0201
+    assert found.attrs["warnings"] == ""
+    assert float(lost_energy(found).max()) < 1e-4
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "exponential"])
+def test_a_beam_that_rings_is_judged_between_outputs_a_period_apart(integrator: str) -> None:
+    """In one of its modes: 1/2 (omega q)^2 are exchanged, by steps of many periods as well."""
+    size, given = 1e-4, load_scene(TREE / "scenes" / "checks" / "clamped_rod.toml", {"load": {}})
+    omega = float(np.sqrt(bundles(given)["rod"]["modal_stiffness"].values[0, 0]))
+    period = 2.0 * np.pi / omega
+    changes: dict[str, Any] = {
+        "start": {"modal": {"rod": {"coordinate": [size]}}},
+        "time.end": 8.0 * period,
+        "output.interval": period,
+        "solver": {"integrator": integrator, "rtol": 1e-9},
+    }
+    ringing = edited(given, changes)
+    found = simulated(ringing, bundles(ringing))
+    assert float(found.kinetic.max()) < 1e-9 * (omega * size) ** 2  # so the outputs know nothing of it
+    assert found.attrs["exchanged_energy"] == pytest.approx(0.5 * (omega * size) ** 2, rel=0.5)
+
+
+@pytest.mark.parametrize("force", [100.0, 1e5])
+def test_a_tendon_over_coupled_joints_is_held_at_rest_up_to_rounding(force: float) -> None:
+    """The torque that holds the first joint is the force times the change of length with both angles.
+
+    A constant length gives the force no work; rounding of the positions does.
+    """
+    bodies = {
+        "ground": {"type": "ground", "frames": {"hip": {}, "origin": {"position": [-0.05, 0.06, 0.0]}}},
+        "thigh": rigid(1.0, 1e-2, {"hip": {}, "knee": {"position": [0.4, 0.0, 0.0]}}),
+        "shank": rigid(1.0, 1e-2, {"knee": {}, "insert": {"position": [0.06, 0.03, 0.0]}}),
+    }
+    joints = {
+        "hip": joint("revolute", "ground.hip", "thigh.hip"),
+        "knee": joint("revolute", "thigh.knee", "shank.knee"),
+    }
+    tendon = {
+        "type": "line-expression",
+        "between": ["ground.origin", "shank.insert"],
+        "force": "f",
+        "values": {"f": f"{force} N"},
+    }
+    more = {
+        "gear": {"couple": {"first": "hip", "second": "knee", "ratio": 0.5}},
+        "start": {"joint": {"hip": {"position": "20 deg"}, "knee": {"position": "10 deg"}}},
+        "drive": {"hip": {"joint": "hip", "law": "20 deg"}},
+        "load": {"tendon": tendon},
+    }
+    found = simulate(scene(bodies, joints, 0.01, **more))
+
+    def length(hip: float) -> float:
+        shank = 1.5 * hip  # the knee bends by half as much, from 10 deg at 20 deg
+        knee = 0.4 * np.array([np.cos(hip), np.sin(hip)])
+        turned = np.array([[np.cos(shank), -np.sin(shank)], [np.sin(shank), np.cos(shank)]])
+        return float(np.linalg.norm(knee + turned @ [0.06, 0.03] - [-0.05, 0.06]))
+
+    at, step = np.radians(20.0), 1e-5
+    arm = (length(at + step) - length(at - step)) / (2.0 * step)  # the difference is exact to 1e-10
+    assert found.drive_force.values[:, 0] == pytest.approx(force * arm, rel=1e-8)
+    assert float(lost_energy(found).max()) == 0.0
 
 
 @pytest.mark.parametrize("size, end", [(1e-6, 6.0), (1.0, 6.0), (1.0, 0.3), (1e3, 0.3), (1e3, 6.0)])

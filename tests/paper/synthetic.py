@@ -206,6 +206,7 @@ def ensemble(base: xr.Dataset, members: int = 4, growth: float = 60.0) -> xr.Dat
         data[name] = (("member", "contact"), np.full((members, 1), value) + np.arange(members)[:, None])
     peak = np.abs(data["acceleration"][1]).max(axis=1)
     data["peak_acceleration"] = (("member", "body", "axis"), peak)
+    data["peak_speed"] = (("member", "body"), np.linalg.norm(data["velocity"][1], axis=-1).max(axis=1))
     made = xr.Dataset(data, {"time": time, "body": ["platform"], "contact": ["A1"]})
     return conform(made, ENSEMBLE, title="made-up members")
 

@@ -183,3 +183,11 @@ def test_what_a_law_cannot_do_is_refused_in_words(law: NormalLaw, said: str) -> 
     part = lankarani_nikravesh.LAW if law.law == "lankarani-nikravesh" else kelvin_voigt
     with pytest.raises(ValueError, match=said):
         part.resolve(law, 1e9, 1.0)
+
+
+def test_a_linear_damper_asks_for_a_mass_where_a_restitution_needs_one() -> None:
+    given = NormalLaw(law="kelvin-voigt", damping=20.0)
+    assert kelvin_voigt.resolve(given, 1e4, None).delivered is None
+    assert kelvin_voigt.resolve(given, 1e4, 1.0).numbers == kelvin_voigt.resolve(given, 1e4, None).numbers
+    with pytest.raises(ValueError, match="no mass is known"):
+        kelvin_voigt.resolve(NormalLaw(law="kelvin-voigt", restitution=0.5), 1e4, None)

@@ -22,7 +22,13 @@ def run(energy_error=1e-9, loops=1e-12, condition=5.0, rejected=1, stiff=0.0, ho
             "horizon": ((), horizon),
         },
         {"time": time, "body": ["slider"]},
-        {"steps": 100, "rejected_steps": rejected, "stiff_share": stiff},
+        {
+            "steps": 100,
+            "rejected_steps": rejected,
+            "stiff_share": stiff,
+            "exchanged_energy": 2.0,
+            "energy_rounding": 1e-12,
+        },
     )
 
 

@@ -205,6 +205,7 @@ contact_normal_force | member time contact | N, N m | normal contact force, >= 0
 contact_offset | member time contact axis | m, rad | ball centre relative to the socket centre, socket axes
 impact_count | member contact | 1 | closings with approach above 1e-4 m/s
 peak_force | member contact | N, N m | largest normal contact force of the run
+peak_speed | member body | m s-1 | largest speed of the centre of mass, also between outputs
 peak_acceleration | member body axis | m s-2 | largest magnitude of each component, of outputs and events
 contact_time_share | member contact | 1 | fraction of the run spent in contact
 """)

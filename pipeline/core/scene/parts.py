@@ -295,7 +295,8 @@ class Stop(OnCoordinate):
     floor: Value | None = None
     """least approach speed used as impact rate; default: 1e-6 rad/s, or for lengths as in contacts"""
     initial_approach_speed: Value | None = None
-    """impact rate of an end that the coordinate has passed at the start; without this key such a start is refused"""
+    """impact rate of an end that the coordinate has passed at the start, 0 for a resting one; without this key such a
+    start is refused, unless it is an equilibrium"""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -49,7 +49,8 @@ contact_elastic? | time contact | J | energy stored in the contact and its brist
 contact_damping_loss? | time contact | J | energy lost to the normal damping of the contact since the start
 contact_impulse? | time contact | N s, N m s | impulse of the normal force since the start
 contact_friction_loss? | time contact | J | energy lost to the friction of the contact since the start
-contact_delivered_restitution? | contact | 1 | rebound over approach speed that the contact's law gives a free impact
+contact_delivered_restitution?~ | contact | 1 | rebound over approach speed that the contact's law gives a free
+  impact, NaN where the law depends on a mass that is unknown
 wear_sliding_distance? | time worn | m | distance that the surfaces in contact have slid on each other
 wear_load_path? | time worn | N m | time integral of normal force times sliding speed since the start
 wear_direction_outer? | time worn axis | 1 | direction from the socket's centre to the contact, socket axes

@@ -31,13 +31,14 @@ class Resolved:
     """A normal law, resolved: form and numbers for the kernels, and the restitution of a free impact.
 
     parameter: the law's own coefficient of restitution, or None.  delivered: the rebound over the
-    approach speed of a free impact.  warning: in words, when the law is used outside its range.
+    approach speed of a free impact, None where it depends on a mass that is unknown.  warning: in words, when the law
+    is used outside its range.
     """
 
     form: str
     numbers: Numbers
     parameter: float | None
-    delivered: float
+    delivered: float | None
     warning: str | None = None
 
     def depth(self, force: float) -> float:

@@ -7,6 +7,7 @@ Products of sines become sums, so that value and rates have the form of any othe
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
@@ -37,7 +38,7 @@ class Course:
 
     def at(self, t: float) -> Piece:
         """Return the piece that holds at a time."""
-        return self.pieces[max(int(np.searchsorted(self.starts, t, side="right")) - 1, 0)]
+        return self.pieces[max(bisect_right(self.starts, t) - 1, 0)]
 
 
 def pieces(law: Expression, dimension: str) -> Pieces:

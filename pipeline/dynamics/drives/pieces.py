@@ -9,13 +9,13 @@ start of a piece, where integration restarts.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise, zip_longest
+from itertools import zip_longest
 from math import comb, inf, perm, pi, sin
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flexclear.pipeline.core.scene.laws import COEFFICIENTS
 from flexclear.pipeline.core.scene.registry import lookup
@@ -74,10 +74,10 @@ class Pieces:
         """Start of each piece [s]; all but the first are breaks."""
         return [p.start for p in self.pieces]
 
-    @property
-    def harmonic(self) -> bool:
-        """True when a piece has harmonics."""
-        return any(p.terms for p in self.pieces)
+    @cached_property
+    def harmonics(self) -> np.ndarray:
+        """Number of harmonics of each piece."""
+        return np.array([len(p.terms) for p in self.pieces])
 
     def at(self, t: float) -> Piece:
         """Return the piece that holds at t; where two meet, the later one."""
@@ -87,16 +87,29 @@ class Pieces:
         """Return the derivative of this order at time t."""
         return self.at(t).value(t, order)
 
+    def derivatives(self, those: np.ndarray, times: np.ndarray, order: int) -> np.ndarray:
+        """Return the derivative of this order of pieces, by their indices, each at a time of its own; shape (n,)."""
+        rows, waved = self.rows[those], np.flatnonzero(self.harmonics[those])
+        terms = [(k, *term) for k in waved for term in self.pieces[those[k]].terms]
+        s, values = times - rows[:, 0], np.zeros(len(times))
+        for n in range(COEFFICIENTS - 1, order - 1, -1):
+            values = values * s + perm(n, order) * rows[:, 1 + n]
+        owner, a, w, phase = np.array(terms or np.zeros((0, 4))).T
+        at = owner.astype(int)
+        np.add.at(values, at, a * w**order * np.sin(w * s[at] + phase + 0.5 * pi * order))
+        return values
+
     def times(self, factor: float) -> Pieces:
         """Return the law multiplied by a factor."""
-        return Pieces(tuple(p.times(factor) for p in self.pieces), self.span)
+        return self if factor == 1.0 else Pieces(tuple(p.times(factor) for p in self.pieces), self.span)
 
-    def table(self) -> tuple[np.ndarray, list[Terms]]:
-        """Return rows (start, eight coefficients), shape (n, 9), and the harmonics of each piece."""
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """Start and eight coefficients of each piece, shape (n, 9)."""
         rows = np.zeros((len(self.pieces), 1 + COEFFICIENTS))
         for row, p in zip(rows, self.pieces, strict=True):
             row[0], row[1 : 1 + len(p.coefficients)] = p.start, p.coefficients
-        return rows, [p.terms for p in self.pieces]
+        return rows
 
 
 def pieces_of(law: object, dimension: str) -> Pieces:
@@ -105,9 +118,10 @@ def pieces_of(law: object, dimension: str) -> Pieces:
     return result
 
 
-def polynomials(starts: Iterable[float], coefficients: Iterable[Sequence[float]]) -> tuple[Piece, ...]:
-    """Return pieces without harmonics."""
-    return tuple(Piece(float(t), tuple(float(c) for c in row)) for t, row in zip(starts, coefficients, strict=True))
+def polynomials(starts: ArrayLike, coefficients: ArrayLike) -> tuple[Piece, ...]:
+    """Return pieces without harmonics; coefficients: a row for each start, of rising order."""
+    both = (np.asarray(values, dtype=float).tolist() for values in (starts, coefficients))
+    return tuple(Piece(t, tuple(row)) for t, row in zip(*both, strict=True))
 
 
 def covers(law: Pieces, start: float, end: float) -> bool:
@@ -118,23 +132,22 @@ def covers(law: Pieces, start: float, end: float) -> bool:
 
 def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
     """Return the time of the first break between start and end where value or rate jumps, and which of them does."""
-    meeting = [(p, q) for p, q in pairwise(law.pieces) if start < q.start < end]
+    starts = np.array(law.starts)
+    later = 1 + np.flatnonzero((start < starts[1:]) & (starts[1:] < end))
     for order, word in ((0, "value"), (1, "rate")):
-        for left, right in meeting:
-            here = left.value(right.start, order), right.value(right.start, order)
-            step = abs(here[1] - here[0])
-            # the size of the law is evaluated last: most laws meet exactly
-            if step > 1e-6 * max(abs(here[0]), abs(here[1])) and step > 1e-6 * size(law, start, end, order):
-                return right.start, word
+        left, right = (law.derivatives(those, starts[later], order) for those in (later - 1, later))
+        step = np.abs(right - left)
+        broken = step > 1e-6 * np.maximum(np.abs(left), np.abs(right))
+        if broken.any():  # most laws meet exactly
+            broken &= step > 1e-6 * size(law, start, end, order)
+        if broken.any():
+            return float(starts[later[np.argmax(broken)]]), word
     return None
 
 
 def size(law: Pieces, start: float, end: float, order: int) -> float:
     """Return the largest magnitude of a law's derivative of this order between two times, on a grid of each piece."""
-    until = [*law.starts[1:], inf]
-    spans = [
-        (p, max(p.start, start), min(after, end))
-        for p, after in zip(law.pieces, until, strict=True)
-        if after > start and p.start < end
-    ]
-    return max(abs(p.value(float(t), order)) for p, a, b in spans for t in np.linspace(a, b, GRID))
+    starts, until = np.array(law.starts), np.array([*law.starts[1:], inf])
+    those = np.flatnonzero((until > start) & (starts < end))
+    times = np.linspace(np.maximum(starts[those], start), np.minimum(until[those], end), GRID)
+    return float(np.abs(law.derivatives(np.tile(those, GRID), times.ravel(), order)).max())

@@ -138,8 +138,8 @@ class _Plan:
         event = first if event is None and first is not None and until < end else event
         seen = observed(last, trajectory)
         require_shallow(last.model, trajectory, seen)
-        exchanged = require_closed(last.model, trajectory, seen, max((p.exchanged for p in before), default=0.0))
         run = Run(scene, last, trajectory, seen, None, switched, mended)
+        exchanged = require_closed(last.model, *run.judged, max((p.exchanged for p in before), default=0.0))
         for sentence in warnings(run) if start.before is None else ():
             self.progress(None, f"warning: {sentence}")
         t = float(trajectory.time[-1])

@@ -17,7 +17,9 @@ from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, await_rates, make_at_once, make_attempt
 from flexclear.pipeline.dynamics.integrate.norms import finite
 from flexclear.pipeline.dynamics.integrate.recording import (
+    BETWEEN,
     hold_modes,
+    keep_largest,
     make_record_outputs,
     share_of_records,
     snapshot,
@@ -173,7 +175,7 @@ def make_advance(
         foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, made.attempt, method)
     last, ends = method.last, method.ends
     watch_start, _, any_closed = events
-    record_outputs = make_record_outputs(made.extend, made.dense.interpolate)
+    record_outputs = make_record_outputs(made.extend, made.dense.interpolate, method.room.oscillations > 0)
     detect_stiffness = make_detect_stiffness(method)
     first_step, error_norm, after_rejection, next_step = stepping.make_step_control(evaluate, any_closed, error, method)
 
@@ -192,7 +194,7 @@ def make_advance(
             d.status = m.AT_SINGULAR
         elif d.last_pivot < d.least_pivot:
             d.status = m.WORN_ROWS
-        elif d.n_recorded + waiting + room > rows.shape[0] or d.n_events + room > events.shape[0]:
+        elif d.n_recorded + waiting + room + BETWEEN > rows.shape[0] or d.n_events + room > events.shape[0]:
             d.status = m.FULL
         else:
             return False
@@ -358,6 +360,7 @@ def make_advance(
             record_outputs(d, step, known, outputs, rows, t_end)
             keep(d, step)
             accept(d, t_end)
+            keep_largest(d, rows, t_end, d.at_y)
             plan(d, step, following)
             if loops:
                 if along:

@@ -28,7 +28,8 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
     """Return the pose with its forces and reactions (schema EQUILIBRIUM)."""
     seen = observe(bench, state(bench, rest.at.q)[None, :])
     contacts, none = len(bench.model.contacts), m.named(m.EVENT, np.zeros((0, m.EVENT.size)))[:, 0]
-    once = Trajectory(rows(bench, seen.state), none, contacts, {}, ((bench.time, bench.engine.selected.copy()),))
+    row = rows(bench, seen.state)
+    once = Trajectory(row, row[:0], none, contacts, {}, ((bench.time, bench.engine.selected.copy()),))
     still = recorded(Run(bench.scene, bench.engine, once, seen)).to_xarray().isel(time=0, drop=True)
     kept = [n for n in EQUILIBRIUM if n in still.variables]
     names = [n for n in still.coords if set(still[n].dims) <= set().union(*(still[k].dims for k in kept))]

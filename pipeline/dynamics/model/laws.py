@@ -83,10 +83,9 @@ def fill(laws: Sequence[Pieces]) -> dict[Any, Any]:
     pieces = [np.zeros((0, m.PIECES.size))]
     harmonics: list[tuple[float, float, float]] = []
     for law in laws:
-        table, terms = law.table()
-        rows.append((len(parts), len(table)))
-        pieces.append(table)
-        for piece in terms:
-            parts.append((len(harmonics), len(piece)))
-            harmonics += piece
+        rows.append((len(parts), len(law.pieces)))
+        pieces.append(law.rows)
+        for piece in law.pieces:
+            parts.append((len(harmonics), len(piece.terms)))
+            harmonics += piece.terms
     return {m.LAWS: rows, m.PIECES: np.concatenate(pieces), m.PIECE_HARMONICS: parts, m.HARMONICS: harmonics}

@@ -232,7 +232,8 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
     frames = frames_of(scene, bundles)
     groups, group_of = merge(scene, frames)
     starts = start_places(scene, groups, group_of, frames)
-    branches, closing = span(groups, edges(scene, frames, group_of))
+    masses = [0.0, *(_mass(scene, group, bundles) for group in groups[1:])]
+    branches, closing = span(masses, edges(scene, frames, group_of))
     origin = _centre(starts)
     links: list[Link] = []
     link_of: dict[str, int] = {}
@@ -261,6 +262,11 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
     contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in touching]
     deformation = {link_of[name]: q for name, q in given_modes(scene, bundles).items()}
     return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length, parts, deformation=deformation)
+
+
+def _mass(scene: Scene, group: Group, bundles: Mapping[str, Labelled]) -> float:
+    """Return the mass of a group of bodies [kg]."""
+    return float(bundles[group.host]["mass"].values) if group.flexible else rigid_inertia(scene, group.placements).mass
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:

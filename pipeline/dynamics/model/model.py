@@ -111,7 +111,7 @@ def filled(
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
     gravity = loading.gravity(mechanism.scene)
-    parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]))
+    parts = _parts(numbering, normals, any(law.harmonics.any() for law in [*drive_laws, *loaded.laws]))
     slots = filling.slots(mechanism, parts)
     books = _books(slots)
     tables = {

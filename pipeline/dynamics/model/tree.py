@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.driving import joint_drives, joint_type
-from flexclear.pipeline.dynamics.model.merge import Frame, Group, find_frame
+from flexclear.pipeline.dynamics.model.merge import Frame, find_frame
 
 #: kind of an edge for a frame's pose in the world, prescribed in part or whole, instead of a joint of the scene
 PATH = "path"
+#: mass, as a fraction of the heaviest one in the scene, below which a group bears no closure, since the closure's
+#: multipliers would lose as many digits as the ratio has
+NEGLIGIBLE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -94,28 +97,38 @@ def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int
     return result
 
 
-def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Edge]]:
+def span(masses: Sequence[float], joints: list[Edge]) -> tuple[list[Branch], list[Edge]]:
     """Return links, parents first (link 0 is the ground), and the closures.
 
-    The tree takes joints with prescribed coordinates first, then those with the fewest free coordinates, then those
-    nearest to the ground: that keeps the unknowns few and the chains short.
+    The tree takes joints with prescribed coordinates first, then those of light groups, then those with the fewest free
+    coordinates, then those nearest to the ground: that keeps the unknowns few and the chains short, and closures join
+    groups whose inertia bears them: closing a loop at a group without mass would be a matter of rounding.
+    masses: of the groups [kg].
     """
     branches = [Branch(0, -1, None)]
     link_of = {0: 0}
     depth = [0]
     left = list(joints)
-    while len(branches) < len(groups):
+    light = {group for group in range(1, len(masses)) if masses[group] < NEGLIGIBLE * max(masses)}
+
+    def order(e: Edge) -> tuple[bool, bool, int, int]:
+        return (
+            not any(e.drives),
+            light.isdisjoint((e.a, e.b)),
+            _freedom(e),
+            depth[link_of[e.a if e.a in link_of else e.b]],
+        )
+
+    while len(branches) < len(masses):
         frontier = [e for e in left if (e.a in link_of) != (e.b in link_of)]
         if frontier:
-            best = min(
-                frontier, key=lambda e: (not any(e.drives), _freedom(e), depth[link_of[e.a if e.a in link_of else e.b]])
-            )
+            best = min(frontier, key=order)
             left.remove(best)
             reverse = best.a not in link_of
             parent, group = (best.b, best.a) if reverse else (best.a, best.b)
             branches.append(Branch(group, link_of[parent], best, reverse))
         else:
-            group = next(g for g in range(len(groups)) if g not in link_of)
+            group = next(g for g in range(len(masses)) if g not in link_of)
             branches.append(Branch(group, 0, None))
         link_of[group] = len(branches) - 1
         depth.append(depth[branches[-1].parent] + 1)

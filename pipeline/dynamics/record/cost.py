@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.record.dataset import recorded
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.run import Run, engines, follow, observed
+from flexclear.pipeline.dynamics.run.run import Run, engines, follow, judged, observed
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Trajectory
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def measure(
     first = (process_time() - begun,) if single else ()
     seen = observed(last, trajectory)
     if checked:
-        require_closed(last.model, trajectory, seen)
+        require_closed(last.model, *judged(last, trajectory, seen))
 
     def record(seen: Observed, perturbed: PerturbedRun | None = None) -> xr.Dataset:
         return recorded(Run(scene, last, trajectory, seen, perturbed, switched)).to_xarray()

@@ -157,7 +157,7 @@ def warnings(run: Run) -> list[str]:
         *_flexible_warnings(run),
         *(text for warn in run.model.parts.functions("warns") for text in warn(run)),
         *_step_warnings(run.model, run.trajectory),
-        *ledger.warnings(run.model, run.observed),
+        *ledger.warnings(run.model, run.judged[1]),
     ]
 
 
@@ -205,12 +205,14 @@ def _flexible_warnings(run: Run) -> list[str]:
         return []
     from flexclear.pipeline.dynamics.run.refusals import validity
 
-    return validity.warnings(run.model, run.trajectory.time, run.observed)
+    trajectory, seen = run.judged
+    return validity.warnings(run.model, trajectory.time, seen)
 
 
 def _report(run: Run) -> dict[str, float | int | str]:
     """Return attributes that describe integration, method and contact laws of a run, with its warnings."""
     counters, redundant = run.trajectory.counters, run.engine.mobility.redundant
+    energies = ledger.balance(run.model, run.judged[1])
     facts: dict[str, float | int | str] = {
         **counters,
         "stiff_share": counters.get("stiff_steps", 0) / max(1, counters.get("steps", 0)),
@@ -218,6 +220,8 @@ def _report(run: Run) -> dict[str, float | int | str]:
         "largest_drift_before_projection": run.trajectory.drift,
         "largest_rate_drift_before_projection": run.trajectory.rate_drift,
         "closure_residual_of_given_start": run.model.mechanism.start_residual,
+        "exchanged_energy": energies.exchanged,
+        "energy_rounding": energies.rounding,
     }
     if run.perturbed is not None:
         facts["separation_perturbation"] = quantities.PERTURBATION
@@ -345,7 +349,7 @@ def _contacts(model: Model, seen: Observed) -> Series:
     variables: Variables = {name: (("time", "contact"), values) for name, values in scalars.items()}
     variables["contact_force"] = (("time", "contact", "axis"), touch["force"])
     variables["contact_offset"] = (("time", "contact", "axis"), touch["offset"])
-    variables["contact_delivered_restitution"] = (("contact",), np.array([law.delivered for law in model.laws]))
+    variables["contact_delivered_restitution"] = (("contact",), np.array([law.delivered for law in model.laws], float))
     return variables, contact_names(model)
 
 

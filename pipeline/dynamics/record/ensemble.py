@@ -36,7 +36,7 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, per
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.pieces import digest
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.pipeline.dynamics.run.run import engines, follow, observed, require_shallow
+from flexclear.pipeline.dynamics.run.run import engines, follow, judged, observed, require_shallow
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -170,11 +170,14 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
     rows = np.searchsorted(trajectory.time, regular)
     seen = observed(engine, trajectory)
     require_shallow(model, trajectory, seen)
-    require_closed(model, trajectory, seen)
+    throughout = judged(engine, trajectory, seen)
+    require_closed(model, *throughout)
+    speed = np.linalg.norm(throughout[1].body_velocity, axis=2).max(axis=0)
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     return {
         **{name: values[rows] for name, (_, values) in series.items()},
         # rows at events count, too: an impact is shorter than the output interval
+        "peak_speed": speed[[model.mechanism.moving_bodies.index(name) for name in names]],
         "peak_acceleration": np.abs(series["acceleration"][1]).max(axis=0),
         "contact_normal_force": seen.touch["normal_force"][rows],
         "contact_offset": seen.touch["offset"][rows],

@@ -32,7 +32,7 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, per
 from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
+from flexclear.pipeline.dynamics.run.run import follow, judged, observed, require_shallow
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
 def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, recorded: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
-    require_closed(engine.model, trajectory, seen)
+    require_closed(engine.model, *judged(engine, trajectory, seen))
     events = {} if all(one.quantity.over_time for one in recorded) else events_of(engine.model, trajectory)
     terms = {term for one in recorded for term in one.quantity.terms()}
     arrays = variables_for(scene, Motions(engine.model, seen), terms, trajectory.time, events)

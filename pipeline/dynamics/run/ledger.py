@@ -21,6 +21,9 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 #: roundings of the largest energies, which may cancel in the balance
 BALANCE_ROUNDING = 1e-12
+#: roundings of the work that the largest force does over the size of the mechanism: a force that holds it at rest does
+#: work by the rounding of its positions
+WORK_ROUNDING = 1e-14
 #: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
 NO_ENERGY = 1e-30
 #: no contact law is known to a thousandth of its energy; a larger error of a run with adaptive steps has another cause.
@@ -136,11 +139,12 @@ def balances(model: Model, seen: Observed) -> list[Balance]:
     """
     count = len(model.mechanism.components.lengths)
     if count == 1 or INTEGRATORS[model.scene.solver.integrator].long_steps:
-        return [_balance(model, seen, None)]
-    return [_balance(model, seen, component) for component in range(count)]
+        return [balance(model, seen)]
+    return [balance(model, seen, component) for component in range(count)]
 
 
-def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
+def balance(model: Model, seen: Observed, component: int | None = None) -> Balance:
+    """Return the energy balance of an independent mechanism, by number, or of all bodies, in observed rows."""
     totals = {name: values for name, (_, values) in series(model, seen, component).items()}
     exchanging = [
         n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in totals
@@ -152,7 +156,24 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
         mechanism = model.mechanism
         body = next(n for n in mechanism.moving_bodies if mechanism.components.of(mechanism.link_of[n]) == component)
         of = f" of body {body} and what it is connected to"
-    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, max(BALANCE_ROUNDING * largest, NO_ENERGY))
+    rounding = max(BALANCE_ROUNDING * largest, WORK_ROUNDING * _largest_work(model, seen, component), NO_ENERGY)
+    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, rounding)
+
+
+def _largest_work(model: Model, seen: Observed, component: int | None) -> float:
+    """Return the work that the largest force in a joint, load or contact does over the size of its mechanism [J]."""
+    parts, loads = model.mechanism.components, model.arrays.table(m.LOADS)
+    length = model.length if component is None else parts.lengths[component]
+    of_link = np.array(parts.of_link)
+    of_site = np.append(of_link[model.arrays.table(m.SITES)["link"]], -1)  # of site -1, the world
+    of_contact = np.array([parts.of(contact.outer.link, contact.inner.link) for contact in model.contacts], int)
+    wrenches = (seen.link_wrenches, of_link), (seen.loads, np.maximum(of_site[loads["a"]], of_site[loads["b"]]))
+    works = [
+        (np.abs(one["moment"]).max(axis=2) + length * np.abs(one["force"]).max(axis=2), of) for one, of in wrenches
+    ]
+    works.append((length * seen.touch["normal_force"], of_contact))
+    mine = [work if component is None else work[:, of == component] for work, of in works]
+    return max(float(work.max(initial=0.0)) for work in mine)
 
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:

@@ -36,6 +36,8 @@ Selections = tuple[tuple[float, np.ndarray], ...]
 class Tape:
     """The arrays of one integration; rows and events may be replaced by larger ones.
 
+    rows: the record from the first row on, and those between outputs from the last one backwards (see
+        `integrate.recording`).
     doubted: flexible bodies with a warning that they left the range of linear modes.
     looks: samples of the progress rate, the first at the start.
     """
@@ -49,6 +51,10 @@ class Tape:
     doubted: set[str] = field(default_factory=set)
     looks: list[Look] = field(default_factory=list)
 
+    def wider(self, recorded: int, room: np.ndarray) -> np.ndarray:
+        """Return the rows with room after those of the record, of which there are so many."""
+        return np.concatenate([self.rows[:recorded], room, self.rows[recorded:]])
+
 
 class Jumps(Protocol):
     """Changes of the state where the equations change; both take the engine, which has arrived there, and the tape."""
@@ -60,7 +66,7 @@ class Jumps(Protocol):
         """Apply the change at a break, from the pieces of laws before it to those after it."""
 
 
-def in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
+def by_time(rows: np.ndarray, contacts: int) -> np.ndarray:
     """Return the rows by time, since those of a step's inner events precede its outputs.
 
     Of rows with the same time, as of an event on an output time, the last one remains.

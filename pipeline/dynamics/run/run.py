@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from importlib import import_module
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
     from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
 
+#: outputs by which runs are judged
+JUDGED = ["state", "positions", "links", "link_wrenches", "body_velocity", "touch", "loads", "energy", "residual"]
+
 
 @dataclass(frozen=True)
 class Run:
@@ -61,6 +64,11 @@ class Run:
     def model(self) -> Model:
         """Model of the run."""
         return self.engine.model
+
+    @cached_property
+    def judged(self) -> tuple[Trajectory, Observed]:
+        """The rows by which the run is judged (`judged`)."""
+        return judged(self.engine, self.trajectory, self.observed)
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Engine:
@@ -158,7 +166,7 @@ def integrate(
                 stopped.partial = seen(*stopped.partial)
             raise
         require_shallow(done.model, done.trajectory, done.observed)
-        require_closed(done.model, done.trajectory, done.observed)
+        require_closed(done.model, *done.judged)
         return done
 
     if not engine.model.contacts:
@@ -222,18 +230,7 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 
     Raises SolverError when a row could not be evaluated.
     """
-    parts = list[Blocks]()
-    for part, selected in trajectory.parts():
-        engine.keep(selected)
-        out = observe_blocks(engine, trajectory.rows[part])
-        for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
-            limit = _limit(engine, trajectory.rows[part][k], motion, bool(out["status"][k, 0]))
-            for name, values in limit.items():
-                out[name][k] = values
-        parts.append(out)
-    # megabytes are copied only when there is something to join: copying takes as long as a short run
-    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts[1:] else parts[0]
-    seen = observation.by_name(joined, engine.model.arrays.size)
+    seen = _evaluated(engine, trajectory)
     bad = np.flatnonzero(seen.status)
     if len(bad):
         at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
@@ -246,6 +243,39 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
             )
         raise SolverError(at + lost)
     return seen
+
+
+def judged(engine: Engine, trajectory: Trajectory, seen: Observed) -> tuple[Trajectory, Observed]:
+    """Return the recorded rows with those between them, by time, and the outputs JUDGED there.
+
+    seen: outputs of the recorded rows, of which the others are returned as they are.  Energies, speeds and deformations
+    are judged by all these rows: recorded ones may meet a motion where it is always the same.
+    """
+    inner = replace(trajectory, rows=trajectory.between)
+    if not len(inner.rows):
+        return trajectory, seen
+    there = _evaluated(engine, inner)
+    fine = np.flatnonzero(there.status == m.OK)  # without those next to a singular pose
+    rows = np.concatenate([trajectory.rows, inner.rows[fine]])
+    order = np.argsort(rows[:, 0], kind="stable")
+    both = {name: np.concatenate([getattr(seen, name), getattr(there, name)[fine]])[order] for name in JUDGED}
+    return replace(trajectory, rows=rows[order]), replace(seen, **both)
+
+
+def _evaluated(engine: Engine, trajectory: Trajectory) -> Observed:
+    """Return the rows of a trajectory as `observed` does, those that could not be evaluated as well."""
+    parts = list[Blocks]()
+    for part, selected in trajectory.parts():
+        engine.keep(selected)
+        out = observe_blocks(engine, trajectory.rows[part])
+        for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
+            limit = _limit(engine, trajectory.rows[part][k], motion, bool(out["status"][k, 0]))
+            for name, values in limit.items():
+                out[name][k] = values
+        parts.append(out)
+    # megabytes are copied only when there is something to join: copying takes as long as a short run
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts[1:] else parts[0]
+    return observation.by_name(joined, engine.model.arrays.size)
 
 
 def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> dict[str, np.ndarray]:

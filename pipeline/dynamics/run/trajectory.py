@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTL
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
-from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Selections, Tape, in_order
+from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Selections, Tape, by_time
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.refusals.reach import require_shallow
@@ -52,7 +52,7 @@ def never(rows: np.ndarray) -> bool:
 class Trajectory:
     """Result of an integration.
 
-    rows: of the record (see `integrate.recording`); events: of the event table, by time.
+    rows: of the record, and those `between` them (see `integrate.recording`); events: of the event table, by time.
     contacts: number of clearance joints.  selections: selected closure rows, each from a time on.
     drift, rate_drift: largest residual of a closure before projection [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations in any step, as the method estimates it.
@@ -61,6 +61,7 @@ class Trajectory:
     """
 
     rows: np.ndarray
+    between: np.ndarray
     events: np.ndarray
     contacts: int
     counters: dict[str, int]
@@ -180,7 +181,7 @@ def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
     n[m.CAP] = cap
     here.enter(engine)
     engine.control[LASTING] = left.lasting
-    tape.rows, tape.events = np.concatenate([before.rows, tape.rows]), np.concatenate([here.events, tape.events])
+    tape.rows, tape.events = before.wider(n[m.N_RECORDED], tape.rows), np.concatenate([here.events, tape.events])
     same = np.array_equal(before.selections[-1][1], engine.selected)
     tape.selections = [*before.selections, *([] if same else tape.selections)]
     tape.collocations, tape.passes = [*before.collocations], [*before.passes]
@@ -197,14 +198,17 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.length
     control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
     engine.view(m.INDEPENDENCE.at)[:] = 0.0
-    for known in range(m.MEMORY, m.QUADRATURES.at + 1):  # of another run it would change this one's last bits
+    for known in (
+        *range(m.MEMORY, m.QUADRATURES.at + 1),
+        m.EXCURSION.at,
+    ):  # of another run it would change this one's last bits
         engine.view(known)[:] = 0.0
     control[m.FIXED], control[m.PARAMETER] = solver.step or 0.0, engine.method.parameter(solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[m.CAP] = solver.evaluations
     engine.modes[:], engine.latched[:] = 0, 0.0
     room = EVENT_ROWS if contacts else m.ROOM
-    rows = recording.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
+    rows = recording.empty_record(len(outputs) + room + m.ROOM + recording.BETWEEN, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
     return Tape(outputs, rows, events, [(t, _select(engine, y, t))])
 
@@ -263,8 +267,10 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
             return False
         if status == m.FULL:
             waiting = len(tape.outputs) - n[m.NEXT_OUTPUT]
-            if n[m.N_RECORDED] + waiting + few > len(tape.rows) or n[m.N_EVENTS] + few > len(tape.events):
-                tape.rows = np.concatenate([tape.rows, np.zeros_like(tape.rows)])
+            if n[m.N_RECORDED] + waiting + few + recording.BETWEEN > len(tape.rows) or n[m.N_EVENTS] + few > len(
+                tape.events
+            ):
+                tape.rows = tape.wider(n[m.N_RECORDED], np.zeros_like(tape.rows))
                 tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
         elif status == m.SINGULAR_AHEAD and engine.model.closures:
             _pass_over(engine, tape)
@@ -340,13 +346,14 @@ def _hand_over(engine: Engine, tape: Tape) -> Handover:
     """Return the handover of a paused integration to another method."""
     n = engine.n
     here = Moment.of(engine, engine.view(m.WATCH.at), tape.events[: n[m.N_EVENTS]].copy())
-    recorded = replace(tape, rows=tape.rows[: n[m.N_RECORDED]].copy())
-    return Handover(here, n[m.STATUS : m.INTEGERS].copy(), engine.control[LASTING], recorded)
+    return Handover(
+        here, n[m.STATUS : m.INTEGERS].copy(), engine.control[LASTING], replace(tape, rows=tape.rows.copy())
+    )
 
 
 def _so_far(engine: Engine, tape: Tape) -> np.ndarray:
     """Return the rows recorded so far, by time."""
-    return in_order(tape.rows[: engine.n[m.N_RECORDED]], len(engine.model.contacts))
+    return by_time(tape.rows[: engine.n[m.N_RECORDED]], len(engine.model.contacts))
 
 
 def _collect(engine: Engine, tape: Tape) -> Trajectory:
@@ -365,6 +372,8 @@ def _collect(engine: Engine, tape: Tape) -> Trajectory:
     in_order = events[np.argsort(events["time"], kind="stable")]
     drift, rate_drift, steepest = (float(engine.control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
     laid = tuple(tape.collocations), tuple(tape.passes)
-    return Trajectory(
-        _so_far(engine, tape), in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid
+    rows = (
+        _so_far(engine, tape),
+        by_time(tape.rows[len(tape.rows) - min(n[m.N_BETWEEN], recording.BETWEEN) :], contacts),
     )
+    return Trajectory(*rows, in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid)

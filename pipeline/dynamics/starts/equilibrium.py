@@ -22,8 +22,8 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     """
     bench, rest, _ = balanced(placed(scene), bundles, progress)
     progress(None, f"starts at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
-    rest_state = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
-    return rest_state, bench.engine.model.mechanism.choice
+    rest_state = posed(scene, bench.engine, state(bench, rest.at.q), bench.time)
+    return resting(rest_state, scene.contacts(), scene.stop), bench.engine.model.mechanism.choice
 
 
 def placed(scene: Scene) -> Scene:

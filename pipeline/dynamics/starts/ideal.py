@@ -69,7 +69,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
             raise
         choice = f"{choice}\nthe pins are not pressed into their sockets without moving given joint positions".strip()
         engine, y = _pressed(concentric, bundles, progress, forces)
-    return resting(moving(concentric, engine, y, t), loose(scene)), choice
+    return resting(moving(concentric, engine, y, t), loose(scene), {}), choice
 
 
 def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndarray) -> dict[str, Any]:

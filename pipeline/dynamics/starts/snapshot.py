@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.laws import Constant, Polynomial
-from flexclear.pipeline.core.scene.parts import Ground
+from flexclear.pipeline.core.scene.parts import Ground, Stop
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
 from flexclear.pipeline.core.scene.units import LARGEST_NUMBER
@@ -67,14 +67,14 @@ def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
     return still.model_copy(update={"body": bodies, "start": start})
 
 
-def resting(scene: Scene, contacts: Mapping[str, Clearance]) -> Scene:
-    """Return the scene with those of these contacts at rest that are closed at the start."""
-    at_rest = {
-        name: joint.model_copy(update={"initial_approach_speed": 0.0})
-        for name, joint in contacts.items()
-        if joint.initial_approach_speed is None
-    }
-    return scene.model_copy(update={"joint": scene.joint | at_rest})
+def resting(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str, Stop]) -> Scene:
+    """Return the scene with those of these contacts and stops at rest that are closed at the start."""
+
+    def at_rest(parts: Mapping[str, Any]) -> dict[str, Any]:
+        begun = [name for name, part in parts.items() if part.initial_approach_speed is None]
+        return {name: parts[name].model_copy(update={"initial_approach_speed": 0.0}) for name in begun}
+
+    return scene.model_copy(update={"joint": scene.joint | at_rest(contacts), "stop": scene.stop | at_rest(stops)})
 
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:

@@ -27,7 +27,6 @@ AGREEMENT = 0.01
 REJECTED, STIFF = 0.3, 0.3
 #: condition number of the closures above which a singular pose is near
 CONDITION = 1e6
-ENERGIES = ("kinetic", "potential", "elastic", "drive_work", "load_work")
 
 
 @dataclass(frozen=True)
@@ -64,14 +63,9 @@ def checks(
 
 
 def lost_energy(run: xr.Dataset) -> np.ndarray:
-    """Return the error of the energy balance, as a fraction of the largest change of any energy, shape (time,).
-
-    Changes below a fraction of the energies themselves count as that fraction: at rest all changes are rounding.
-    """
-    energies = [run[name].values for name in ENERGIES if name in run]
-    changes = [max(np.abs(energy - energy[0]).max(), UNCHANGED * np.abs(energy).max()) for energy in energies]
-    largest, missed = max(map(float, changes), default=0.0), np.abs(run["energy_error"].values)
-    return np.asarray(missed / largest) if largest > 0.0 else np.zeros_like(missed)
+    """Return the error of the energy balance beyond rounding, as a fraction of the exchanged energy, shape (time,)."""
+    missed, rounding = np.abs(run["energy_error"].values), float(run.attrs["energy_rounding"])
+    return np.where(missed > rounding, missed / max(float(run.attrs["exchanged_energy"]), rounding), 0.0)
 
 
 def _drift(run: xr.Dataset) -> np.ndarray | None:

@@ -48,7 +48,9 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
     }
     if ensemble is not None:
         arrays |= ensemble_statistics(ensemble)
-        arrays["ensemble_horizon"] = np.array(horizon(ensemble["time"].values, ensemble["velocity"].values))
+        arrays["ensemble_horizon"] = np.array(
+            horizon(ensemble["time"].values, ensemble["velocity"].values, float(ensemble["peak_speed"].values.max()))
+        )
         coords |= {"ensemble_time": ensemble["time"].values, "ensemble_body": ensemble["body"].values}
         coords["quantile"] = np.array(QUANTILES)
     arrays["horizon"] = np.array(float(run["horizon"].values if "horizon" in run else run["time"].values[-1]))
@@ -295,13 +297,13 @@ def spread(velocity: np.ndarray) -> np.ndarray:
     return np.linalg.norm(velocity - velocity.mean(axis=0), axis=-1).max(axis=(0, 2))
 
 
-def horizon(time: np.ndarray, velocity: np.ndarray) -> float:
+def horizon(time: np.ndarray, velocity: np.ndarray, speed: float = 0.0) -> float:
     """Return the time from which members are separated, by `spread` over the largest speed; else the last time [s].
 
-    Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a pointwise value is one
-    draw out of many.
+    speed: the largest one between the given times [m/s].  Beyond the horizon two runs that differ by a perturbation far
+    below any tolerance differ visibly, so a pointwise value is one draw out of many.
     """
-    peak = float(np.linalg.norm(velocity, axis=-1).max())
+    peak = max(float(np.linalg.norm(velocity, axis=-1).max()), speed)
     first = separated_from(time, spread(velocity) / (peak or 1.0), float(time[-1] - time[0]))
     return float(time[-1] if first is None else time[first])
 

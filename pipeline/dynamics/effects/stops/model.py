@@ -72,9 +72,10 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
     far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else lengths[joint])
     speed = "angular velocity" if coordinate.turning else "velocity"
     speeds = read([key for key in ("floor", "initial_approach_speed") if getattr(stop, key) is not None], speed)
-    for key, value in speeds.items():
-        if not value > 0.0:
-            raise InputError(f"[stop.{name}.{key}]", f"must be positive, not {value:.6g}")
+    for key, value in speeds.items():  # an approach speed of 0 declares that the end bears a resting part
+        if value < 0.0 or (value == 0.0 and key == "floor"):
+            word = "positive" if key == "floor" else "positive or 0"
+            raise InputError(f"[stop.{name}.{key}]", f"must be {word}, not {value:.6g}")
     between, sides = scene.joint[joint].between, {"lower": -1.0, "upper": 1.0}
     approach = speeds.get("initial_approach_speed")
     return {

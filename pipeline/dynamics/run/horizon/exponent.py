@@ -66,7 +66,8 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
         recording.record(rows, trajectory.contacts).state[:] += sign * steps[:, None] * changes
         sides.append(metric.motion(engine, rows))
     change = (sides[1] - sides[0]) / (2.0 * steps[:, None])
-    largest = metric.norms(metric.motion(engine, trajectory.rows)).max(axis=0, initial=0.0)
+    rows = np.concatenate([trajectory.rows, trajectory.between])
+    largest = metric.norms(metric.motion(engine, rows)).max(axis=0, initial=0.0)
     separation = metric.distance(change, np.zeros_like(change), largest)
     time = trajectory.time
     first = separated_from(time, separation, engine.end - engine.start)

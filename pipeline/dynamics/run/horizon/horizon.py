@@ -81,13 +81,14 @@ class Pair:
         self._engine, self._observer = another(engine), another(engine)
         self._metric = Metric(engine)
         self._run, self._complete, self._ended = self._no_rows(), False, Event()
+        self._between = self._run.rows
 
     def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
         """Return the result of the run that takes these steps, without the rows that only serve comparisons."""
         try:
             engine, trajectory, switched = steps(self._store_rows, self.outputs)
             self._store_rows(trajectory.rows)
-            self._complete = True
+            self._between, self._complete = trajectory.between, True
         except StoppedError as stopped:
             if stopped.partial is not None:
                 engine, trajectory = stopped.partial
@@ -204,8 +205,9 @@ class Pair:
         return self._metric.distance(self._run.motion[:both], other.motion[:both], self._largest())
 
     def _largest(self) -> np.ndarray:
-        """Return the largest motion of each body in the run so far, shape (body,)."""
-        return self._metric.norms(self._run.motion).max(axis=0, initial=0.0)
+        """Return the largest motion of each body in the run so far, shape (body,); between outputs once it is over."""
+        both = np.concatenate([self._run.motion, self._metric.motion(self._observer, self._between)])
+        return self._metric.norms(both).max(axis=0, initial=0.0)
 
 
 class Metric:

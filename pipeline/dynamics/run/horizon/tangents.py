@@ -81,7 +81,8 @@ def differentiate(
     if whole.collocations:
         raise SolverError("the motion passes a singular pose, across which it has no derivative")
     kept, contacts = whole.rows.shape[1] - count * ny, len(model.contacts)
-    trajectory = replace(whole, rows=np.ascontiguousarray(whole.rows[:, :kept]))
+    rows, between = (np.ascontiguousarray(part[:, :kept]) for part in (whole.rows, whole.between))
+    trajectory = replace(whole, rows=rows, between=between)
     times = np.full((len(whole.events), count), np.nan)
     rates = np.zeros((len(whole.rows), count, contacts))
     for change in jumps.made:
