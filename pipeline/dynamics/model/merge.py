@@ -134,7 +134,7 @@ def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group],
             continue
         places = groups[group_of[a.body]].placements
         A, B = places[a.body].of(a.placement), places[b.body].of(b.placement)
-        if not _close(A, B, same):
+        if not _close(A, B, same + _tolerance(scene, a.body, b.body)):
             angle = np.degrees(np.arccos(np.clip((np.trace(A.R.T @ B.R) - 1.0) / 2.0, -1.0, 1.0)))
             raise InputError(
                 f"[joint.{name}.between]",
@@ -197,7 +197,7 @@ def start_places(
             here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(
                 placement.inverse()
             )
-            if i in known and not _close(known[i], here, same):
+            if i in known and not _close(known[i], here, same + _tolerance(scene, *group.placements)):
                 raise InputError(
                     f"[body.{name}.pose]",
                     "contradicts the poses of the bodies that it is fixed to",
@@ -219,6 +219,11 @@ def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
     origins = np.array([(0.0, 0.0, 0.0), *poses])
     span = max([*np.ptp(origins, axis=0), *(float(np.linalg.norm(f.placement.p)) for f in frames.values())])
     return float(np.clip(1e-9, 1e-9 * span, 1e-6 * span)) if span > 0.0 else 1e-9
+
+
+def _tolerance(scene: Scene, *bodies: str) -> float:
+    """Return the largest distance by which frames of some bodies may be moved [m]."""
+    return max(getattr(scene.body[body], "frame_tolerance", 0.0) for body in bodies)
 
 
 def _close(a: Placement, b: Placement, same: float) -> bool:

@@ -18,6 +18,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.exponent import growth, start_direction
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, differentiate
@@ -81,18 +82,18 @@ def sensitivities(
     if scene.solver.integrator != "dop853":
         scene = with_numbers(scene, {"solver.integrator": "dop853", "solver.step": None})
     engine = engine_of(scene, bundles, progress)
-    family = Family(scene, bundles, engine)
+    family = Family(_near(scene, engine), bundles, engine)
     parameters = [family.parameter(path) for path in to]
     directions = [family.direction(parameter) for parameter in parameters]
     start = consistent_start(engine)
-    run = differentiate(engine, start, [*directions, start_direction(engine, start)], progress)
+    run = differentiate(engine, start, [*(one for one, _ in directions), start_direction(engine, start)], progress)
     grown = growth(engine, run, len(directions))
     series = {one.quantity.name: one.quantity for one in requested if one.quantity.over_time}
     values = read(family, engine, run, series.values())
     columns: dict[str, list[np.ndarray]] = {one.name: [] for one in requested}
     for k, parameter in enumerate(parameters):
         progress((k + 1) / len(parameters), f"quantities by {parameter.path}")
-        changes = derivatives(family, run, k, parameter, series.values())
+        changes = derivatives(family, run, k, parameter, directions[k][1], series.values())
         for one in requested:
             columns[one.name].append(
                 _derivative(one, family.engine.model, run, k, values, changes, horizon) / parameter.unit
@@ -111,6 +112,16 @@ def sensitivities(
     if np.isfinite(horizon):
         facts |= {"horizon": horizon, "validity": f"up to the predictability horizon, {horizon:.6g} s; beyond it NaN"}
     return xr.Dataset(variables, coordinates, facts)
+
+
+def _near(scene: Scene, engine: Engine) -> Scene:
+    """Return the scene with the poses of its run, from which equilibria of changed scenes are sought.
+
+    From further away each search would end elsewhere along motions that no force resists.
+    """
+    if scene.start is None or scene.start.at != "equilibrium":
+        return scene
+    return scene.model_copy(update={"body": engine.model.scene.body})
 
 
 METHOD = "variational equations of the tangent of the equations of motion, with the jumps of impacts"

@@ -11,8 +11,9 @@ import numpy as np
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot, scale
 
-#: speed [m/s] below which the coefficient rises linearly: at rest there is no force, but a slope
-SLOWEST = 1e-290
+#: speed [m/s] below which the coefficient rises linearly: at rest there is no force, but a slope. The squares of it and
+#: of its reciprocal, of which derivatives consist, are numbers
+SLOWEST = 1e-150
 
 
 @dataclass(frozen=True)

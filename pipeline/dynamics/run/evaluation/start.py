@@ -28,6 +28,14 @@ def consistent_start(engine: Engine) -> np.ndarray:
 
     Raises InputError for a start that joints, drives or surfaces do not allow.
     """
+    y = closed_start(engine)
+    for c, depth in overlapping(engine, y).items():
+        refuse_depth(engine.model.scene, engine.model.contacts[c], depth)
+    return y
+
+
+def closed_start(engine: Engine) -> np.ndarray:
+    """Return the state of `consistent_start`, which depends smoothly on numbers, also where surfaces overlap."""
     model = engine.model
     engine.select_pieces_after(engine.start)
     y = initial.start_state(model)
@@ -43,8 +51,6 @@ def consistent_start(engine: Engine) -> np.ndarray:
         _look(engine, y)
         y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
         initial.check_loads(model, engine.table(m.LOAD))
-    for c, depth in overlapping(engine, y).items():
-        refuse_depth(model.scene, model.contacts[c], depth)
     return y
 
 
