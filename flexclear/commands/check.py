@@ -18,6 +18,7 @@ from flexclear.commands import scenes, show
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
+from flexclear.pipeline.core.scene.recipe_frames import recipe_frames
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.variants import ideal, loose
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
@@ -133,7 +134,7 @@ def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
 
 
 def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
-    findings.errors += dangling(compose(path), scenes.recipe_frames, str(path))
+    findings.errors += dangling(compose(path), recipe_frames, str(path))
     loaded: list[Scene] = []
     findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
     # bodies may share a recipe, which is meshed once

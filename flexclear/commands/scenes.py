@@ -17,8 +17,9 @@ from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
+from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.plausibility import implausible
+from flexclear.pipeline.core.scene.recipe_frames import recipe_frames
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.units import quantity
@@ -320,15 +321,6 @@ def require_names(scene: Scene) -> None:
     wrong = dangling(table, recipe_frames, str(scene.path or scene.name))
     if wrong:
         raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
-
-
-def recipe_frames(mesh: str) -> list[str] | None:
-    """Return the names of the frames in a mesh recipe; None when it cannot be read, which is reported elsewhere."""
-    try:
-        frames = read_toml(Path(mesh)).get("frames")
-    except InputError:
-        return None
-    return list(frames) if isinstance(frames, dict) else None
 
 
 def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:

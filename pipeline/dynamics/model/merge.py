@@ -180,11 +180,16 @@ def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia
 
 
 def start_places(
-    scene: Scene, groups: list[Group], group_of: Mapping[str, int], frames: Mapping[str, Frame]
+    scene: Scene,
+    groups: list[Group],
+    group_of: Mapping[str, int],
+    frames: Mapping[str, Frame],
+    led: Mapping[str, Placement],
 ) -> list[Placement]:
     """Return the start pose of every group's host frame in the world.
 
-    A group without given pose takes it from a joint to a group with a pose, the joint's frames coinciding.  Raises
+    A group without given pose takes it from a joint to a group with a pose, the joint's frames coinciding, else from
+    `led`, the poses of frames at the start of their paths.  Raises
     InputError for a group without any pose, and for a pose that contradicts the fixed joints.
     """
     known: dict[int, Placement] = {0: Placement()}
@@ -205,6 +210,12 @@ def start_places(
                 )
             known.setdefault(i, here)
     _propagate(scene, group_of, frames, groups, known)
+    for name, place in led.items():
+        frame = find_frame(frames, name, "[drive]")
+        mine = group_of[frame.body]
+        if mine not in known:
+            known[mine] = place.of(groups[mine].placements[frame.body].of(frame.placement).inverse())
+            _propagate(scene, group_of, frames, groups, known)
     missing = [groups[i].host for i in range(len(groups)) if i not in known]
     if missing:
         raise InputError(

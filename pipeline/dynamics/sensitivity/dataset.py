@@ -11,11 +11,12 @@ from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.quantities import IMPACT, reduced
 from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.load import with_numbers
-from flexclear.pipeline.core.scene.quantity import Quantity, Recorded, parse, parse_recorded
+from flexclear.pipeline.core.scene.quantity import KINDS, Quantity, Recorded, parse, parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.merge import find_frame
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -82,6 +83,10 @@ def sensitivities(
     if scene.solver.integrator != "dop853":
         scene = with_numbers(scene, {"solver.integrator": "dop853", "solver.step": None})
     engine = engine_of(scene, bundles, progress)
+    for one in requested:
+        for term in one.quantity.terms():
+            if KINDS[term.kind].owner == "frame":
+                find_frame(engine.model.mechanism.frames, term.owner, f"of: '{one.name}'")
     family = Family(_near(scene, engine), bundles, engine)
     parameters = [family.parameter(path) for path in to]
     directions = [family.direction(parameter) for parameter in parameters]
