@@ -166,12 +166,24 @@ def number_at(scene: Scene, path: str) -> tuple[float, str]:
 
     Raises InputError for a value that is no number.
     """
-    parent, key = _find(scene.model_dump(mode="json", exclude_none=True), path, path)
+    return number_in(scene.model_dump(mode="json", exclude_none=True), path, path)
+
+
+def number_in(table: Mapping[str, Any], path: str, where: str) -> tuple[float, str]:
+    """Return a table's number at a key path, as `number_at` does; where: name of the path in errors."""
+    parent, key = _find(table, path, where)
     if isinstance(parent[key], (int, float, str)) and not isinstance(parent[key], bool):
         with contextlib.suppress(ValueError):
             number, _, unit = str(any_quantity(parent[key])).partition(" ")
             return float(number), unit
-    raise InputError(path, f"is not a number but {parent[key]!r}", "name one number, of a list by index: com.0")
+    raise InputError(where, f"is not a number but {parent[key]!r}", "name one number, of a list by index: com.0")
+
+
+def with_number(table: Mapping[str, Any], path: str, value: object) -> dict[str, Any]:
+    """Return a copy of a table with the value at a key path changed."""
+    changed = copy.deepcopy(dict(table))
+    _put(changed, path, value, path)
+    return changed
 
 
 @cache

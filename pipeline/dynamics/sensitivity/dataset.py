@@ -25,6 +25,7 @@ from flexclear.pipeline.dynamics.run.horizon.exponent import growth, start_direc
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, differentiate
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.sensitivity.parameters import Family
+from flexclear.pipeline.dynamics.sensitivity.recipes import Varied
 from flexclear.pipeline.dynamics.sensitivity.series import NORMAL_FORCE, Series, derivatives, read
 
 if TYPE_CHECKING:
@@ -71,11 +72,12 @@ def sensitivities(
     of: Sequence[str],
     to: Sequence[str],
     horizon: float = np.inf,
+    varied: Mapping[str, Varied] | None = None,
 ) -> xr.Dataset:
     """Return derivatives of quantities with respect to numbers of the scene (`flexclear.sensitivities`).
 
-    horizon: time [s] up to which the motion is predictable; values beyond are NaN.  Raises InputError for unknown
-    names, SolverError where the motion has no derivative.
+    varied: numbers of recipes among `to`, by path.  horizon: time [s] up to which the motion is predictable; values
+    beyond are NaN.  Raises InputError for unknown names, SolverError where the motion has no derivative.
     """
     import xarray as xr
 
@@ -87,7 +89,7 @@ def sensitivities(
         for term in one.quantity.terms():
             if KINDS[term.kind].owner == "frame":
                 find_frame(engine.model.mechanism.frames, term.owner, f"of: '{one.name}'")
-    family = Family(_near(scene, engine), bundles, engine)
+    family = Family(_near(scene, engine), bundles, engine, varied or {})
     parameters = [family.parameter(path) for path in to]
     directions = [family.direction(parameter) for parameter in parameters]
     start = consistent_start(engine)
@@ -112,6 +114,8 @@ def sensitivities(
     if any(one.recorded is None for one in requested):
         coordinates["time"] = ("time", time, {"units": "s", "long_name": "time"})
     facts: dict[str, Any] = attributes(scene) | {"title": f"Sensitivities of {subject(scene)}", "method": METHOD}
+    if varied:
+        facts["method"] += f"; by differences of reduced bodies for {', '.join(varied)}"
     facts["evaluations"] = run.trajectory.counters["evaluations"]
     facts |= {"exponent": grown.exponent, "exponent_error": grown.error, "tangent_horizon": grown.horizon}
     if np.isfinite(horizon):

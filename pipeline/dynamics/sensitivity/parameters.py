@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import closed_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Direction
+from flexclear.pipeline.dynamics.sensitivity.recipes import Varied
 
 #: changes of a number, in its units, for the derivative of the start: the first one at which a start exists on both
 #: sides and at which differences over two and over four points agree, as a fraction of the start's change or, for
@@ -46,16 +47,19 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Family:
-    """Engines of a scene with one changed number."""
+    """Engines of a scene with one changed number; varied: numbers of recipes, by path."""
 
     scene: Scene
     bundles: Mapping[str, Labelled]
     engine: Engine
+    varied: Mapping[str, Varied] = field(default_factory=dict)
 
     def parameter(self, path: str) -> Parameter:
         """Return the number at a key path; raise InputError for anything else, or a number that the motion ignores."""
         if path.partition(".")[0] not in FAMILIES:
             raise InputError(path, f"is not a number of {', '.join(FAMILIES)}", "name one, as joint.A1.clearance")
+        if path in self.varied:
+            return Parameter(path, self.varied[path].value, self.varied[path].written_in)
         return Parameter(path, *number_at(self.scene, path), _size(self.scene, path))
 
     def changed(self, parameter: Parameter, amount: float) -> Engine:
@@ -63,8 +67,13 @@ class Family:
 
         Its code and its choices of method are those of the unchanged scene.
         """
-        edited = with_numbers(self.scene, {parameter.path: parameter.changed(amount)})
-        engine, _ = engines_alike(self.engine, edited, self.bundles)
+        if parameter.path in self.varied:
+            one = self.varied[parameter.path]
+            bundles = {**self.bundles, one.body: one.bundle(self.bundles[one.body], amount)}
+            engine, _ = engines_alike(None, self.scene, bundles)
+        else:
+            edited = with_numbers(self.scene, {parameter.path: parameter.changed(amount)})
+            engine, _ = engines_alike(self.engine, edited, self.bundles)
         if not np.array_equal(engine.model.arrays.h, self.engine.model.arrays.h):
             raise InputError(parameter.path, "changes the structure of the mechanism, not only numbers", "leave it out")
         return engine
