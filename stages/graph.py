@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.scene.limits import require_scatter
-from flexclear.pipeline.core.scene.load import edited, number_in, read_toml, with_number
+from flexclear.pipeline.core.scene.load import edited, number_in, with_number
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import of_run
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import (

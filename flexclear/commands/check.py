@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 from flexclear.commands import scenes, show
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
-from flexclear.pipeline.core.scene.recipe_frames import recipe_frames
+from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.toml_files import read_toml, recipe_frames
 from flexclear.pipeline.core.scene.variants import ideal, loose
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
 from flexclear.stages import meshing, simulation

@@ -19,9 +19,9 @@ from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.plausibility import implausible
-from flexclear.pipeline.core.scene.recipe_frames import recipe_frames
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.scene.toml_files import recipe_frames
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, InputErrors, ResourceError, SolverError

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.load import read_toml
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle

@@ -9,7 +9,7 @@ from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.loads import Bushing, Pid, SampledPid
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.quantity import KINDS
-from flexclear.pipeline.core.scene.recipe_frames import recipe_frames
+from flexclear.pipeline.core.scene.toml_files import recipe_frames
 
 #: joint type -> its coordinates by name, and whether each is an angle, as in the classes of the joints
 COORDINATES: Mapping[str, Mapping[str, bool]] = {

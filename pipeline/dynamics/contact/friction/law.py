@@ -45,8 +45,9 @@ def sliding(coefficient: Callable) -> Callable:
 
     @kernel
     def traction(z, slip, f_n, p):
-        speed = max(np.sqrt(dot(slip, slip)), SLOWEST)
-        f_t = f_n * coefficient(speed, p)
-        return scale(-f_t / speed, slip), f_t * speed, 0.0, (0.0, 0.0, 0.0)
+        square = dot(slip, slip)
+        speed = max(np.sqrt(square), SLOWEST)
+        per_speed = f_n * coefficient(speed, p) / speed
+        return scale(-per_speed, slip), per_speed * square, 0.0, (0.0, 0.0, 0.0)
 
     return traction
