@@ -103,7 +103,7 @@ def formula(scene: Any, name: str) -> Formula | None:
     return Formula(" ; ".join(codes), tuple(numbers), tuple(reads))
 
 
-def written(scene: Any, load: LineExpression | JointExpression | PointExpression) -> Iterator[tuple[str, list[Any]]]:
+def written(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]]:
     """Yield each expression of a load, and its postfix order; raise ValueError, in words, for one without meaning."""
     known = constants_of(load.values)
     require_used(known, load.texts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -104,9 +105,7 @@ def _repeats(steps: list[Any], start: float, period: float, changes: Mapping[str
         return given[one] + later * (changes.get(one.owner, 0.0) if grows else 0.0)
 
     with np.errstate(all="ignore"):  # powers of negative numbers
-        now, then = (
-            np.broadcast_to(v, (len(times), v.shape[1])).reshape(MOTIONS, TIMES, -1)
-            for v in (combined(steps, lambda one, later=later: read(one, later)) for later in (0.0, 1.0))
-        )
+        both = [combined(steps, partial(read, later=later)) for later in (0.0, 1.0)]
+        now, then = (np.broadcast_to(v, (len(times), v.shape[1])).reshape(MOTIONS, TIMES, -1) for v in both)
         size = np.fmax.reduce(np.abs(now), axis=1, keepdims=True)
         return not bool(np.any(np.abs(then - now) > EQUAL * size))
