@@ -21,6 +21,9 @@ from flexclear.pipeline.dynamics.sensitivity.recipes import Varied
 #: sides and at which differences over two and over four points agree, as a fraction of the start's change or, for
 #: starts that are closed to 1e-13, of its magnitude. Those over four points then err by the square of that
 NUMBER_STEPS, AGREEMENT, SLIGHT = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 1e-3, 1e-6
+#: change between starts, of their magnitude, above which no differences count as derivatives: bodies that nothing holds
+#: may turn as they like from one equilibrium to another
+WIDEST = 1e-2
 #: families of parts, and settings, whose numbers affect the motion
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "start")
 
@@ -92,8 +95,10 @@ class Family:
             direction = Direction(central(numbers, step), central(starts, step))
             narrow = (starts[1] - starts[-1]) / (2.0 * step)
             off, size = (float(np.linalg.norm(v / scales)) for v in (narrow - direction.start, direction.start))
-            if off / (AGREEMENT * size + SLIGHT) < least:
-                found, least = (direction, step), off / (AGREEMENT * size + SLIGHT)
+            wide = float(np.linalg.norm((starts[2] - starts[-2]) / scales)) > WIDEST
+            merit = off / (AGREEMENT * size + SLIGHT) + (1.0 / step if wide else 0.0)
+            if merit < least:
+                found, least = (direction, step), merit
             if least <= 1.0:
                 break
         if found is None:
