@@ -232,8 +232,8 @@ def cam(**changes: Any) -> Scene:
 def test_from_an_equilibrium_with_a_contact_at_rest() -> None:
     """Friction at rest has a slope, the roller may turn as it likes, and positions of zero are numbers of metres.
 
-    Tolerance: differences of starts with penetrations of 1.5 um; a place turns the roller, which nothing holds, from one
-    equilibrium to another.
+    Tolerance: differences of starts with penetrations of 1.5 um; a place turns the roller, which nothing holds, from
+    one equilibrium to another.
     """
     to = {"load.contact.values.k": 1e-3, "joint.roller.clearance": 1e-3}
     agree(cam(), ["guide.position.final", "roller.normal_force.final"], to, 1e-6)
