@@ -84,7 +84,7 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Model:
     frames = grouping.frames_of(scene, bundles)
     scene = _held_legs_merged(scene, frames)
     groups, group_of = grouping.merge(scene, frames)
-    starts = grouping.start_places(scene, groups, group_of, frames)
+    starts = grouping.start_places(scene, groups, group_of, frames, {})
     model = Model(container.AddSystem(), parts, frames, groups, group_of, starts, bundles)
     model.system.variables["container"] = container  # kept alive with its system
     _bodies(model, scene)

@@ -171,7 +171,8 @@ def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str
     """Return derivatives of quantities by numbers of a scene, through its impacts; from the cache when fresh.
 
     of: quantities over time, ``slider.position``, or reduced as in a sweep, ``pin.peak_force``,
-    ``slider.velocity.largest``.  to: dotted paths of numbers, ``joint.pin.clearance``, of lists by index, ``com.0``.
+    ``slider.velocity.largest``.  to: dotted paths of numbers, ``joint.pin.clearance``, of lists by index, ``com.0``, or
+    of a flexible body's recipe, ``body.rod.mesh.material.youngs_modulus``, through differences of its bundles.
     Each variable has the dimension `parameter`; its unit is that of the quantity per SI unit of the parameter. Values
     are NaN beyond the predictability horizon.  Raises FlexclearError: InputError for a path that is no number or
     changes the mechanism's structure, SolverError where the motion has no derivative.

@@ -34,16 +34,22 @@ def sections(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progre
 def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Differentiate the quantities `of` with respect to the numbers `to` of the scene.
 
-    inputs: ``bundle/<body>``; for a scene with contacts also ``run``, which contains the predictability horizon.
+    inputs: ``bundle/<body>``; for a scene with contacts also ``run``, which contains the predictability horizon; for
+    numbers of `recipes` the bundles ``varied/<step>/<path>`` at -2, -1, 1 and 2 steps.
     """
     from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
+    from flexclear.pipeline.dynamics.sensitivity.recipes import varied
 
     scene = rebuild(params, inputs)
     analyses.require_without_events(scene, "derivatives")
     horizon = float(inputs["run"]["horizon"]) if "run" in inputs else math.inf
+    reduced, numbers = bundles(inputs), {}
+    for path, (body, *number) in params.get("recipes", {}).items():
+        around = {k: inputs[f"varied/{k}/{path}"] for k in (-2, -1, 1, 2)}
+        numbers[path] = varied(path, body, (number[0], number[1]), reduced[body], around)
     with in_time(scene):
         names = params["of"], params["to"]
-        return {"nc": derivatives(scene, bundles(inputs), progress, *names, horizon)}
+        return {"nc": derivatives(scene, reduced, progress, *names, horizon, numbers)}
 
 
 def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

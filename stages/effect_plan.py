@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.load import edited, read_toml
+from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.plotting.table import files
 from flexclear.stages import simulation

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.scene.limits import require_scatter
-from flexclear.pipeline.core.scene.load import edited, read_toml
+from flexclear.pipeline.core.scene.load import edited, number_in, with_number
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import of_run
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import PATH, Task
 from flexclear.stages import (
@@ -137,11 +138,31 @@ class Graph:
         return self._simulation("sections", params)
 
     def sensitivities(self, of: Sequence[str], to: Sequence[str]) -> Task:
-        """Return the task that differentiates quantities `of` by numbers `to`, up to the horizon of the run."""
-        params = {**simulation.params(self.scene), "of": list(of), "to": list(to)}
+        """Return the task that differentiates quantities `of` by numbers `to`, up to the horizon of the run.
+
+        A number of a recipe, ``body.rod.mesh.material.youngs_modulus``, changes the bundle of its body.
+        """
+        from flexclear.pipeline.dynamics.sensitivity.recipes import RECIPE_STEP
+
+        params, more = {**simulation.params(self.scene), "of": list(of), "to": list(to)}, dict[str, Task]()
+        for path in to:
+            family, body, key, inside = (*path.split(".", 3), "", "", "")[:4]
+            if (family, key) != ("body", "mesh") or body not in self.scene.recipes() or not inside:
+                continue
+            if body not in self.bundle:
+                raise InputError(path, f"is a number of the recipe of '{body}', which is rigid", "name a flexible body")
+            table = read_toml(Path(self.scene.recipes()[body]))
+            value, unit = number_in(table, inside, path)
+            params.setdefault("recipes", {})[path] = [body, value, unit]
+            for k in (-2, -1, 1, 2):
+                number = value + k * RECIPE_STEP * (abs(value) or 1.0)
+                edit = with_number(table, inside, f"{number!r} {unit}" if unit else number)
+                top = inside.partition(".")[0]
+                other = Graph(self.scene, shown=False, recipe={**self.recipe, top: edit[top]})
+                more[f"varied/{k}/{path}"] = other.bundle[body]
         task = self._simulation("sensitivities", params)
         run = {"run": self.simulate} if self.scene.contacts() or self.scene.stop else {}
-        return replace(task, inputs={**task.inputs, **run}, names={}, folder="")
+        return replace(task, inputs={**task.inputs, **run, **more}, names={}, folder="")
 
     @cached_property
     def verdict(self) -> Task:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.limits import Limits, check_cells
-from flexclear.pipeline.core.scene.load import RECIPE, is_file, read_toml, require_kind
+from flexclear.pipeline.core.scene.load import RECIPE, is_file, require_kind
 from flexclear.pipeline.core.scene.registry import module_of
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.external_files import companions
 

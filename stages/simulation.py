@@ -37,9 +37,6 @@ TIMES_IN_MEMORY, TIMES_ON_DISK = 4.5, 2.0
 MEMBER_ROWS = 2000
 #: prefix of the inputs that hold rigid bodies of recipes; the body's name follows
 RIGID = "rigid/"
-#: error of the frame positions from a mesh, as a fraction of their distance: the centre of a hole is the mean of its
-#: nodes; with sixteen around a hole of a twentieth of that distance, a chord is off the circle by 2 % of the radius
-FRAME_ERROR = 1e-3
 REMEDY = "choose a longer output.interval, or raise [limits]"
 
 
@@ -165,6 +162,7 @@ def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[st
     import numpy as np
 
     from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
+    from flexclear.pipeline.core.scene.parts import FRAME_ERROR
 
     result = dict(bodies)
     for name, data in inputs.items():

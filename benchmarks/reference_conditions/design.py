@@ -12,8 +12,9 @@ import xarray as xr
 
 from benchmarks.layouts import FIRST, Layout, by_condition, chosen, edits, family
 from flexclear.commands.scenes import find_scene
-from flexclear.pipeline.core.scene.load import load_scene, read_toml
+from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.structure.kinds import kind

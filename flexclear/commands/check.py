@@ -17,16 +17,9 @@ from typing import TYPE_CHECKING, Any
 from flexclear.commands import scenes, show
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import (
-    RECIPE,
-    SCENE,
-    SWEEP,
-    compose,
-    is_file,
-    kind_of_file,
-    read_toml,
-)
+from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.toml_files import read_toml, recipe_frames
 from flexclear.pipeline.core.scene.variants import ideal, loose
 from flexclear.pipeline.core.system.errors import (
     FlexclearError,
@@ -149,7 +142,7 @@ def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
 
 
 def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
-    findings.errors += dangling(compose(path), scenes.recipe_frames, str(path))
+    findings.errors += dangling(compose(path), recipe_frames, str(path))
     loaded: list[Scene] = []
     findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
     # bodies may share a recipe, which is meshed once

@@ -14,10 +14,11 @@ from typing import Any
 
 from flexclear.papers.wang_wang_2019.timing import paper_solver
 from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS, STIFF, VIBRATING
-from flexclear.pipeline.core.scene.load import edited, read_toml
+from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import NAMING
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.system.errors import InputError
 
 #: multiples of the scene's own tolerance and step, in this order; half and a tenth show whether tighter runs agree

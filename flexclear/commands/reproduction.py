@@ -17,7 +17,8 @@ from typing import Any
 from flexclear.commands import scenes
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import DATA, TREE, kernel_root, results_root
-from flexclear.pipeline.core.scene.load import is_file, overridden, read_toml
+from flexclear.pipeline.core.scene.load import is_file, overridden
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.system.external_files import companions, require_file
 from flexclear.pipeline.core.system.version import version

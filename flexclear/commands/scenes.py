@@ -21,12 +21,13 @@ from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.load import is_file, load_scene, overridden, read_toml, scene_name
+from flexclear.pipeline.core.scene.load import is_file, load_scene, overridden, scene_name
 from flexclear.pipeline.core.scene.plausibility import implausible
 from flexclear.pipeline.core.scene.quantity import KINDS, parse
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.toml_files import read_toml, recipe_frames
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, ResourceError, SolverError, errors_from, errors_of, refuse
@@ -355,15 +356,6 @@ def unrecorded(scene: Scene) -> Iterator[InputError]:
                     remedy = f"request {body}.peak_von_mises" if solid else f"request {body}.section_force"
                     where = f"{scene.path or scene.name} [{place}]"
                     yield InputError(where, f"'{name}' is not recorded: '{body}' is {lacks}", remedy)
-
-
-def recipe_frames(mesh: str) -> list[str] | None:
-    """Return the names of the frames in a mesh recipe; None when it cannot be read, which is reported elsewhere."""
-    try:
-        frames = read_toml(Path(mesh)).get("frames")
-    except InputError:
-        return None
-    return list(frames) if isinstance(frames, dict) else None
 
 
 def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:

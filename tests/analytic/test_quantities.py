@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.post.overview import comparison
 from flexclear.pipeline.post.overview.curves import curves
-from tests.analytic.mechanism_runs import run_with_sections
+from tests.analytic.mechanism_runs import TREE, bundles, run_with_sections
 from tests.properties import mechanisms
 from tests.properties.mechanisms import frame, joint, rigid, simulated
 
@@ -271,6 +271,18 @@ def test_any_quantity_can_be_asked_for_in_accuracy(name: str) -> None:
     if name == "slider.acceleration":
         known = closed_form(done["time"].values)["acceleration"]
         assert np.abs(evaluate(done, f"{name}.x").values - known).max() <= 1e-6 * np.abs(known).max()
+
+
+def test_frames_of_recipes_have_quantities_without_a_joint() -> None:
+    """The rod of 300 mm lies along x at the start; a frame that its recipe lacks is refused, with the nearest one."""
+    scene = load_scene(TREE / "scenes/checks/flexible_slider_crank.toml", {"time.end": "1 ms"})
+    asked = edited(scene, {"accuracy": {"rod.middle.frame_position.x": {"relative": 1e-3}}})
+    watched = edited(asked, {"view": {"watch": ["rod.middle.frame_position"]}})
+    assert [one.name for one in watched.watched()] == ["rod.middle.frame_position"]
+    start = evaluate(simulate(edited(watched, {"accuracy": None}), bundles(scene), silent), "rod.middle.frame_position")
+    assert start.values[0] == pytest.approx([0.3, 0.0, 0.0], abs=1e-12)
+    with pytest.raises(InputError, match=r"did you mean 'rod.middle.frame_position'"):
+        edited(scene, {"view": {"watch": ["rod.midle.frame_position"]}})
 
 
 def test_the_table_of_joint_coordinates_is_that_of_the_joints() -> None:

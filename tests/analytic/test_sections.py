@@ -18,6 +18,8 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.post.sections import chaos
 from flexclear.pipeline.post.sections.verdict import derive, judge
+from tests.properties.mechanisms import joint, rigid
+from tests.properties.mechanisms import scene as small
 
 N = 600
 
@@ -184,6 +186,55 @@ def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Sce
         a, b = one_by_one[name].values[1:5], strobed[name].values
         sign = np.sign((a * b).sum(axis=-1, keepdims=True)) if name == "quaternion" else 1.0
         assert np.abs(a - b * sign).max() < 1e-5
+
+
+def test_forces_by_expressions_are_repeated_like_laws(pendulum: Scene) -> None:
+    """The damper as an expression without t, and the torque as one with it, are those of the scene."""
+    short = with_torque(pendulum, 1.5, transient=0, periods=20, exponent_periods=20)
+    written = {"type": "joint-expression", "joint": "pin"}
+    damper = written | {"force": "-c * pin.velocity", "values": {"c": "0.5 N m s/rad"}}
+    torque = written | {"force": "A * cos(w * t)", "values": {"A": "1.5 N m", "w": f"{2.0 / 3.0!r} rad/s"}}
+    known = analyses.sections(short, {}, silent)
+    for change in ({"load.friction": damper}, {"load.friction": damper, "load.torque": torque}):
+        found = analyses.sections(edited(short, change), {}, silent)
+        for name in ("position", "velocity"):
+            # neighbours part by exp(0.112 x 47 s) = 200 of a tolerance of 1e-10 in five periods
+            assert np.abs(found[name].values[:5] - known[name].values[:5]).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    "force, said",
+    [
+        ("A * cos(0.5 * w * t)", r"load\.torque\.force.*depends on t and does not repeat after a period"),
+        ("A * pin.position * t / 1 s / 1 rad", "depends on t and does not repeat"),
+        ("-A * max(0, t / 1 s - 3)^1.5 * cos(pin.position)", "depends on t and does not repeat"),
+    ],
+)
+def test_an_expression_that_does_not_repeat_is_refused(pendulum: Scene, force: str, said: str) -> None:
+    values = {name: value for name, value in {"A": "1.5 N m", "w": f"{2.0 / 3.0!r} rad/s"}.items() if name in force}
+    torque = {"type": "joint-expression", "joint": "pin", "force": force, "values": values}
+    with pytest.raises(InputError, match=said):
+        analyses.sections(edited(pendulum, {"load.torque": torque}), {}, silent)
+
+
+def test_an_expression_of_a_driven_angle_has_its_full_turns() -> None:
+    """A crank that turns once in a period: its sine repeats, the angle itself does not."""
+    bodies = {
+        "ground": {"type": "ground", "frames": {"o": {}}},
+        "crank": rigid(1.0, 0.1, {"o": {}, "end": {"position": [0.1, 0.0, 0.0]}}),
+        "bob": rigid(1.0, 0.1, {"o": {}}, com=[0.0, -0.1, 0.0]),
+    }
+    joints = {"pin": joint("revolute", "ground.o", "crank.o"), "swing": joint("revolute", "crank.end", "bob.o")}
+    law = {"type": "polynomial", "coefficients": [0.2, 2.0 * np.pi]}
+    table = small(bodies, joints, end=1.0, rtol=1e-6, drive={"motor": {"joint": "pin", "law": law}})
+    table["sections"] = {"transient": 0, "periods": 20, "exponent_periods": 20}
+    brake = {"type": "joint-expression", "joint": "swing"}
+    repeating = brake | {"force": "1 N m * sin(pin.position)"}
+    found = analyses.sections(Scene.model_validate(table | {"load": {"brake": repeating}}), {}, silent)
+    assert found.sizes["section"] == 20
+    winding = brake | {"force": "1 N m * pin.position / 1 rad"}
+    with pytest.raises(InputError, match="reads a driven angle and does not repeat"):
+        analyses.sections(Scene.model_validate(table | {"load": {"brake": winding}}), {}, silent)
 
 
 @pytest.mark.parametrize(

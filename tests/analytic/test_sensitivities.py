@@ -1,11 +1,13 @@
 """Derivatives by numbers of the scene against closed forms, and against differences of converged runs."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
+import flexclear as fc
 from flexclear.pipeline.core.scene.load import edited, load_scene, number_at
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
@@ -15,7 +17,7 @@ from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
 from flexclear.pipeline.dynamics.sensitivity.parameters import Parameter
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint
+from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, rigid
 from tests.properties.mechanisms import scene as small
 
 #: peaks are located to 1e-5 of an impact's duration, in which their derivatives change by their own size
@@ -187,3 +189,97 @@ def test_friction_of_ideal_joints_that_feeds_back() -> None:
         dict.fromkeys(("joint.P.friction.dynamic", "joint.P.friction.length", "body.slider.mass"), 1e-3),
         1e-5,
     )
+
+
+def cam(**changes: Any) -> Scene:
+    """A follower on a rotating cam, by the law of Hertz between two circles, with a roller loose on its pin.
+
+    At rest in equilibrium the pin touches its journal, without sliding.
+    """
+    steel, turning = {"youngs_modulus": 2.07e11, "poisson": 0.29}, {"type": "polynomial", "coefficients": [1.5, 60.0]}
+    along = {"position": [0.0, 0.0, 0.0], "axis": [0, 1, 0]}
+    bodies = {
+        "ground": {"type": "ground", "frames": {"cam": {}, "guide": along}},
+        "cam": rigid(1.0, 1e-3, {"axle": {}, "centre": {"position": [0.01, 0.0, 0.0]}}),
+        "follower": rigid(0.5, 1e-3, {"pin": {}, "guide": along}),
+        "roller": rigid(0.05, 2.5e-6, {"centre": {}}),
+    }
+    roller = joint(
+        "clearance-revolute", "roller.centre", "follower.pin", clearance=5e-5, pin_radius=0.004, length=0.012
+    )
+    roller |= {"journal_material": steel, "pin_material": steel, "normal": {"law": "flores", "restitution": 0.5}}
+    roller["friction"] = {"law": "modified-coulomb", "static": 0.1, "dynamic": 0.08}
+    roller["friction"] |= {"v_static": 1e-3, "v_dynamic": 0.01}
+    contact = {"type": "line-expression", "between": ["cam.centre", "roller.centre"]}
+    contact |= {"force": "-k * max(0, reach - length)^1.5", "values": {"k": "6.3e8 N/m^1.5", "reach": "0.04 m"}}
+    spring = {"type": "joint-spring", "joint": "guide", "stiffness": 4e3, "rest": 0.01}
+    joints = {
+        "axle": joint("revolute", "ground.cam", "cam.axle"),
+        "guide": joint("prismatic", "ground.guide", "follower.guide"),
+        "roller": roller,
+    }
+    table = small(
+        bodies,
+        joints,
+        end=0.004,
+        load={"contact": contact, "spring": spring},
+        drive={"motor": {"joint": "axle", "law": turning}},
+        start={"at": "equilibrium", "joint": {"guide": {"near": 0.05}}},
+    )
+    return edited(Scene.model_validate(table), TIGHT | changes)
+
+
+def test_from_an_equilibrium_with_a_contact_at_rest() -> None:
+    """Friction at rest has a slope, the roller may turn as it likes, and positions of zero are numbers of metres.
+
+    Tolerance: differences of starts with penetrations of 1.5 um; a place turns the roller, which nothing holds, from
+    one equilibrium to another.
+    """
+    to = {"load.contact.values.k": 1e-3, "joint.roller.clearance": 1e-3}
+    agree(cam(), ["guide.position.final", "roller.normal_force.final"], to, 1e-6)
+    agree(cam(), ["guide.position.final"], {f"body.follower.frames.pin.position.{k}": 1e-7 for k in range(2)}, 1e-4)
+
+
+def test_a_place_of_a_pin_whose_surfaces_would_overlap_at_the_start() -> None:
+    """A thousandth of its distance of 50 mm from the centre of mass is half of the clearance.
+
+    Tolerance: differences through two impacts; later the motion depends so much on the start that they are none.
+    """
+    scene = load("clearance_slider_crank", **{"time.end": 5e-4})
+    of = ["piston.position.x.final", "piston.velocity.x.final", "pin.impulse"]
+    agree(scene, of, {f"body.rod.frames.big_end.position.{k}": h for k, h in ((0, 1e-6), (1, 5e-8))}, 1e-5)
+
+
+def test_the_modulus_of_a_recipe_through_bundles(tmp_path: Path) -> None:
+    """Modulus and density against runs with bundles of their own recipes, at other steps; a frame that no joint uses.
+
+    Tolerance: of differences, where vibrations have turned ten times.
+    """
+    scene = load("flexible_slider_crank", **{"time.end": 0.002})
+    recipe = Path(scene.recipes()["rod"]).read_text()
+    of = ["slider.velocity.x.final", "crank_pin.force.x.final", "rod.middle.frame_position.final"]
+    numbers = {"material.youngs_modulus": "200 GPa", "material.density": "7870 kg/m^3"}
+    to = [f"body.rod.mesh.{path}" for path in numbers]
+    found = fc.sensitivities(scene, of, to)
+    assert f"by differences of reduced bodies for {', '.join(to)}" in found.attrs["method"]
+    recorded = [parse_recorded(name, scene.owners()) for name in of]
+    for path, (key, text) in zip(to, numbers.items(), strict=True):
+        number, unit = text.split()
+        values = []
+        for k in (-2, -1, 1, 2):
+            file = tmp_path / f"{key}{k}.toml"
+            file.write_text(recipe.replace(f'"{text}"', f'"{float(number) * (1.0 + k * 2e-4)!r} {unit}"'))
+            other = edited(scene, {"body.rod.mesh": str(file)})
+            values.append(Runner(bundles(other), recorded).run(other).values)
+        size = 2e-4 * float(found.parameter_value.sel(parameter=path))
+        for one in recorded:
+            a, b, c, d = (np.asarray(v[one.name]) for v in values)
+            stepped = (a - 8.0 * b + 8.0 * c - d) / (12.0 * size)
+            exact = found[one.name].sel(parameter=path).values
+            assert exact == pytest.approx(stepped, rel=1e-5, abs=1e-5 * np.abs(stepped).max())
+
+
+def test_a_number_that_no_recipe_has_is_refused() -> None:
+    scene = load("flexible_slider_crank", **{"time.end": 0.002})
+    with pytest.raises(InputError, match=r"there is no 'material.stiffness'"):
+        fc.sensitivities(scene, ["slider.velocity.final"], ["body.rod.mesh.material.stiffness"])

@@ -31,7 +31,7 @@ def start(name: str) -> dict[str, Placement]:
     s = scene(name)
     frames = frames_of(s, bundles(s))
     groups, group_of = merge(s, frames)
-    poses = start_places(s, groups, group_of, frames)
+    poses = start_places(s, groups, group_of, frames, {})
     found = {}
     for frame, here in frames.items():
         group = group_of[here.body]

@@ -11,6 +11,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.laws import drive_laws
+from flexclear.pipeline.dynamics.model.mechanism import build
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, scene, simulate
 
@@ -36,7 +37,7 @@ def laws(table: dict[str, Any], time: np.ndarray, order: int = 0) -> np.ndarray:
     return np.array([[law.value(float(t), order) for law in made] for t in time])
 
 
-def cardan(a: np.ndarray) -> np.ndarray:
+def cardan(a: Any) -> np.ndarray:
     parts = [rotation_vector_to_matrix(angle * axis) for angle, axis in zip(a, np.eye(3), strict=True)]
     return parts[0] @ parts[1] @ parts[2]
 
@@ -197,6 +198,23 @@ def test_actuators_beyond_the_freedoms_share_by_least_norm_when_asked_to() -> No
     exchanged = float(np.abs(shared.drive_work).max() + np.abs(shared.load_work).max())
     # quintics and straight lines between outputs of 10 ms: the same in both, so that only rounding is left
     assert float(np.abs(shared.energy_error).max()) < 1e-8 * exchanged
+
+
+@pytest.mark.parametrize("angles", ["cardan", "rotation-vector"])
+def test_a_body_on_a_path_needs_no_pose(angles: str) -> None:
+    """It starts where the laws put its frame; what it carries hangs on it, and components without a law are zero."""
+    table = flying(position=PLACE, rotation=ANGLES, angles=angles)
+    del table["body"]["b"]["pose"]
+    own = rotation_vector_to_matrix(np.array(TIP["rotation_vector"]))
+    for path in (table["drive"]["path"], {"frame": "b.tip", "position": {"y": 2.0}, "rotation": {"z": 0.5}}):
+        table["drive"]["path"] = path
+        made = build(Scene.model_validate(table), {})
+        there = made.links[-1].start.of(made.links[-1].placements["b"])
+        turn = cardan if angles == "cardan" else rotation_vector_to_matrix
+        start = laws(table, np.zeros(1))[0]
+        origin, turned = (start[:3], turn(start[3:])) if len(start) == 6 else ([0.0, 2.0, 0.0], cardan([0.0, 0.0, 0.5]))
+        assert pytest.approx(turned @ own.T, abs=1e-14) == there.R
+        assert made.origin + there.p == pytest.approx(origin - turned @ own.T @ TIP["position"], abs=1e-14)
 
 
 def test_a_path_and_a_joint_drive_do_not_fight_unnoticed() -> None:

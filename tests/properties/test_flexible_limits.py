@@ -9,8 +9,9 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene, read_toml
+from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve

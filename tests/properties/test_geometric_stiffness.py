@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import skew
-from flexclear.pipeline.core.scene.load import read_toml
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.dynamics import analyses
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe.section import POINTS

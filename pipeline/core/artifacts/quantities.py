@@ -5,8 +5,8 @@ Series are compared at the regular output times that both runs have, never inter
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,13 +77,16 @@ def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int
 
 def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
     """Return values over time [SI], shape (time, components), of a quantity that has a value at every time."""
-    if not quantity.steps:
-        return _of_part(run, quantity)
+    return combined(quantity.steps, lambda one: _of_part(run, one)) if quantity.steps else _of_part(run, quantity)
 
-    def leaf(step: Quantity | tuple[float, str]) -> np.ndarray:
-        return _of_part(run, step) if isinstance(step, Quantity) else np.full((1, 1), step[0])
 
-    return fold(quantity.steps, leaf, lambda operator, operands: _OPERATORS[operator](*operands))
+def combined(steps: Sequence[Any], read: Callable[[Any], np.ndarray]) -> np.ndarray:
+    """Return the values of an expression in postfix order from those of its quantities, (n, components)."""
+    return fold(
+        steps,
+        lambda step: np.full((1, 1), step[0]) if isinstance(step, tuple) else read(step),
+        lambda operator, operands: _OPERATORS[operator](*operands),
+    )
 
 
 _OPERATORS: dict[str, Callable[..., np.ndarray]] = {

@@ -8,7 +8,7 @@ and share compiled code.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,14 +88,11 @@ def formula(scene: Any, name: str) -> Formula | None:
     load = scene.load[name]
     if not isinstance(load, EXPRESSIONS):
         return None
-    known = constants_of(load.values)
-    require_used(known, load.texts)
     dimension = "torque" if isinstance(load, JointExpression) and turns(scene, load) else "force"
     vector = isinstance(load, PointExpression) and isinstance(load.force, str)
     numbers, reads, codes = list[float](), list[tuple[str, str]](), list[str]()
-    for text in load.texts:
+    for text, steps in written(scene, load):
         try:
-            steps = read(text, scene.owners(), known, OF_LINES if isinstance(load, LineExpression) else None)
             measure(steps)
             for step in steps:
                 _check(scene, step)
@@ -104,6 +101,17 @@ def formula(scene: Any, name: str) -> Formula | None:
             raise ValueError(f"force = '{text}': {error}") from None
         codes.append(_encoded(steps, numbers, reads))
     return Formula(" ; ".join(codes), tuple(numbers), tuple(reads))
+
+
+def written(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]]:
+    """Yield each expression of a load, and its postfix order; raise ValueError, in words, for one without meaning."""
+    known = constants_of(load.values)
+    require_used(known, load.texts)
+    for text in load.texts:
+        try:
+            yield text, read(text, scene.owners(), known, OF_LINES if isinstance(load, LineExpression) else None)
+        except ValueError as error:
+            raise ValueError(f"force = '{text}': {error}") from None
 
 
 def check_formulas(scene: Any) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import copy
 import re
-import stat
-import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -16,10 +14,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
 from flexclear.pipeline.core.scene.limits import check_parts
-from flexclear.pipeline.core.scene.lines import not_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import close_choice
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.system import file_names
@@ -27,11 +25,6 @@ from flexclear.pipeline.core.system.errors import InputError, ResourceError, sho
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
-#: largest size of a scene or recipe [bytes]: the TOML reader takes a second for the worst content of this size
-LARGEST_FILE = 1 << 20
-#: a key with more parts than a scene has levels; the TOML reader's time grows with their number squared
-_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-DEEP = re.compile(rf"(?<![\w\\-])(?:{_PART}[ \t]*+\.[ \t]*+){{50}}")
 #: largest number of scenes that extend each other in a row; each is read, and the extended ones are copied
 LONGEST_CHAIN = 50
 #: keys of parts that name files, which are searched for next to the scene
@@ -166,12 +159,24 @@ def number_at(scene: Scene, path: str) -> tuple[float, str]:
 
     Raises InputError for a value that is no number.
     """
-    parent, key = _find(scene.model_dump(mode="json", exclude_none=True), path, path)
+    return number_in(scene.model_dump(mode="json", exclude_none=True), path, path)
+
+
+def number_in(table: Mapping[str, Any], path: str, where: str) -> tuple[float, str]:
+    """Return a table's number at a key path, as `number_at` does; where: name of the path in errors."""
+    parent, key = _find(table, path, where)
     if isinstance(parent[key], (int, float, str)) and not isinstance(parent[key], bool):
         with contextlib.suppress(ValueError):
             number, _, unit = str(any_quantity(parent[key])).partition(" ")
             return float(number), unit
-    raise InputError(path, f"is not a number but {parent[key]!r}", "name one number, of a list by index: com.0")
+    raise InputError(where, f"is not a number but {parent[key]!r}", "name one number, of a list by index: com.0")
+
+
+def with_number(table: Mapping[str, Any], path: str, value: object) -> dict[str, Any]:
+    """Return a copy of a table with the value at a key path changed."""
+    changed = copy.deepcopy(dict(table))
+    _put(changed, path, value, path)
+    return changed
 
 
 @cache
@@ -266,36 +271,6 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
         raise InputError(f"{path} [remove]", f"is a list of paths, not {removed!r}", 'write remove = ["joint.A1"]')
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file as a table; raise InputError when it cannot be read or parsed."""
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(str(path), "cannot be read: it is not an ordinary file", "name a TOML file")
-        if status.st_size > LARGEST_FILE:
-            raise InputError(
-                str(path),
-                f"is larger than {LARGEST_FILE >> 20} MB",
-                "name a TOML file; put long tables of laws into a CSV file",
-            )
-        text = path.read_text(encoding="utf-8-sig")
-        if DEEP.search(text):
-            raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
-        return tomllib.loads(text)
-    except FileNotFoundError:
-        raise InputError(str(path), "there is no such file", _neighbours(path)) from None
-    except UnicodeDecodeError as error:
-        raise InputError(str(path), f"is not text in UTF-8: {error.reason}", "name a TOML file") from None
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}", "name a TOML file") from None
-    except tomllib.TOMLDecodeError as error:
-        raise not_toml(path, path.read_text(encoding="utf-8-sig"), str(error)) from None
-    except RecursionError:
-        raise InputError(str(path), "nests tables or lists too deeply to be read") from None
-    except ValueError as error:  # a NUL in the path, or a number with more digits than Python reads
-        raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
-
-
 def kind_of_file(table: Mapping[str, Any]) -> str:
     """Return SCENE, SWEEP or RECIPE: the kind to which most keys of a file belong; SCENE where none decides."""
     matches = {kind: len(keys & set(table)) for kind, keys in TYPICAL_KEYS.items()}
@@ -307,13 +282,6 @@ def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
     kind = kind_of_file(table)
     if kind != requested and (kind != SCENE or TYPICAL_KEYS[SCENE] & set(table)):
         raise InputError(str(path), f"is {kind}, not {requested}", USE[kind].format(path=path))
-
-
-def _neighbours(path: Path) -> str | None:
-    if any("\\" in part for part in path.parts) or not str(path).isprintable():  # \ separates folders on Windows only
-        return "write / between folders, which works on every system"
-    names = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-    return suggestion(path.name, names) if names else None
 
 
 def _edited(result: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:

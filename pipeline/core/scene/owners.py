@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.loads import Bushing, Pid, SampledPid
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.quantity import KINDS
+from flexclear.pipeline.core.scene.toml_files import recipe_frames
 
 #: joint type -> its coordinates by name, and whether each is an angle, as in the classes of the joints
 COORDINATES: Mapping[str, Mapping[str, bool]] = {
@@ -33,9 +34,10 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
     stops = {f"{name}.{end}": turns(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
     controllers = {name: load for name, load in forces.items() if isinstance(load, (Pid, SampledPid))}
     modes = {name: body.modes.count for name, body in scene.flexible().items()}
+    unread = {name for name, mesh in scene.recipes().items() if not mesh}
     return {
         "body": moving,
-        "frame": _still(_frames(scene)),
+        "frame": _Frames(_frames(scene), unread),
         "joint": _still(scene.joint),
         "coordinate": _coordinates(scene),
         "drive": dict(_drives(scene)),
@@ -64,10 +66,25 @@ def _of_all(scene: Any) -> Iterator[str]:
             yield key
 
 
+class _Frames(dict[str, bool]):
+    """Names of frames; of bodies whose recipe is left out where their bundle is given, any frame may exist."""
+
+    def __init__(self, names: Iterable[str], unread: Collection[str]) -> None:
+        super().__init__(_still(names))
+        self.unread = unread
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or str(name).partition(".")[0] in self.unread
+
+    def __missing__(self, name: str) -> bool:
+        return False
+
+
 def _frames(scene: Any) -> Iterator[str]:
-    """Yield frames of bodies; of bodies that recipes describe, the frames that the scene names."""
+    """Yield frames of bodies; of bodies whose recipe cannot be read, the frames that the scene names."""
     for name, body in scene.body.items():
-        yield from (f"{name}.{frame}" for frame in getattr(body, "frames", {}))
+        known = recipe_frames(body.mesh) if getattr(body, "mesh", "") else getattr(body, "frames", None)
+        yield from (f"{name}.{frame}" for frame in known or ())
     for part in (*scene.joint.values(), *scene.load.values(), *scene.drive.values()):
         yield from getattr(part, "between", ())
         yield from (part.frame,) if hasattr(part, "frame") else ()

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.core.scene.load import SWEEP, read_toml, require_kind
+from flexclear.pipeline.core.scene.load import SWEEP, require_kind
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 

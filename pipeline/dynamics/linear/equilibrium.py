@@ -30,7 +30,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, close, hold, in_strides, set_drives
-from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, magnitude, stiffness, tangent
+from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, is_symmetric, vibrations
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import row_units
@@ -74,7 +74,7 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
     best, since = np.inf, 0
     for iteration in range(MOST_MOVES):
         size = float(np.linalg.norm(at.unbalanced))
-        largest = max(weight(bench), magnitude(at.Z, at.bias))
+        largest = max(weight(bench), at.magnitude(bench.model.speed_scales))
         since = 0 if size < 0.5 * best else since + 1
         best = min(best, size)
         if size <= BALANCED * largest or (since > 3 and size <= STALLED * largest):
@@ -229,8 +229,7 @@ def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
     at, last, iteration = tangent(bench, q), np.inf, 0
     size = bench.model.speed_scales
     for iteration in range(1, CORRECTIONS + 1):
-        forces = at.forces * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
-        step = _correction(bench, at, BALANCED * forces)
+        step = _correction(bench, at, BALANCED * at.magnitude(size))
         length = float(np.max(np.abs(step) / size, initial=0.0))
         if length <= SHORT_MOVE or (length <= STALLED_CORRECTION and length > CONTRACTION * last):
             return Equilibrium(at, residual(bench, at), iteration)

@@ -67,6 +67,10 @@ class Tangent:
         """Negative unbalanced forces along the free motions, shape (mobility,)."""
         return self.Z.T @ self.bias
 
+    def magnitude(self, size: np.ndarray) -> float:
+        """Return the size of the balancing forces along the free motions; size: natural unit of each speed, (nv,)."""
+        return self.forces * float(np.linalg.norm(np.abs(self.Z).T @ (1.0 / size)))
+
 
 def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     """Return the free motions at closed positions q; raise SolverError at deformations beyond any real pose."""
@@ -139,11 +143,6 @@ def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: fl
     reach = np.max(np.abs(motions) / bench.model.speed_scales[:, None], axis=0, initial=0.0)
     terms = np.linalg.norm(np.abs(motions).T @ np.abs(changes).T, axis=0)
     return EPSILON * np.asarray(terms + forces * reach * np.linalg.norm(reach))
-
-
-def magnitude(motions: np.ndarray, bias: np.ndarray) -> float:
-    """Return the size of the summands of the forces along motions."""
-    return float(np.linalg.norm(np.abs(motions).T @ np.abs(bias)))
 
 
 def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:

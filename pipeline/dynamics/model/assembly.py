@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,21 +18,21 @@ from flexclear.pipeline.dynamics.model.constraints import Constraint, constraint
 from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import NO_LAWS
-from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, build
+from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.placing import ambiguity, assemblies, guess, targets
+from flexclear.pipeline.dynamics.model.placing import Assembly, ambiguity, assemblies, guess, targets
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
 #: residuals of joints below this fraction of the mechanism's size come from rounded input
 MEANT_TO_FIT = 1e-4
 
 
-def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS) -> Mechanism:
+def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, exact: bool = False) -> Mechanism:
     """Return the mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
 
     Mechanisms with flexible bodies or paths are only checked: the engine closes them, with deformation and prescribed
     poses.
-    given: laws that replace the scene's.
+    given: laws that replace the scene's.  exact: True where no frame may be moved within its tolerance.
     Raises InputError for joints whose frames start at a large distance or with opposite axes, for given poses that
     contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.
     """
@@ -53,24 +53,52 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS) -> Me
     residual = max([*residuals(judged, poses).values(), *(one.size for one in contradicted)], default=0.0)
     mechanism = replace(mechanism, start_residual=residual, placed=tuple(poses))
     if search:
-        return _searched(mechanism, joints, placed, starts)
+        candidates = assemblies(mechanism, joints, placed, starts)
+        if not candidates and not exact:
+            mine = (mechanism, joints, placed, starts)
+            fits = _fitted(mechanism, joints, given, lambda within: [one.poses for one in assemblies(*mine, within)])
+            if fits is not None:
+                return fits
+        return _searched(mechanism, joints, placed, starts, candidates)
     asked = bool(starts or mechanism.deformation)
     if mechanism.has_paths or not (mechanism.all_rigid or asked):
         return with_starts(mechanism, poses)
     closed = close(mechanism, joints, poses)
-    fitting = way(mechanism.scene, "frames to a tolerance") if closed is None else None
-    if fitting is not None and (scene := fitting.fitted(mechanism, joints, poses)) is not None:
-        fits = assembled(build(scene, {}), given)
-        return replace(fits, choice=" ".join([fitting.changed(mechanism.scene, scene), fits.choice]).strip())
     if closed is None and mechanism.all_rigid:
+        fits = None if exact else _fitted(mechanism, joints, given, lambda within: [poses])
+        if fits is not None:
+            return fits
         _refuse_drives(mechanism, joints, poses)
         raise _impossible(mechanism, joints, poses)
     return with_starts(mechanism, closed or poses)
 
 
-def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> Mechanism:
-    """Return the mechanism with links without poses put where the joints allow; raise InputError where none fits."""
-    candidates = assemblies(mechanism, joints, placed, starts)
+def _fitted(
+    mechanism: Mechanism,
+    joints: list[Constraint],
+    given: Mapping[str, Pieces],
+    near: Callable[[float], list[list[Placement]]],
+) -> Mechanism | None:
+    """Return the assembled mechanism with frames moved within their tolerances; None where these do not suffice.
+
+    near: as in `fitting.fitted`.
+    """
+    fitting = way(mechanism.scene, "frames to a tolerance")
+    other: Mechanism | None = fitting.fitted(mechanism, joints, near) if fitting is not None else None
+    if other is None:
+        return None
+    fits = assembled(other, given, exact=True)
+    return replace(fits, choice=" ".join([fitting.changed(mechanism, other), fits.choice]).strip())
+
+
+def _searched(
+    mechanism: Mechanism,
+    joints: list[Constraint],
+    placed: set[int],
+    starts: Sequence[Given],
+    candidates: Sequence[Assembly],
+) -> Mechanism:
+    """Return the mechanism with links without poses at the first of the assemblies; raise InputError without any."""
     if not candidates:
         _refuse_starts(mechanism, joints, placed, starts)
         driven = any(joint.values for joint in joints)

@@ -7,12 +7,16 @@ Each coordinate of the chain is then free or known by itself. The pose of a fram
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import reduce
 
 import numpy as np
 
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import joint_type
+from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
 #: x, y and z of the origin, then Cardan angles about x, y and z
@@ -90,3 +94,13 @@ def path_positions(edge: Edge, R: np.ndarray, p: np.ndarray) -> np.ndarray:
     # R = Rx(a) Ry(b) Rz(c)
     angles = [np.arctan2(-R[1, 2], R[2, 2]), np.arcsin(np.clip(R[0, 2], -1.0, 1.0)), np.arctan2(-R[0, 1], R[0, 0])]
     return np.concatenate([p, angles])
+
+
+def path_pose(place: Mapping[str, float], vector: bool) -> Placement:
+    """Return the pose in the world of a frame on a path, from prescribed components by name; others are zero.
+
+    vector: True for the components of a rotation vector instead of Cardan angles.
+    """
+    p, angles = (np.array([place.get(f"{kind}.{axis}", 0.0) for axis in "xyz"]) for kind in ("position", "rotation"))
+    turns = [angles] if vector else list(np.diag(angles))
+    return Placement(p, reduce(np.matmul, map(rotation_vector_to_matrix, turns)))

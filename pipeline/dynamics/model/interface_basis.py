@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.numerics.rotations import first_largest
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.components import joined
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
@@ -106,10 +107,12 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
         return np.zeros((n, 0)), np.eye(n)
     still, moving = rows[rank:].T, rows[:rank].T
     _, axes = np.linalg.eigh(still.T @ (stiffness[:, None] * still))
+    shapes = still @ axes
+    shapes *= np.sign(shapes[first_largest(np.abs(shapes), axis=0), np.arange(shapes.shape[1])])
     # rotations before displacements: then only the first shapes rotate frames. With a heavy body on a frame, the mass
     # matrix of other moving shapes, scaled to a unit diagonal, is worse conditioned by a factor of 10 to 100
     turns_first, _ = np.linalg.qr((motions[np.any(motions != 0.0, axis=1)] @ moving)[::-1].T)
-    return still @ axes, moving @ turns_first
+    return shapes, moving @ turns_first
 
 
 def frame_index(bundle: Labelled, frame: str) -> int:

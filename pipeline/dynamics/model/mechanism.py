@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects.stops.model import STOP, End, ends
-from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
+from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain, path_pose
 from flexclear.pipeline.dynamics.model.components import Components, components, joined
 from flexclear.pipeline.dynamics.model.driving import joint_type, prescribed
+from flexclear.pipeline.dynamics.model.laws import checked_law
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,
     Group,
@@ -231,7 +233,7 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
     require_bodies(scene)
     frames = frames_of(scene, bundles)
     groups, group_of = merge(scene, frames)
-    starts = start_places(scene, groups, group_of, frames)
+    starts = start_places(scene, groups, group_of, frames, _led(scene))
     masses = [0.0, *(_mass(scene, group, bundles) for group in groups[1:])]
     branches, closing = span(masses, edges(scene, frames, group_of))
     origin = _centre(starts)
@@ -267,6 +269,19 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
 def _mass(scene: Scene, group: Group, bundles: Mapping[str, Labelled]) -> float:
     """Return the mass of a group of bodies [kg]."""
     return float(bundles[group.host]["mass"].values) if group.flexible else rigid_inertia(scene, group.placements).mass
+
+
+def _led(scene: Scene) -> dict[str, Placement]:
+    """Return the poses at the start of frames on a path, of bodies without a given pose."""
+    places = {}
+    for name, drive in scene.drive.items():
+        body = scene.body.get(drive.frame.partition(".")[0]) if isinstance(drive, PathDrive) else None
+        if isinstance(drive, PathDrive) and getattr(body, "pose", drive) is None:
+            mine = [one for one in prescribed(scene) if one.name.startswith(f"{name}.")]
+            laws = {one.name: checked_law(scene, one.law, one.dimension, one.place) for one in mine}
+            values = {one.removeprefix(f"{name}."): law.value(scene.time.start) for one, law in laws.items()}
+            places[drive.frame] = path_pose(values, drive.angles == "rotation-vector")
+    return places
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:

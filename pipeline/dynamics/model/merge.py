@@ -134,7 +134,7 @@ def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group],
             continue
         places = groups[group_of[a.body]].placements
         A, B = places[a.body].of(a.placement), places[b.body].of(b.placement)
-        if not _close(A, B, same):
+        if not _close(A, B, same + _tolerance(scene, a.body, b.body)):
             angle = np.degrees(np.arccos(np.clip((np.trace(A.R.T @ B.R) - 1.0) / 2.0, -1.0, 1.0)))
             raise InputError(
                 f"[joint.{name}.between]",
@@ -180,11 +180,16 @@ def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia
 
 
 def start_places(
-    scene: Scene, groups: list[Group], group_of: Mapping[str, int], frames: Mapping[str, Frame]
+    scene: Scene,
+    groups: list[Group],
+    group_of: Mapping[str, int],
+    frames: Mapping[str, Frame],
+    led: Mapping[str, Placement],
 ) -> list[Placement]:
     """Return the start pose of every group's host frame in the world.
 
-    A group without given pose takes it from a joint to a group with a pose, the joint's frames coinciding.  Raises
+    A group without given pose takes it from a joint to a group with a pose, the joint's frames coinciding, else from
+    `led`, the poses of frames at the start of their paths.  Raises
     InputError for a group without any pose, and for a pose that contradicts the fixed joints.
     """
     known: dict[int, Placement] = {0: Placement()}
@@ -197,7 +202,7 @@ def start_places(
             here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(
                 placement.inverse()
             )
-            if i in known and not _close(known[i], here, same):
+            if i in known and not _close(known[i], here, same + _tolerance(scene, *group.placements)):
                 raise InputError(
                     f"[body.{name}.pose]",
                     "contradicts the poses of the bodies that it is fixed to",
@@ -205,6 +210,12 @@ def start_places(
                 )
             known.setdefault(i, here)
     _propagate(scene, group_of, frames, groups, known)
+    for name, place in led.items():
+        frame = find_frame(frames, name, "[drive]")
+        mine = group_of[frame.body]
+        if mine not in known:
+            known[mine] = place.of(groups[mine].placements[frame.body].of(frame.placement).inverse())
+            _propagate(scene, group_of, frames, groups, known)
     missing = [groups[i].host for i in range(len(groups)) if i not in known]
     if missing:
         raise InputError(
@@ -219,6 +230,11 @@ def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
     origins = np.array([(0.0, 0.0, 0.0), *poses])
     span = max([*np.ptp(origins, axis=0), *(float(np.linalg.norm(f.placement.p)) for f in frames.values())])
     return float(np.clip(1e-9, 1e-9 * span, 1e-6 * span)) if span > 0.0 else 1e-9
+
+
+def _tolerance(scene: Scene, *bodies: str) -> float:
+    """Return the largest distance by which frames of some bodies may be moved [m]."""
+    return max(getattr(scene.body[body], "frame_tolerance", 0.0) for body in bodies)
 
 
 def _close(a: Placement, b: Placement, same: float) -> bool:

@@ -45,11 +45,11 @@ class Assembly:
 
 
 def assemblies(
-    mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]
+    mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given], within: float = 0.0
 ) -> list[Assembly]:
     """Return the assemblies in which the joints fit, nearest to the hints first, then to the first guess; maybe none.
 
-    placed: links that have a given pose.
+    placed: links that have a given pose.  within: as in `close`.
     """
     hints, aims = targets(joints, starts)
     random, distinct, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
@@ -57,9 +57,9 @@ def assemblies(
         here = guess(mechanism, joints, placed, aims, random if k else None, k / GUESSES)
         if k == 0:
             aim = {**_coordinates(joints, here), **hints}
-        poses = close(mechanism, joints, here, placed)
+        poses = close(mechanism, joints, here, placed, within)
         if poses is None and len(placed) > 1:
-            poses = close(mechanism, joints, here)
+            poses = close(mechanism, joints, here, within=within)
         if poses is None or opposite(joints, poses) is not None:
             continue
         made = Assembly(poses, _coordinates(joints, poses))

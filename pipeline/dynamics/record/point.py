@@ -29,7 +29,8 @@ from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place,
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
-from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, stretches
+from flexclear.pipeline.dynamics.run.horizon.repetition import require_periodic
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
 from flexclear.pipeline.dynamics.run.run import follow, judged, observed, require_shallow

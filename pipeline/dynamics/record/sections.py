@@ -31,9 +31,9 @@ from flexclear.pipeline.dynamics.run.horizon.periods import (
     Cursor,
     Period,
     periods,
-    require_periodic,
     stretches,
 )
+from flexclear.pipeline.dynamics.run.horizon.repetition import require_periodic
 from flexclear.pipeline.dynamics.run.pieces import digest, memory, remember
 from flexclear.pipeline.dynamics.run.run import engines, observed
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory

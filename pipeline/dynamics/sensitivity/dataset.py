@@ -11,18 +11,21 @@ from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.quantities import IMPACT, reduced
 from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.load import with_numbers
-from flexclear.pipeline.core.scene.quantity import Quantity, Recorded, parse, parse_recorded
+from flexclear.pipeline.core.scene.quantity import KINDS, Quantity, Recorded, parse, parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.merge import find_frame
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.exponent import growth, start_direction
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, differentiate
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.sensitivity.parameters import Family
+from flexclear.pipeline.dynamics.sensitivity.recipes import Varied
 from flexclear.pipeline.dynamics.sensitivity.series import NORMAL_FORCE, Series, derivatives, read
 
 if TYPE_CHECKING:
@@ -69,11 +72,12 @@ def sensitivities(
     of: Sequence[str],
     to: Sequence[str],
     horizon: float = np.inf,
+    varied: Mapping[str, Varied] | None = None,
 ) -> xr.Dataset:
     """Return derivatives of quantities with respect to numbers of the scene (`flexclear.sensitivities`).
 
-    horizon: time [s] up to which the motion is predictable; values beyond are NaN.  Raises InputError for unknown
-    names, SolverError where the motion has no derivative.
+    varied: numbers of recipes among `to`, by path.  horizon: time [s] up to which the motion is predictable; values
+    beyond are NaN.  Raises InputError for unknown names, SolverError where the motion has no derivative.
     """
     import xarray as xr
 
@@ -81,18 +85,22 @@ def sensitivities(
     if scene.solver.integrator != "dop853":
         scene = with_numbers(scene, {"solver.integrator": "dop853", "solver.step": None})
     engine = engine_of(scene, bundles, progress)
-    family = Family(scene, bundles, engine)
+    for one in requested:
+        for term in one.quantity.terms():
+            if KINDS[term.kind].owner == "frame":
+                find_frame(engine.model.mechanism.frames, term.owner, f"of: '{one.name}'")
+    family = Family(_near(scene, engine), bundles, engine, varied or {})
     parameters = [family.parameter(path) for path in to]
     directions = [family.direction(parameter) for parameter in parameters]
     start = consistent_start(engine)
-    run = differentiate(engine, start, [*directions, start_direction(engine, start)], progress)
+    run = differentiate(engine, start, [*(one for one, _ in directions), start_direction(engine, start)], progress)
     grown = growth(engine, run, len(directions))
     series = {one.quantity.name: one.quantity for one in requested if one.quantity.over_time}
     values = read(family, engine, run, series.values())
     columns: dict[str, list[np.ndarray]] = {one.name: [] for one in requested}
     for k, parameter in enumerate(parameters):
         progress((k + 1) / len(parameters), f"quantities by {parameter.path}")
-        changes = derivatives(family, run, k, parameter, series.values())
+        changes = derivatives(family, run, k, parameter, directions[k][1], series.values())
         for one in requested:
             columns[one.name].append(
                 _derivative(one, family.engine.model, run, k, values, changes, horizon) / parameter.unit
@@ -106,11 +114,23 @@ def sensitivities(
     if any(one.recorded is None for one in requested):
         coordinates["time"] = ("time", time, {"units": "s", "long_name": "time"})
     facts: dict[str, Any] = attributes(scene) | {"title": f"Sensitivities of {subject(scene)}", "method": METHOD}
+    if varied:
+        facts["method"] += f"; by differences of reduced bodies for {', '.join(varied)}"
     facts["evaluations"] = run.trajectory.counters["evaluations"]
     facts |= {"exponent": grown.exponent, "exponent_error": grown.error, "tangent_horizon": grown.horizon}
     if np.isfinite(horizon):
         facts |= {"horizon": horizon, "validity": f"up to the predictability horizon, {horizon:.6g} s; beyond it NaN"}
     return xr.Dataset(variables, coordinates, facts)
+
+
+def _near(scene: Scene, engine: Engine) -> Scene:
+    """Return the scene with the poses of its run, from which equilibria of changed scenes are sought.
+
+    From further away each search would end elsewhere along motions that no force resists.
+    """
+    if scene.start is None or scene.start.at != "equilibrium":
+        return scene
+    return scene.model_copy(update={"body": engine.model.scene.body})
 
 
 METHOD = "variational equations of the tangent of the equations of motion, with the jumps of impacts"

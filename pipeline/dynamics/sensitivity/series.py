@@ -21,9 +21,9 @@ from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated
 from flexclear.pipeline.dynamics.run.run import observed
 from flexclear.pipeline.dynamics.sensitivity.parameters import Family, Parameter, central
 
-#: steps along a direction, in its units: powers of ten between these; the widest also as a fraction of the size of the
-#: quantity that changes most
-WIDEST_STEP, FINEST = 1e-3, 1e-10
+#: steps along a direction are powers of ten, from this one [its unit] to that of its start; each changes no quantity by
+#: a larger fraction of its size
+FINEST = 1e-10
 #: step of a closed contact, as a fraction of its penetration
 OF_DEPTH = 1e-2
 #: name of the contacts' normal forces among the series
@@ -40,12 +40,15 @@ def read(family: Family, engine: Engine, run: Differentiated, requested: Collect
 
 
 def derivatives(
-    family: Family, run: Differentiated, k: int, parameter: Parameter, requested: Collection[Quantity]
+    family: Family, run: Differentiated, k: int, parameter: Parameter, widest: float, requested: Collection[Quantity]
 ) -> Series:
-    """Return the derivatives of the series of `read` along direction k of a run, per unit of the parameter."""
+    """Return the derivatives of the series of `read` along direction k of a run, per unit of the parameter.
+
+    widest: step of the parameter at which its start is smooth.
+    """
     result: Series = {}
     # rows with equal steps together
-    powers = np.floor(np.log10(_steps(family, run, k, parameter)) + 1e-9).astype(int)
+    powers = np.floor(np.log10(_steps(family, run, k, parameter, widest)) + 1e-9).astype(int)
     for power in np.unique(powers):
         rows, step = np.flatnonzero(powers == power), 10.0**power
         around = {
@@ -67,12 +70,12 @@ def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differe
     return replace(run, trajectory=replace(run.trajectory, rows=some))
 
 
-def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) -> np.ndarray:
+def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter, widest: float) -> np.ndarray:
     """Return the step of each row."""
     model, changes = family.engine.model, np.abs(run.changes[:, k])
     positions = slice(0, model.speeds.stop)
     size = np.maximum(np.abs(run.trajectory.state), family.engine.magnitudes)[:, positions]
-    steps = WIDEST_STEP / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
+    steps = widest / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
     if model.contacts:
         everything, probe = np.arange(len(steps)), float(steps.min()) * 1e-3
         sides = [(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
@@ -82,4 +85,4 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) ->
         with np.errstate(divide="ignore", invalid="ignore"):
             allowed = np.where(closed & (change > 0.0), OF_DEPTH * depth / change, np.inf)
         steps = np.minimum(steps, allowed.min(axis=1))
-    return np.clip(steps, FINEST, WIDEST_STEP)
+    return np.clip(steps, FINEST, widest)

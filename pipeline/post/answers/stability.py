@@ -19,8 +19,8 @@ from flexclear.pipeline.post.single_run.series import sentence
 ENERGY = 1e-3
 #: largest opening of loops, as a fraction of the mechanism's extent
 LOOPS = 1e-6
-#: values below this are rounding; changes of an energy below this fraction of it may be
-ROUNDING, UNCHANGED = 1e-15, 1e-9
+#: values below this are rounding
+ROUNDING = 1e-15
 #: largest disagreement with runs at other tolerances and by other methods, as a fraction of each quantity's size
 AGREEMENT = 0.01
 #: largest fractions of rejected steps, and of steps limited by stability

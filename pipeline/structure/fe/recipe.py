@@ -10,8 +10,9 @@ from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.json_schema import identified
-from flexclear.pipeline.core.scene.load import RECIPE, read_toml, require_kind
+from flexclear.pipeline.core.scene.load import RECIPE, require_kind
 from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.scene.toml_files import read_toml
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe

@@ -11,8 +11,9 @@ import numpy as np
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot, scale
 
-#: speed [m/s] below which the coefficient rises linearly: at rest there is no force, but a slope
-SLOWEST = 1e-290
+#: speed [m/s] below which the coefficient rises linearly: at rest there is no force, but a slope. The squares of it and
+#: of its reciprocal, of which derivatives consist, are numbers
+SLOWEST = 1e-150
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,9 @@ def sliding(coefficient: Callable) -> Callable:
 
     @kernel
     def traction(z, slip, f_n, p):
-        speed = max(np.sqrt(dot(slip, slip)), SLOWEST)
-        f_t = f_n * coefficient(speed, p)
-        return scale(-f_t / speed, slip), f_t * speed, 0.0, (0.0, 0.0, 0.0)
+        square = dot(slip, slip)
+        speed = max(np.sqrt(square), SLOWEST)
+        per_speed = f_n * coefficient(speed, p) / speed
+        return scale(-per_speed, slip), per_speed * square, 0.0, (0.0, 0.0, 0.0)
 
     return traction

@@ -29,6 +29,14 @@ def consistent_start(engine: Engine) -> np.ndarray:
 
     Raises InputError for a start that joints, drives or surfaces do not allow.
     """
+    y = closed_start(engine)
+    model, depths = engine.model, overlapping(engine, y).items()
+    together(partial(refuse_depth, model.scene, model.contacts[c], depth) for c, depth in depths)
+    return y
+
+
+def closed_start(engine: Engine) -> np.ndarray:
+    """Return the state of `consistent_start`, which depends smoothly on numbers, also where surfaces overlap."""
     model = engine.model
     engine.select_pieces_after(engine.start)
     y = initial.start_state(model)
@@ -43,8 +51,6 @@ def consistent_start(engine: Engine) -> np.ndarray:
     if model.loads or model.arrays.size(m.N_INTERNAL):
         _look(engine, y)
         y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
-    depths = overlapping(engine, y).items()
-    together(partial(refuse_depth, model.scene, model.contacts[c], depth) for c, depth in depths)
     return y
 
 

@@ -19,10 +19,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import rows_of
 from flexclear.pipeline.dynamics.run.evaluation.start import project
@@ -36,8 +35,6 @@ WAYPOINTS = 16
 NEIGHBOUR = 1e3
 #: growth of the distance between two waypoints above which it is not linear, which is reported
 NOT_LINEAR = 1e4
-#: laws repeat when their values at both ends of a period agree to this fraction
-EQUAL_LAWS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -79,37 +76,6 @@ class Period:
     growth: float
     lost: int
     after: Cursor
-
-
-def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
-    """Raise InputError unless laws exist and all end the period with their initial values, drives also with the rates.
-
-    Whole turns of a driven angle are no difference.
-    """
-    if not len(parts[0].table(m.LAW)):
-        raise InputError(
-            "[sections]", "no period: neither a drive nor a load has a law of time", "drive a joint, or vary a load"
-        )
-    values = []
-    for part, t in ((parts[0], parts[0].start), (parts[-1], parts[-1].end)):
-        part.select_pieces_after(t)
-        part.attempt(y, t)
-        laws = part.table(m.LAW)
-        values.append(np.stack([laws["value"], laws["rate"]], axis=1))
-    period, driven = parts[-1].end - parts[0].start, prescribed(parts[0].model.scene)
-    turning, change = [k for k, drive in enumerate(driven) if drive.dimension == "angle"], values[1] - values[0]
-    change[turning, 0] = (change[turning, 0] + np.pi) % (2.0 * np.pi) - np.pi
-    change[len(driven) :, 1] = 0.0  # a load's rate may jump
-    least = np.where(np.arange(len(change)) < len(driven), EQUAL_LAWS, 1.0)[:, None] * [1.0, 1.0 / period]
-    wrong = np.argwhere(np.abs(change) > EQUAL_LAWS * (np.abs(values).max(axis=0) + least))
-    if len(wrong):
-        k, rate = wrong[0]
-        raise InputError(
-            f"[drive.{driven[k].name}]" if k < len(driven) else "[load]",
-            f"its law does not repeat after a period of {period:.6g} s: its {'rate' if rate else 'value'} has changed "
-            f"by {change[k, rate]:.3g}",
-            "give the laws' period as sections.period, or choose laws whose period ends as it begins",
-        )
 
 
 def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
