@@ -17,14 +17,14 @@ import xarray as xr
 
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.basis import ModeRequest
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.dynamics import analyses
+from flexclear.scene.schema import Scene
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.basis import ModeRequest
+from flexclear.structure.modes.solution import solve
+from flexclear.system.progress import silent
+from flexclear.workflow.fingerprint import TREE
 
 Table = dict[str, Any]
 STEEL, ALUMINIUM = (

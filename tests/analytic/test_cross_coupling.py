@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
+from flexclear.dynamics import analyses
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 from tests.properties.mechanisms import Table, rigid, scene, simulate
 
 #: a mass on springs with a force across the displacement [kg, N/m]; with z = x + iy, m z'' + k z = i kc z

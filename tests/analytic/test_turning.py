@@ -11,9 +11,9 @@ import xarray as xr
 
 from benchmarks.families import turning
 from benchmarks.families.turning import ALONG, CASES, STEEL, Body, circle, compared, known, rectangle, rod, vibrations
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
+from flexclear import dynamics
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 
 #: 1.2 m of 20 mm steel, clamped to its hub, every coordinate of three elements
 SHAFT = Body(rod(1.2, circle(0.01), "rayleigh", 3))

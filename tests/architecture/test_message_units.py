@@ -27,14 +27,14 @@ NAMES = {
 }
 #: where a name stands for something else: places along rods, rates of bodies, shares in percent, angles in both units
 ELSEWHERE = {
-    ("pipeline/structure", "start"): {"m"},
-    ("pipeline/structure", "end"): {"m"},
-    ("pipeline/dynamics/run/refusals/validity.py", "first"): {"rad/s"},
-    ("pipeline/dynamics/run/refusals/validity.py", "speeds"): {"rad/s"},
-    ("pipeline/dynamics/run/ledger.py", "speeds"): {"m/s"},
-    ("pipeline/dynamics/model/given_start.py", "turned"): {"rad", "deg"},
-    ("pipeline/dynamics/model/closing.py", "turned"): {"deg"},
-    ("pipeline/post/answers/plan.py", "frequency"): {"%"},
+    ("pipeline/flexclear/structure", "start"): {"m"},
+    ("pipeline/flexclear/structure", "end"): {"m"},
+    ("pipeline/flexclear/dynamics/run/refusals/validity.py", "first"): {"rad/s"},
+    ("pipeline/flexclear/dynamics/run/refusals/validity.py", "speeds"): {"rad/s"},
+    ("pipeline/flexclear/dynamics/run/ledger.py", "speeds"): {"m/s"},
+    ("pipeline/flexclear/dynamics/model/given_start.py", "turned"): {"rad", "deg"},
+    ("pipeline/flexclear/dynamics/model/closing.py", "turned"): {"deg"},
+    ("pipeline/flexclear/post/answers/plan.py", "frequency"): {"%"},
     ("papers/wang_wang_2019/figures/errors.py", "interval"): {"ms"},
 }
 EXPECTED = {name: {unit} for unit, names in NAMES.items() for name in names.split()}
@@ -56,7 +56,7 @@ def name_of(number: ast.expr) -> str:
 
 def printed(root: Path) -> Iterator[tuple[str, str, str]]:
     """Place, name and unit of every number with a unit in the texts of the program."""
-    for folder in ("pipeline", "stages", "flexclear/commands", "papers"):
+    for folder in ("pipeline", "stages", "pipeline/flexclear/commands", "papers"):
         for path in sorted((root / folder).rglob("*.py")):
             for text in ast.walk(ast.parse(path.read_text())):
                 parts = text.values if isinstance(text, ast.JoinedStr) else []

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline.core.artifacts.labelled import of
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model.assembly import assembled, residuals
-from flexclear.pipeline.dynamics.model.constraints import constraints
-from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.artifacts.labelled import of
+from flexclear.dynamics.model.assembly import assembled, residuals
+from flexclear.dynamics.model.constraints import constraints
+from flexclear.dynamics.model.mechanism import build
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, joint, rigid, scene
 

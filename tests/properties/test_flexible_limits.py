@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.toml_files import read_toml
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear import dynamics
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.scene.toml_files import read_toml
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE, bundles
 
 END = 0.01

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import skew
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.toml_files import read_toml
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.structure.fe import beam as beams
-from flexclear.pipeline.structure.fe.section import POINTS
-from flexclear.pipeline.structure.fe.slices import fields_at_points, motion
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.dynamics import analyses
+from flexclear.numerics.rotations import skew
+from flexclear.scene.schema import Scene
+from flexclear.scene.toml_files import read_toml
+from flexclear.structure.fe import beam as beams
+from flexclear.structure.fe.section import POINTS
+from flexclear.structure.fe.slices import fields_at_points, motion
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import ground, joint, rigid, scene
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, same_starts
+from flexclear.artifacts.points import Point
 from flexclear.commands import plan
 from flexclear.commands.new import write
-from flexclear.pipeline.core.artifacts.effect_size import POOLED, Agreement, agreement, same_starts
-from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.dynamics.plan import search
-from flexclear.pipeline.post.answers.plan import _verdict, until_decided, verdict
+from flexclear.dynamics.plan import search
+from flexclear.post.answers.plan import _verdict, until_decided, verdict
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import Quantity
 
 
 @pytest.mark.parametrize(

@@ -5,16 +5,19 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from flexclear.pipeline.post.overview import sweep_figures
-from flexclear.pipeline.post.overview.curves import NOISE, impacts, noise, without_noise
-from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render.layout import CLEARANCE_COLOR
-from flexclear.pipeline.post.render.mechanism import SOCKET
-from flexclear.pipeline.post.render.ruler import exaggeration
-from flexclear.pipeline.post.render.view import plane, view
+from flexclear.post.overview import sweep_figures
+from flexclear.post.overview.curves import NOISE, impacts, noise, without_noise
+from flexclear.post.plotting import style
+from flexclear.post.render.layout import CLEARANCE_COLOR
+from flexclear.post.render.mechanism import SOCKET
+from flexclear.post.render.ruler import exaggeration
+from flexclear.post.render.view import plane, view
 
 #: mechanism with a loose joint, and the key of the radius of its pin or ball
-LOOSE = [("stages/templates/slider_crank/slider_crank.toml", "pin_radius"), ("scenes/sps4/csj.toml", "ball_radius")]
+LOOSE = [
+    ("pipeline/flexclear/stages/templates/slider_crank/slider_crank.toml", "pin_radius"),
+    ("scenes/sps4/csj.toml", "ball_radius"),
+]
 
 
 @pytest.mark.parametrize("path, key", LOOSE)

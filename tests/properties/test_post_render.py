@@ -8,20 +8,20 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.post.render import gl, gltf, player
-from flexclear.pipeline.post.render.forms import equivalent
-from flexclear.pipeline.post.render.layout import part_pose
-from flexclear.pipeline.post.render.mechanism import Looks, mechanism, placed
-from flexclear.pipeline.post.render.panel import panel
-from flexclear.pipeline.post.render.pictures import Shown, make
-from flexclear.pipeline.post.render.player import _camera
-from flexclear.pipeline.post.render.view import ANGLE, eye
-from flexclear.pipeline.post.shapes import body_shape
-from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scale_to
-from flexclear.pipeline.post.shapes.body_shape import rod_surface as surface
-from flexclear.pipeline.post.single_run.series import derive
+from flexclear.post.render import gl, gltf, player
+from flexclear.post.render.forms import equivalent
+from flexclear.post.render.layout import part_pose
+from flexclear.post.render.mechanism import Looks, mechanism, placed
+from flexclear.post.render.panel import panel
+from flexclear.post.render.pictures import Shown, make
+from flexclear.post.render.player import _camera
+from flexclear.post.render.view import ANGLE, eye
+from flexclear.post.shapes import body_shape
+from flexclear.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scale_to
+from flexclear.post.shapes.body_shape import rod_surface as surface
+from flexclear.post.single_run.series import derive
+from flexclear.system.errors import SolverError
+from flexclear.workflow.fingerprint import TREE
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
@@ -153,9 +153,9 @@ def _decoded(track: str) -> np.ndarray:
 @needs_gl
 def test_a_body_that_moves_far_is_in_the_first_picture_of_its_film():
     """A ball that falls by a metre from above the origin, where parts are before they are put in place."""
-    from flexclear.pipeline.post.render import film
+    from flexclear.post.render import film
 
-    run = fc.run(fc.load_scene(TREE / "stages/templates/empty/scene.toml"))
+    run = fc.run(fc.load_scene(TREE / "pipeline/flexclear/stages/templates/empty/scene.toml"))
     drawn = mechanism(run, {})
     first = next(iter(film.frames(drawn, derive(run), 12)))[:, : film.VIEW]
     # the ball is blue; background, floor and words are grey
@@ -233,7 +233,7 @@ def test_state_of_gl_is_said_without_drawing():
 
 
 def test_without_gl_there_is_no_film_but_an_error_that_says_why(monkeypatch):
-    monkeypatch.setattr("flexclear.pipeline.post.render.gl.works", lambda: False)
+    monkeypatch.setattr("flexclear.post.render.gl.works", lambda: False)
     shown = Shown(run=synthetic.run("sps4/far_cb", modes=7), bundles={"rod1": synthetic.bundle()})
     with pytest.raises(SolverError, match="libgl1"):
         make("motion", "mp4", shown)
@@ -243,7 +243,7 @@ def test_without_gl_there_is_no_film_but_an_error_that_says_why(monkeypatch):
 @needs_gl
 def test_a_film_moves():
     """A second picture of one scene shows what has moved since the first: the rod, and everything else."""
-    from flexclear.pipeline.post.render import film
+    from flexclear.post.render import film
 
     run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
     drawn = mechanism(run, {"rod1": synthetic.bundle()})

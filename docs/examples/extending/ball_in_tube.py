@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from flexclear.pipeline.core.scene.clearance import BallInTube
-from flexclear.pipeline.dynamics.contact.hertz import published, relative_radius, sphere_stiffness
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
+from flexclear.dynamics.contact.hertz import published, relative_radius, sphere_stiffness
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
+from flexclear.scene.clearance import BallInTube
 
 
 @kernel

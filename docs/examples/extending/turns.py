@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+from flexclear.artifacts.labelled import LabelledArrays
 
 
 def turns(run: LabelledArrays) -> dict[str, np.ndarray]:

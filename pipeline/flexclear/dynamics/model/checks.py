@@ -1,0 +1,56 @@
+"""Checks that `flexclear check` and every run make alike: of each part, and of the mechanism at its start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from flexclear.dynamics.effects.gears.model import coordinates_and_ratio, couplings
+from flexclear.dynamics.effects.stops.model import ends
+from flexclear.dynamics.model import contacts
+from flexclear.dynamics.model.driving import joint_drives, named_coordinate
+from flexclear.dynamics.model.laws import NO_LAWS, drive_laws
+from flexclear.dynamics.model.loads import acting_frames, describe
+from flexclear.dynamics.model.mechanism import Contact, Mechanism
+from flexclear.dynamics.model.start_table import given_coordinates
+from flexclear.scene.drives import PathDrive
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, errors_from
+
+#: a check raises InputError
+Check = Callable[[], object]
+
+
+def part_errors(scene: Scene) -> list[InputError]:
+    """Return the errors of drives, loads, stops, gears and start values that the scene's other numbers do not matter
+    for: missing coordinates, wrong units, laws that jump or do not cover the run."""
+    return errors_from(_of_parts(scene))
+
+
+def _of_parts(scene: Scene) -> Iterator[Check]:
+    for name, drive in scene.drive.items():
+        yield partial(drive_laws, scene.model_copy(update={"drive": {name: drive}}), NO_LAWS)
+        for actuator in (isinstance(drive, PathDrive) and drive.actuators) or ():
+            yield partial(named_coordinate, scene, actuator, f"[drive.{name}.actuators]")
+    yield partial(joint_drives, scene)
+    yield from (partial(describe, scene, name) for name in scene.forces())
+    yield partial(ends, scene, dict.fromkeys(scene.joint, 1.0))
+    yield from (partial(coordinates_and_ratio, scene, name) for name in scene.gear)
+    if scene.start is not None and scene.start.at != "ideal":  # else joints with clearance have coordinates, too
+        yield partial(given_coordinates, scene)
+
+
+def mechanism_errors(scene: Scene, mechanism: Mechanism) -> list[InputError]:
+    """Return the errors of contacts, gears and loads of a scene in a mechanism of its bodies.
+
+    mechanism: may have ideal joints instead of the scene's joints with clearance.
+    """
+    joints = [Contact(name, joint, *map(mechanism.site, joint.between)) for name, joint in scene.contacts().items()]
+    stops = [contact for contact in mechanism.contacts if contact.name not in scene.contacts()]
+    loads = (partial(_frames, scene, mechanism, name) for name in scene.forces())
+    laws = (partial(contacts.resolve_one, mechanism, contact) for contact in (*joints, *stops))
+    return errors_from((*laws, partial(couplings, mechanism), *loads))
+
+
+def _frames(scene: Scene, mechanism: Mechanism, load: str) -> tuple[str, ...]:
+    return acting_frames(mechanism, load, describe(scene, load).row)

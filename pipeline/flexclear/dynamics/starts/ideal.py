@@ -1,0 +1,224 @@
+"""Start of a run with clearance like its ideal mechanism: same pose and velocities, pins at rest in their sockets.
+
+The ideal scene has ideal joints instead of pins and balls with clearance. The force of such a joint at the
+start presses the pin onto one side of its socket, to the penetration at which the contact carries that force. Flexible
+bodies start deformed by the loads at the start, so that they do not spring into their shape. A ball on a plane
+has no ideal counterpart: it, and the bodies that touch it, stay where the poses put them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from typing import Any
+
+import numpy as np
+
+from flexclear.artifacts.labelled import Labelled
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model.driving import label
+from flexclear.dynamics.model.start_table import Given, given_coordinates
+from flexclear.dynamics.record.motion import Motions
+from flexclear.dynamics.record.wrenches import joint_wrenches
+from flexclear.dynamics.run.coordinates import joint_coordinates
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.observation import observe, rows_of
+from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed, project
+from flexclear.dynamics.run.run import maker
+from flexclear.dynamics.starts.snapshot import held, moving, resting
+from flexclear.scene.laws import Polynomial
+from flexclear.scene.parts import IdealJoint
+from flexclear.scene.schema import Scene
+from flexclear.scene.start import Start
+from flexclear.scene.variants import WITHOUT_CLEARANCE, loose
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import Progress
+
+#: a pin has reached its position within this fraction of the clearance; largest number of passes for that
+REACHED, PIN_PASSES = 1e-9, 20
+#: forces below this fraction of the weight press nothing: the pin stays in the middle
+NO_FORCE = 1e-9
+#: axes of the outer frame along which an ideal joint holds a pin in the middle; others: all
+ACROSS: dict[str, tuple[int, ...]] = {"clearance-revolute": (0, 1), "clearance-slot": (1,)}
+#: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
+SETTLED, LOADINGS = 1e-9, 10
+#: step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
+MODAL_STEP = 1e-7
+#: singular values below this fraction of the largest are rounding
+SINGULAR_ROUNDING = 1e-9
+
+
+def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
+    """Return the scene with the start of its ideal mechanism, and how that was assembled.
+
+    Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be moved to
+    their pressed positions.
+    """
+    ideal_scene, t = placed(scene), scene.time.start
+    engine, y = _started(ideal_scene, bundles, progress)
+    y = _deform_statically(engine, y)
+    forces = _forces(scene, engine, y)
+    concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
+    if not loose(scene):
+        return concentric, choice
+    exact = concentric.model_copy(update={"drive": _exact_drives(ideal_scene, loose(scene), engine, y)})
+    try:
+        engine, y = _pressed(exact, bundles, progress, forces)
+    except (InputError, SolverError):
+        if exact == concentric:
+            raise
+        choice = f"{choice}\nthe pins are not pressed into their sockets without moving given joint positions".strip()
+        engine, y = _pressed(concentric, bundles, progress, forces)
+    return resting(moving(concentric, engine, y, t), loose(scene), {}), choice
+
+
+def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndarray) -> dict[str, Any]:
+    """Return the drives of an ideal scene, and drives that hold given positions of joints that are not loose.
+
+    engine, y: of this scene at its start, whose rates the drives have.
+    """
+    rates = joint_coordinates(engine.model, observe(engine, rows_of(engine, y[None], engine.start)))
+
+    def law(start: Given, value: float) -> Polynomial:
+        name = label(start.joint, scene.joint[start.joint].type, start.number)
+        return Polynomial(type="polynomial", coefficients=(value, float(rates[name][1][0])), origin=engine.start)
+
+    return held(scene, [start for start in given_coordinates(scene) if start.joint not in pins], law)
+
+
+def _pressed(
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, forces: Mapping[str, np.ndarray]
+) -> tuple[Engine, np.ndarray]:
+    engine, y = _started(scene, bundles, progress)
+    return engine, _press_pins(engine, y, forces)
+
+
+def placed(scene: Scene) -> Scene:
+    """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart."""
+    joints = scene.joint | {
+        name: IdealJoint.model_validate({"type": WITHOUT_CLEARANCE[joint.type], "between": joint.between})
+        for name, joint in loose(scene).items()
+    }
+    start = (scene.start or Start()).model_copy(update={"at": None})
+    return scene.model_copy(update={"joint": joints, "start": start})
+
+
+def _started(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Engine, np.ndarray]:
+    engine = maker(scene, bundles, progress)()
+    return engine, consistent_start(engine)
+
+
+def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Return the state with flexible bodies deformed statically by the loads of the start, inertia included.
+
+    Modal coordinates then do not accelerate, as far as loops leave them free.  Where rods buckle or the pose is
+    singular no such state exists, and y is returned.
+    """
+    speeds = _modal_speeds(engine)
+    if not speeds or engine.mobility.singular_start:
+        return y
+    try:
+        state, step = y, MODAL_STEP * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
+        for _ in range(LOADINGS):
+            rates = _accelerations(engine, state, speeds)
+            slopes = np.array(
+                [_accelerations(engine, _changed(engine, state, step * unit), speeds) for unit in np.eye(len(speeds))]
+            )
+            slopes = (slopes - rates).T / step
+            stiffness = np.maximum(np.abs(np.diag(slopes)), np.finfo(float).tiny)
+            change = np.linalg.lstsq(slopes / stiffness[:, None], -rates / stiffness, rcond=SINGULAR_ROUNDING)[0]
+            state = _changed(engine, state, change)
+            if np.max(np.abs(change)) <= SETTLED * np.max(np.abs(state[_modes(engine)])):
+                return state
+    except SolverError:
+        pass
+    return y
+
+
+def _changed(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Return the state with changed modal coordinates and closed loops."""
+    changed = y.copy()
+    changed[_modes(engine)] += change
+    engine.select_pieces_after(engine.start)
+    return project(engine, changed)
+
+
+def _accelerations(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
+    """Return the accelerations of the modal coordinates, shape (n,)."""
+    return closure_rows.evaluate(engine, y, engine.start)[speeds].copy()
+
+
+def _modal_speeds(engine: Engine) -> list[int]:
+    """Return the indices of the speeds of modal coordinates in the state."""
+    model = engine.model
+    return [model.nq + k for own in model.numbering.modal_coordinates.values() for k in own]
+
+
+def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the force of every joint on its second body at the start [N], world axes, by name."""
+    seen = observe(engine, rows_of(engine, y[None], engine.start), after=True)
+    return {name: wrench[1][0] for name, wrench in joint_wrenches(Motions(engine.model, seen)).items()}
+
+
+def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the nearest state in which every pin is where the force on it presses it."""
+    model, table = engine.model, engine.model.arrays.table(m.CONTACTS)
+    weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
+    # the end of a stop may move, too: held fixed, it would hold the pins back
+    pins = [pin for pin in zip(table, model.contacts, model.laws, strict=True) if pin[1].name in loose(model.scene)]
+    modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
+
+    def along(row: np.void, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the axes that hold a pin, its offset [m], and the rate of that [m/s] along the axes."""
+        outer, inner = (engine.table(m.SITE_FRAMES)[row[side]] for side in ("outer", "inner"))
+        across, away = outer["axes"][:, ACROSS.get(kind, (0, 1, 2))].T, inner["origin"] - outer["origin"]
+        return across, across @ away, across @ (inner["velocity"] - outer["velocity"] - np.cross(outer["omega"], away))
+
+    for _ in range(PIN_PASSES):
+        closure_rows.evaluate(engine, y, engine.start)
+        missing = []
+        for row, contact, law in pins:
+            across, offset, _ = along(row, contact.joint.type)
+            force = across @ forces[contact.name]
+            size = float(np.linalg.norm(force))
+            pressed = contact.joint.clearance + law.depth(size)
+            target = -force / size * pressed if size > NO_FORCE * weight else 0.0 * force
+            missing.append(target - offset)
+        offsets = np.concatenate(missing)
+        if np.max(np.abs(offsets)) <= REACHED * least:
+            return y
+        engine.select_pieces_after(engine.start)
+        rates = per_speed(engine, y, lambda _: np.concatenate([along(row, one.joint.type)[2] for row, one, _ in pins]))
+        y = _move_pins(engine, y, rates, offsets, modal)
+    raise SolverError(
+        f"at t = {engine.start:.6g} s: the pins cannot reach their pressed positions; give "
+        "poses and velocities instead of [start] at = 'ideal'"
+    )
+
+
+def _move_pins(
+    engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray, modal: np.ndarray
+) -> np.ndarray:
+    """Return the state with pins moved by `offsets` [m] and modal coordinates as close to `modal` as possible.
+
+    jacobian: rates of the offsets per speed.
+
+    The least motion alone would bend rods by part of the clearance, and the run would begin with the impact of their
+    springing back: a stiff rod would carry kilonewtons.
+    """
+    engine.select_pieces_after(engine.start)
+    nq, modes = engine.model.nq, _modes(engine)
+    ways = per_speed(engine, y, lambda rates: rates[:nq])
+    speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=SINGULAR_ROUNDING)
+    if modes:
+        free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that do not move the pins
+        bending = modal - y[modes] - ways[modes] @ speeds
+        speeds += free @ np.linalg.lstsq(ways[modes] @ free, bending, rcond=SINGULAR_ROUNDING)[0]
+    moved = y.copy()
+    moved[:nq] += ways @ speeds
+    return project(engine, moved)
+
+
+def _modes(engine: Engine) -> list[int]:
+    """Return the indices of the flexible bodies' modal coordinates in the state."""
+    return [k for own in engine.model.numbering.modal_positions.values() for k in own]
