@@ -13,10 +13,10 @@ from pathlib import Path
 from benchmarks import families, log, page, processes
 from benchmarks.family import WRONG, Case, Family, Record
 from flexclear.commands.__main__ import INTERRUPTED
-from flexclear.pipeline.core.scene.registry import suggestion
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError
-from flexclear.pipeline.core.workflow.progress import Monitor, duration
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.post.plotting.table import pipe_table
+from flexclear.scene.registry import suggestion
+from flexclear.system.errors import FlexclearError, InputError
+from flexclear.workflow.progress import Monitor, duration
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -17,20 +17,20 @@ import numpy as np
 from benchmarks import processes
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.layouts import ROD_CENTRE, ROD_END, Layout, edits
+from flexclear import dynamics
+from flexclear.artifacts import quantities
 from flexclear.commands.scenes import Workplace, bundles, open_workplace
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.scene.integrators import DEFAULT
-from flexclear.pipeline.core.scene.load import compose, scene_of
-from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import FlexclearError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.core.workflow.progress import Monitor
-from flexclear.pipeline.core.workflow.task import in_order
-from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.dynamics.run.run import engine_of
+from flexclear.scene.integrators import DEFAULT
+from flexclear.scene.load import compose, scene_of
+from flexclear.scene.quantity import parse
+from flexclear.scene.schema import Scene
 from flexclear.stages.graph import Graph
+from flexclear.system.errors import FlexclearError, SolverError
+from flexclear.system.progress import silent
+from flexclear.workflow.fingerprint import TREE
+from flexclear.workflow.progress import Monitor
+from flexclear.workflow.task import in_order
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -214,7 +214,7 @@ def modules(case: Case) -> set[str]:
     """Return the modules that determine a case: its scene, the dynamics, the earlier stages, and the parts it names."""
     tasks = in_order([Graph(scene(case.of), shown=False).simulate])
     named = {name for task in tasks for name in task.roots()}
-    return {scene.__module__, "flexclear.pipeline.dynamics", *named}
+    return {scene.__module__, "flexclear.dynamics", *named}
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:

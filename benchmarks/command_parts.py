@@ -16,7 +16,7 @@ from threading import Lock, local
 from typing import Any
 
 IMPORTS, REST = "imports", "rest"
-_CORE, _RUN = "flexclear.pipeline.core", "flexclear.pipeline.dynamics"
+_CORE, _RUN = "flexclear.pipeline.core", "flexclear.dynamics"
 #: module -> function -> part to which the function's time counts
 PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_CORE}.scene.load": {"load_scene": "scene"},
@@ -28,7 +28,7 @@ PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_RUN}.run.horizon.horizon": {"Pair.perturbed_run": "integrating"},
     f"{_RUN}.run.run": {"observed": "recording"},
     f"{_RUN}.record.dataset": {"recorded": "recording"},
-    "flexclear.pipeline.post.single_run.series": {"derived": "deriving"},
+    "flexclear.post.single_run.series": {"derived": "deriving"},
 }
 _spent: dict[str, float] = {}
 _adding = Lock()

@@ -10,16 +10,16 @@ import xarray as xr
 
 from benchmarks.mechanisms import Mechanism
 from benchmarks.timing import once
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.observation import frames
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import observed
-from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear import dynamics
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.observation import frames
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import observed
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.scene.integrators import DEFAULT, VIBRATING
+from flexclear.scene.load import edited
+from flexclear.system.errors import SolverError
+from flexclear.system.progress import silent
 
 #: default interval of the samples at which two codes are compared [s]
 SAMPLING = 1e-3

@@ -21,13 +21,13 @@ from numpy.polynomial.polynomial import polyder
 
 from benchmarks.errors import Samples
 from benchmarks.mechanisms import Mechanism
-from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
-from flexclear.pipeline.core.scene.drives import JointDrive
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.contact.surfaces import clearance_spherical
-from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from flexclear.pipeline.dynamics.model import merge as grouping
-from flexclear.pipeline.dynamics.model.contacts import LEAST_RATE
+from flexclear.dynamics.contact.surfaces import clearance_spherical
+from flexclear.dynamics.drives.pieces import Pieces, pieces_of
+from flexclear.dynamics.model import merge as grouping
+from flexclear.dynamics.model.contacts import LEAST_RATE
+from flexclear.scene.clearance import ClearanceSpherical
+from flexclear.scene.drives import JointDrive
+from flexclear.scene.schema import Scene
 
 EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
 #: axes with x along the old z: Exudyn's prismatic joint slides along x

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from flexclear.commands.scenes import find_scene
-from flexclear.papers.wang_wang_2019.deviations import Deviation
-from flexclear.papers.wang_wang_2019.published import TABLE3, TABLE8
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from papers.wang_wang_2019.deviations import Deviation
+from papers.wang_wang_2019.published import TABLE3, TABLE8
 
 #: length that scales rotations in all condition numbers here [m]
 SCALE = 0.1

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.family import FINISHED, Case, Family, Record
-from flexclear.pipeline.core.artifacts.paths import results_root
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, library_version
+from flexclear.artifacts.paths import results_root
+from flexclear.workflow.fingerprint import TREE, Sources, library_version
 
 FOLDER = Path(__file__).parent / "log"
 PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn", "pin", "mujoco")

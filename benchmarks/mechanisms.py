@@ -12,18 +12,18 @@ import xarray as xr
 
 from benchmarks.timing import once
 from flexclear.commands.scenes import bundles, find_scene
-from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.parts import IdealJoint
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate import recording
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised_code
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engine_of, observed
-from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate import recording
+from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.scene.clearance import ClearanceSpherical
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.parts import IdealJoint
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 
 #: the scenes of the paper, from the fewest to the most effects
 SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")

@@ -17,10 +17,10 @@ from typing import Any
 from benchmarks import families, log
 from benchmarks.family import Family, Record
 from benchmarks.log import Session
-from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.post.plotting.table import pipe_table
+from flexclear.scene.registry import lookup
+from flexclear.system.errors import InputError
+from flexclear.workflow.fingerprint import TREE
 
 DOCS = TREE / "docs"
 #: columns of a table: heading, and the function that returns a record's cell

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.workflow.fingerprint import Sources
 
 ROOT = Path(__file__).parent.parent
 #: folders of the program; `flexclear` leads to the others by links

@@ -13,12 +13,12 @@ from dataclasses import asdict
 from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
+from flexclear.artifacts.paths import results_root
 from flexclear.commands import cost
 from flexclear.commands.scenes import find_scene, open_workplace
-from flexclear.pipeline.core.artifacts.paths import results_root
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.cost.answer import Studied, sections
-from flexclear.pipeline.post.plotting.table import Table, as_markdown, from_markdown
+from flexclear.post.cost.answer import Studied, sections
+from flexclear.post.plotting.table import Table, as_markdown, from_markdown
+from flexclear.scene.load import load_scene
 
 #: processor time of a study [s]
 STUDY = 3600.0

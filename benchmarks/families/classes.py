@@ -12,14 +12,14 @@ import numpy as np
 
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Record, each
 from benchmarks.page import Columns, table
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import scene_of
-from flexclear.pipeline.core.scene.registry import module_of
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import FlexclearError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.effects import RUNS
+from flexclear import dynamics
+from flexclear.dynamics import analyses
+from flexclear.dynamics.effects import RUNS
+from flexclear.scene.load import scene_of
+from flexclear.scene.registry import module_of
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import FlexclearError
+from flexclear.system.progress import silent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -352,7 +352,7 @@ def modules(case: Case) -> set[str]:
     """Return the modules that determine a case: its scene and the dynamics."""
     del case
     ways = {module_of(RUNS, name) for name in import_module(RUNS).NAMES}  # scenes request them by these names
-    return {__name__, "flexclear.pipeline.dynamics", *ways}
+    return {__name__, "flexclear.dynamics", *ways}
 
 
 FAMILY = Family(

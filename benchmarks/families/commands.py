@@ -17,8 +17,8 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, spread, table
 from benchmarks.processes import as_installed
 from benchmarks.timing import Times, interleaved, of_children
-from flexclear.pipeline.core.artifacts.paths import TREE, results_root
-from flexclear.pipeline.core.system.platforms import cores
+from flexclear.artifacts.paths import TREE, results_root
+from flexclear.system.platforms import cores
 
 #: number of rounds; single ones take up to a quarter longer on a machine that others use as well
 ROUNDS = 11

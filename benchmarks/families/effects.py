@@ -15,14 +15,14 @@ from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
 from benchmarks.timing import interleaved, once
 from flexclear.commands import effects, scenes
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engines, follow
-from flexclear.pipeline.post.answers.effect_sizes import written
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import engines, follow
+from flexclear.post.answers.effect_sizes import written
+from flexclear.scene.load import edited, load_scene
 from flexclear.stages.workplace import open_workplace
+from flexclear.system.progress import silent
 
 SCENE, RIGID = "sps4/far_csj_cb", "sps4/csj"
 #: watched quantities

@@ -12,13 +12,13 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, mechanism
 from benchmarks.page import Columns, short, table
 from benchmarks.timing import Times, in_turn, slope
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.schema import Ensemble
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.record import ensemble
+from flexclear import dynamics
+from flexclear.dynamics import analyses
+from flexclear.dynamics.record import ensemble
+from flexclear.scene.load import edited
+from flexclear.scene.schema import Ensemble
+from flexclear.system.progress import silent
+from flexclear.workflow import cores
 
 #: scenes, and the number of members in the paper's ensembles
 SCENES, MEMBERS = ("csj", "far_csj_cb"), 16

@@ -25,8 +25,8 @@ from benchmarks.mechanisms import Mechanism, damped, mechanism, without_friction
 from benchmarks.page import short
 from benchmarks.processes import LostError, Worker
 from benchmarks.timing import interleaved
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.post.plotting.table import pipe_table
+from flexclear.scene.schema import Scene
 
 BODY = "platform"
 #: velocity errors, as fractions of the largest speed, for which times are compared

@@ -27,11 +27,11 @@ import psutil
 from benchmarks import processes
 from benchmarks.family import FINISHED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
-from flexclear.pipeline.core.artifacts import maintenance
-from flexclear.pipeline.core.artifacts.disk import read_checked
-from flexclear.pipeline.core.artifacts.store import Store, read_record
-from flexclear.pipeline.core.workflow.journal import Journal
-from flexclear.pipeline.dynamics.compile.files import CODE, compiled
+from flexclear.artifacts import maintenance
+from flexclear.artifacts.disk import read_checked
+from flexclear.artifacts.store import Store, read_record
+from flexclear.dynamics.compile.files import CODE, compiled
+from flexclear.workflow.journal import Journal
 
 SCENE = "checks/pendulum"
 #: command -> its fraction of all kills, and its arguments; the sweep is of a scene that takes some seconds

@@ -12,14 +12,14 @@ import xarray as xr
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import DOCS
+from flexclear import dynamics
 from flexclear.commands.scenes import bundles, find_scene
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.post.single_run.series import derive
+from flexclear.dynamics import analyses
+from flexclear.post.single_run.series import derive
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
 from flexclear.stages import rendering
+from flexclear.system.progress import silent
 
 PICTURES = DOCS / "gallery"
 #: pictures: size [pixels], factor of the size at which they are drawn first, and number of colours, for small files
@@ -325,13 +325,13 @@ def measure(chosen: Sequence[Case], jobs: int) -> Measured:
 
 def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None:
     """Write the picture of a run, where this machine can draw."""
-    from flexclear.pipeline.post.render import gl
+    from flexclear.post.render import gl
 
     if not gl.works():
         return
     from PIL import Image
 
-    from flexclear.pipeline.post.render import film, mechanism, ruler
+    from flexclear.post.render import film, mechanism, ruler
 
     params = rendering.params(scene, "motion", "html")
     looks = mechanism.Looks(bodies=params["bodies"], **params.get("view", {}))

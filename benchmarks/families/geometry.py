@@ -17,15 +17,15 @@ from benchmarks import layouts
 from benchmarks.family import REFUSED, Case, Family, Record, each
 from benchmarks.layouts import DANGLE, DZ, Layout, answer, deviation_row
 from benchmarks.page import Columns, mean, table
+from flexclear import dynamics
 from flexclear.commands import scenes as stages
-from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
-from flexclear.papers.wang_wang_2019.models import JOINT, PLATFORM
-from flexclear.papers.wang_wang_2019.published import TABLE8, TABLE9
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
+from flexclear.dynamics import analyses
 from flexclear.stages.workplace import open_workplace
+from flexclear.system.errors import SolverError
+from flexclear.system.progress import silent
+from papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
+from papers.wang_wang_2019.models import JOINT, PLATFORM
+from papers.wang_wang_2019.published import TABLE8, TABLE9
 
 #: coarser grid [m], and stride at which layouts on this grid are simulated
 COARSE, SHOWN = 0.02, 5

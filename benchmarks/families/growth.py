@@ -17,13 +17,13 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, once, slope
+from flexclear import dynamics
 from flexclear.commands.scenes import bundles
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.scene.load import edited
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 
 LOOPS = (5, 10, 20, 40, 80)
 #: counts of Craig-Bampton modes (six are static) that cut no pair of equal frequencies, and the scene of the rod

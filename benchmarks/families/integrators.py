@@ -13,13 +13,13 @@ import xarray as xr
 
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
+from flexclear import dynamics
+from flexclear.artifacts.quantities import IMPACT
 from flexclear.commands.scenes import find_scene
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.quantities import IMPACT
-from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.system.progress import silent
+from flexclear.scene.integrators import INTEGRATORS
+from flexclear.scene.load import load_scene
+from flexclear.system.errors import SolverError
+from flexclear.system.progress import silent
 
 SCENE = "sps4/csj"
 RTOLS = (1e-6, 1e-8, 1e-10, 1e-12)

@@ -19,12 +19,12 @@ from benchmarks.family import Case, Family, Record, each
 from benchmarks.mechanisms import Mechanism, State, evaluation_time
 from benchmarks.page import Columns, short, spread, table
 from benchmarks.timing import interleaved, once, slope
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.system.progress import silent
 
 LOOPS = (5, 20)
 LINKS = (5, 10, 20, 40, 80, 150, 300)

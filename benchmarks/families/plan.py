@@ -19,19 +19,19 @@ import numpy as np
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, short, table
 from benchmarks.plan_scenes import Drawn, drawn
+from flexclear.artifacts import effect_size
+from flexclear.artifacts.effect_size import Agreement
+from flexclear.artifacts.points import Point
 from flexclear.commands import plan
 from flexclear.commands.plan import MEMBERS
-from flexclear.pipeline.core.artifacts import effect_size
-from flexclear.pipeline.core.artifacts.effect_size import Agreement
-from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.quantity import Quantity, parse
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import FlexclearError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, dataset, until_decided, verdict
+from flexclear.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, dataset, until_decided, verdict
+from flexclear.scene.load import edited
+from flexclear.scene.quantity import Quantity, parse
+from flexclear.scene.schema import Scene
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.workplace import check, open_workplace
+from flexclear.system.errors import FlexclearError
+from flexclear.system.progress import silent
 
 #: first of consecutive seeds that were never looked at before, number of seeds, and scenes of each
 SEED, SEEDS, SCENES = 5301, 3, 8

@@ -14,9 +14,9 @@ from benchmarks.page import Columns, mean, png, table
 from benchmarks.reference_conditions import claims, design, runs
 from benchmarks.reference_conditions.claims import Rows, at, far_error
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
-from flexclear.papers.wang_wang_2019.models import FAR_CB, FAR_FIXED, FAR_FREE
-from flexclear.pipeline.post.plotting.style import plt
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.post.plotting.style import plt
+from flexclear.post.plotting.table import pipe_table
+from papers.wang_wang_2019.models import FAR_CB, FAR_FIXED, FAR_FREE
 
 #: fraction of the compliance from which on a set is complete; error below which the mechanism's frequencies are right
 COMPLETE, RESOLVED = 0.99, 0.01

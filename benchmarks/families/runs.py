@@ -29,15 +29,15 @@ from benchmarks.mechanisms import SCENES, Mechanism, evaluation_time, mechanism,
 from benchmarks.page import Columns, short, spread, table
 from benchmarks.processes import as_installed
 from benchmarks.timing import interleaved, of_children, once
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.platforms import cores
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
-from flexclear.pipeline.dynamics.model.merge import frames_of, merge
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear import dynamics
+from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.model.merge import frames_of, merge
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.post.plotting.table import pipe_table
+from flexclear.scene.schema import Scene
+from flexclear.system.platforms import cores
+from flexclear.system.progress import silent
 
 ROUNDS = 5
 

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.family import Case, Family, Record, each
-from flexclear.pipeline.core.artifacts.store import write_dataset
-from flexclear.pipeline.post.plotting.table import pipe_table
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.artifacts.store import write_dataset
+from flexclear.post.plotting.table import pipe_table
 from flexclear.stages.cost_point import peak_memory
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
 
 MATERIAL = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
 FRAMES = {name: {"on": {"region": region}, "tie": "mean"} for name, region in (("bottom", "start"), ("top", "end"))}

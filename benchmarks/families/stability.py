@@ -13,9 +13,9 @@ from benchmarks import atlas
 from benchmarks.atlas import ALONG, CLOSURE, DEVIATION, LEDGER, RANGES, Parameters
 from benchmarks.family import FINISHED, REFUSED, WRONG, Family, Record
 from benchmarks.page import png
-from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS
-from flexclear.pipeline.post.plotting.style import SOFT, plt, style
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.post.plotting.style import SOFT, plt, style
+from flexclear.post.plotting.table import pipe_table
+from flexclear.scene.integrators import DEFAULT, INTEGRATORS
 
 TEXT = """{seeds}Parameters and results of every case, to the last digit: [its log](../benchmarks/log/stability.jsonl).
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.record.cost import Cost
+from flexclear.dynamics import analyses
+from flexclear.dynamics.record.cost import Cost
 from flexclear.stages.simulation import bundles, rebuild
 
 Files = dict[str, Any]

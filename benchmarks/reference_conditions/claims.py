@@ -15,7 +15,7 @@ from benchmarks.families.geometry import JOINTS
 from benchmarks.family import Record as Row
 from benchmarks.page import Columns, mean, table
 from benchmarks.reference_conditions.design import FULL, PLACES, RIGID
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.post.plotting.table import pipe_table
 
 #: two results agree, or one is right, when they differ by less than this fraction of the effect in question
 AGREE = 0.1

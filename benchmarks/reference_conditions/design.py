@@ -12,14 +12,14 @@ import xarray as xr
 
 from benchmarks.layouts import FIRST, Layout, by_condition, chosen, edits, family
 from flexclear.commands.scenes import find_scene
-from flexclear.pipeline.core.scene.load import load_scene, read_toml
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.scene.load import load_scene, read_toml
+from flexclear.scene.schema import Scene
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes.solution import solve
+from flexclear.system.errors import InputError
+from flexclear.workflow.task import Task
 
 ROD = "rod1"
 #: frame of the rod that carries the prismatic joint, by its distance from the rod's lower end [mm]

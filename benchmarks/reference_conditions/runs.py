@@ -15,8 +15,8 @@ from benchmarks.family import Record as Row
 from benchmarks.layouts import deviation_row
 from benchmarks.reference_conditions import design
 from benchmarks.reference_conditions.cases import BODY
-from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
 from flexclear.stages.workplace import Workplace, check, open_workplace
+from papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
 
 #: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
 DIRECTIONS = ("z", "x", "rz")

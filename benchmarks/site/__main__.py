@@ -10,7 +10,7 @@ from functools import partial
 
 from benchmarks.page import DOCS
 from benchmarks.site import keys, reference
-from flexclear.pipeline.core.workflow.fingerprint import TREE
+from flexclear.workflow.fingerprint import TREE
 
 
 def readme() -> str:

@@ -10,10 +10,10 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.sweep import Sweep
-from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.structure.fe.recipe import Recipe
+from flexclear.scene.schema import Scene
+from flexclear.scene.sweep import Sweep
+from flexclear.structure.fe.recipe import Recipe
+from flexclear.workflow.fingerprint import TREE
 
 #: unit of a number without unit, by quantity
 SI = {

@@ -8,13 +8,13 @@ import flexclear as fc
 from benchmarks.page import DOCS
 from benchmarks.site.keys import table
 from flexclear import public
-from flexclear.pipeline.core.artifacts import schema as artifacts
-from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
-from flexclear.pipeline.core.artifacts.schema import Schema
-from flexclear.pipeline.core.scene.output import Variable
-from flexclear.pipeline.core.scene.quantity import CONTACT_REDUCTIONS, KINDS, OWNERS, SERIES, WORDS, Kind
-from flexclear.pipeline.post.sections.verdict import VERDICT
-from flexclear.pipeline.post.single_run.schema import POST
+from flexclear.artifacts import schema as artifacts
+from flexclear.artifacts.coordinates import COORDINATES
+from flexclear.artifacts.schema import Schema
+from flexclear.post.sections.verdict import VERDICT
+from flexclear.post.single_run.schema import POST
+from flexclear.scene.output import Variable
+from flexclear.scene.quantity import CONTACT_REDUCTIONS, KINDS, OWNERS, SERIES, WORDS, Kind
 
 RECIPES = DOCS / "examples" / "datasets"
 #: datasets in the order in which they are computed: heading, location of the file, schema

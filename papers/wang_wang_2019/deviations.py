@@ -12,9 +12,9 @@ from dataclasses import astuple, dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
-from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, common_times
-from flexclear.pipeline.core.numerics.rotations import angle_about_y, rotation_between
+from flexclear.artifacts.quantities import SAME_TIME, common_times
+from flexclear.numerics.rotations import angle_about_y, rotation_between
+from papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
 
 #: variables of two runs that are compared
 COMPARED = ("quaternion", "position", "velocity")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.quantities import common_times
+from flexclear.artifacts.quantities import common_times
 
 PLATFORM = "platform"
 JOINT = "A1"

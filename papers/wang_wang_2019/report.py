@@ -14,12 +14,12 @@ from typing import Any
 
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019 import DOCUMENTS, figures
-from flexclear.papers.wang_wang_2019.published import CITATION, DISCREPANCIES
-from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.post.pages import Part, downloads, figures_of, media, page, prose
-from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, from_markdown
+from flexclear.post.pages import Part, downloads, figures_of, media, page, prose
+from flexclear.post.plotting.table import Table, as_csv, as_html, from_markdown
+from flexclear.system.progress import Progress
+from flexclear.workflow.fingerprint import TREE
+from papers.wang_wang_2019 import DOCUMENTS, figures
+from papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 
 #: place, text and scenes
 Assumption = tuple[str, str, tuple[str, ...]]

@@ -7,17 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from flexclear.papers.wang_wang_2019 import DOCUMENTS, figures, timing
-from flexclear.pipeline.core.artifacts.paths import DATA, TREE
-from flexclear.pipeline.core.artifacts.store import Record
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.registry import module_of
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.workflow.schedule import Outcome
-from flexclear.pipeline.core.workflow.task import Task
+from flexclear.artifacts.paths import DATA, TREE
+from flexclear.artifacts.store import Record
+from flexclear.scene.load import load_scene
+from flexclear.scene.registry import module_of
 from flexclear.stages import derived_series, kernels, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, check
+from flexclear.system.errors import InputError
+from flexclear.workflow.schedule import Outcome
+from flexclear.workflow.task import Task
+from papers.wang_wang_2019 import DOCUMENTS, figures, timing
 
 #: files with parts that the page shows, below the folder of the sources: pages, their pictures, variants of scenes
 PAGES = [pattern for name in DOCUMENTS for pattern in (f"docs/{name}.md", f"docs/{name}/*.png")]
@@ -59,7 +59,7 @@ class Scenes:
         self.times[family] = Task(
             stage="timing",
             scene=family,
-            run="flexclear.papers.wang_wang_2019.timing:run",
+            run="papers.wang_wang_2019.timing:run",
             params={g.scene.name: simulation.params(g.scene) for g in graphs},
             inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
             | _paper_kernels(graphs),
@@ -133,7 +133,7 @@ def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list
         stage="report",
         scene="report",
         part="page",
-        run="flexclear.papers.wang_wang_2019.report:run",
+        run="papers.wang_wang_2019.report:run",
         params={
             "results": str(workplace.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.dynamics import analyses
+from flexclear import dynamics
+from flexclear.dynamics import analyses
+from flexclear.scene.load import edited
 from flexclear.stages.simulation import bundles, rebuild
+from flexclear.system.errors import SolverError
+from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
-    from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.dynamics.record.cost import Cost
+    from flexclear.artifacts.labelled import Labelled
+    from flexclear.dynamics.record.cost import Cost
+    from flexclear.scene.schema import Scene
 
 #: equal error: relative error of the velocity of the body with most joints, over this first fraction of the run, in
 #: which all scenes can still be predicted point by point

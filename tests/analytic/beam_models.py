@@ -6,8 +6,8 @@ import numpy as np
 import scipy.linalg
 import xarray as xr
 
-from flexclear.pipeline.structure.fe import beam
-from flexclear.pipeline.structure.kinds import kind
+from flexclear.structure.fe import beam
+from flexclear.structure.kinds import kind
 from tests.analytic.beam_solutions import PAPER_ROD
 
 RECIPE = {

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.scene.schema import Scene
 from tests.properties.mechanisms import joint, rigid
 
 #: a tolerance at which no projection is made within these short runs, so that the method alone is seen

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from flexclear import dynamics
 from flexclear.commands import scenes as stages
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
+from flexclear.dynamics import analyses
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
 from flexclear.stages.workplace import Workplace, open_workplace
+from flexclear.system.progress import silent
 from tests.properties.mechanisms import simulated
 
 TREE = Path(__file__).resolve().parents[2]

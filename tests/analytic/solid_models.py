@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.structure.kinds import kind
+from flexclear.structure.kinds import kind
 
 #: Wang & Wang (2019), Table 2
 ALUMINIUM = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}

@@ -5,11 +5,10 @@ from contextlib import suppress
 
 import pytest
 
-from flexclear import load_scene
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear import dynamics, load_scene
+from flexclear.artifacts import quantities
+from flexclear.scene.quantity import parse
+from flexclear.system.errors import InputError, SolverError
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import simulated
 

@@ -7,11 +7,11 @@ import pytest
 import scipy.linalg
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.structure.fe import beam
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.numerics.rotations import rotation_vector_to_matrix
+from flexclear.structure.fe import beam
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, RECIPE, build, held_rows, order
 from tests.analytic.beam_solutions import PAPER_ROD, cantilever_compliance
 

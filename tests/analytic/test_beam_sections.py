@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe import section
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.structure.fe import section
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
+from flexclear.system.errors import InputError
 from tests.analytic.beam_models import GENERAL, RECIPE, WITHOUT_SHAPE, build, lowest
 
 # Timoshenko & Goodier, *Theory of Elasticity*, sec. 109: J = k1 b a^3 by b/a, printed digits

@@ -9,10 +9,10 @@ import pytest
 import xarray as xr
 from scipy.special import iv, jv, kv, yv
 
-from flexclear.pipeline.structure import closed_form
-from flexclear.pipeline.structure.fe import beam
-from flexclear.pipeline.structure.fe.recipe import read_recipe
-from flexclear.pipeline.structure.kinds import kind
+from flexclear.structure import closed_form
+from flexclear.structure.fe import beam
+from flexclear.structure.fe.recipe import read_recipe
+from flexclear.structure.kinds import kind
 from tests.analytic.beam_models import (
     BENDING,
     BENDING_Z,

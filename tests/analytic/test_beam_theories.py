@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from flexclear.pipeline.structure import closed_form
-from flexclear.pipeline.structure.closed_form import Span
-from flexclear.pipeline.structure.fe import beam
-from flexclear.pipeline.structure.fe.recipe import read_recipe
-from flexclear.pipeline.structure.fe.section import tube_shear_coefficient
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.structure import closed_form
+from flexclear.structure.closed_form import Span
+from flexclear.structure.fe import beam
+from flexclear.structure.fe.recipe import read_recipe
+from flexclear.structure.fe.section import tube_shear_coefficient
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
 from tests.analytic.beam_models import (
     BENDING,
     BENDING_Z,

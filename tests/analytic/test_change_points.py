@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.record.dataset import recorded
-from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges
-from flexclear.pipeline.dynamics.run.run import integrate
+from flexclear import dynamics
+from flexclear.dynamics.record.dataset import recorded
+from flexclear.dynamics.run.progress_rate import Judge, Judges
+from flexclear.dynamics.run.run import integrate
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 from tests.analytic import change_points as cp
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, simulate

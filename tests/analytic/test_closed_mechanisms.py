@@ -8,9 +8,9 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import analyses
+from flexclear.dynamics import analyses
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, frequencies, run
 from tests.properties import movable

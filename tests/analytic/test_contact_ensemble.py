@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.adaptive import LEAST_NORM
-from flexclear.pipeline.dynamics.kernels import INTERPRETED
-from flexclear.pipeline.dynamics.model.contacts import arms
-from flexclear.pipeline.dynamics.record import ensemble
-from flexclear.pipeline.dynamics.record.ensemble import difference_of_starts
-from flexclear.pipeline.dynamics.run import trajectory
-from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engine_of, engines
+from flexclear import dynamics
+from flexclear.dynamics import analyses
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate.adaptive import LEAST_NORM
+from flexclear.dynamics.kernels import INTERPRETED
+from flexclear.dynamics.model.contacts import arms
+from flexclear.dynamics.record import ensemble
+from flexclear.dynamics.record.ensemble import difference_of_starts
+from flexclear.dynamics.run import trajectory
+from flexclear.dynamics.run.evaluation import batched_evaluation
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import engine_of, engines
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import Progress, silent
+from flexclear.workflow import cores
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table, frame, ground, joint, rigid, simulated
 from tests.properties.mechanisms import scene as written

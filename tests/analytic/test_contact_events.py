@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 from pydantic import TypeAdapter
 
-from flexclear.pipeline.core.scene.solver import Solver
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.run.ledger import usual
-from flexclear.pipeline.post.single_run.series import derive
+from flexclear.dynamics.run.ledger import usual
+from flexclear.post.single_run.series import derive
+from flexclear.scene.solver import Solver
+from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import Overrides, impacts, of_kind, run
 from tests.properties.mechanisms import simulate
 from tests.reference import contact_solutions as exact

@@ -85,7 +85,7 @@ def test_rolling_friction_takes_next_to_nothing_and_never_drives() -> None:
 
 
 def test_a_start_in_contact_without_a_declared_speed_is_refused() -> None:
-    from flexclear.pipeline.core.system.errors import InputError
+    from flexclear.system.errors import InputError
 
     with pytest.raises(InputError, match="initial_approach_speed"):
         run(PRELOAD, (("joint.contact.initial_approach_speed", None),))
@@ -103,7 +103,7 @@ def test_the_slope_of_friction_is_reported_as_the_stiffness_that_limits_the_step
 
 
 def test_a_run_that_stiffness_makes_too_long_is_refused_in_words() -> None:
-    from flexclear.pipeline.core.system.errors import SolverError
+    from flexclear.system.errors import SolverError
 
     with pytest.raises(SolverError, match="limited by stability"):
         run(ROLLING, (("solver.evaluations", 20000),))

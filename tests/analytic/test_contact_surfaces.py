@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.schema import RUN
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import ideal
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.post.single_run.series import PIECES, derive, spread_over_surface
+from flexclear.artifacts.schema import RUN
+from flexclear.post.single_run.series import PIECES, derive, spread_over_surface
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.scene.variants import ideal
+from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, impacts, run
 from tests.properties.mechanisms import Table, frame, joint, rigid, scene, simulate
 from tests.reference import contact_solutions as exact

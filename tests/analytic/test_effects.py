@@ -6,13 +6,13 @@ import xarray as xr
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.mobility import analyse
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear import dynamics
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.mobility import analyse
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.load import load_scene
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, frequencies, impacts, run
 from tests.properties.mechanisms import rigid, scene, simulate
 

@@ -8,15 +8,15 @@ import pytest
 import xarray as xr
 from scipy.integrate import quad
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import edited, load_scene, scene_of
-from flexclear.pipeline.core.scene.quantity import parse_recorded
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear import dynamics
+from flexclear.dynamics import analyses
+from flexclear.dynamics.record.point import Runner
+from flexclear.scene.load import edited, load_scene, scene_of
+from flexclear.scene.quantity import parse_recorded
+from flexclear.scene.schema import Scene
 from flexclear.stages import simulation
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
 from tests.properties import mechanisms
 from tests.properties.mechanisms import joint, rigid
 
@@ -368,10 +368,10 @@ def test_only_scenes_with_events_reach_their_modules() -> None:
     """A part that an event brings in is in the key of the run."""
     with_events, without = press(), press(event={})
     packages = [[n for n in simulation.modules(one) if ".dynamics.events" in n] for one in (with_events, without)]
-    assert packages == [["flexclear.pipeline.dynamics.events.phases"], []]
+    assert packages == [["flexclear.dynamics.events.phases"], []]
     wave = {"law": {"type": "harmonic", "amplitude": [0.1], "frequency": [3.0]}}
     switched = press(event={"e": {"at": 0.1, "switch": "drive.motor", "to": wave}})
-    assert "flexclear.pipeline.dynamics.drives.harmonic" in simulation.modules(switched)
+    assert "flexclear.dynamics.drives.harmonic" in simulation.modules(switched)
     assert simulation.params(with_events) != simulation.params(press(**{"event.break.at": "abs(pin.force) > 41 N m"}))
 
 

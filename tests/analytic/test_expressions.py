@@ -9,15 +9,15 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.special import beta
 
-from flexclear.pipeline.core.scene.laws import Expression, Harmonic, Step
-from flexclear.pipeline.core.scene.load import edited, load_scene, scene_of
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.drives.pieces import Pieces, jump, pieces_of
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.dynamics import analyses
+from flexclear.dynamics.compile import sources
+from flexclear.dynamics.drives.pieces import Pieces, jump, pieces_of
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.laws import Expression, Harmonic, Step
+from flexclear.scene.load import edited, load_scene, scene_of
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, run
 from tests.analytic.test_events import GROUND, event_of, require_balanced, simulated
 from tests.properties.mechanisms import GRAVITY, Table, body, frame, ground, joint, rigid, scene, simulate

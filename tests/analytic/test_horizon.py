@@ -5,17 +5,17 @@ from functools import partial
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.quantities import DIVERGED, PERTURBATION, SEPARATED, lasting, separated_from
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.run.evaluation.observation import frames
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engine_of, observed
-from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.post.single_run.series import horizon
+from flexclear import dynamics
+from flexclear.artifacts.quantities import DIVERGED, PERTURBATION, SEPARATED, lasting, separated_from
+from flexclear.dynamics import analyses
+from flexclear.dynamics.run.evaluation.observation import frames
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.post.single_run.series import horizon
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 from tests.analytic import mechanism_runs
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import ground, joint, rigid, scene

@@ -6,17 +6,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.quantities import PERTURBATION
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.horizon.exponent import Growth, growth, start_direction
-from flexclear.pipeline.dynamics.run.horizon.tangents import differentiate
-from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.post.single_run.series import horizon
+from flexclear import dynamics
+from flexclear.artifacts.quantities import PERTURBATION
+from flexclear.dynamics import analyses
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.horizon.exponent import Growth, growth, start_direction
+from flexclear.dynamics.run.horizon.tangents import differentiate
+from flexclear.dynamics.run.run import engine_of
+from flexclear.post.single_run.series import horizon
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table
 from tests.properties.movable import Setting, scene

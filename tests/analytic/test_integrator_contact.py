@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from flexclear import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, run
 from tests.properties.mechanisms import simulated
 from tests.reference import contact_solutions as exact

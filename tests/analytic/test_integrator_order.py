@@ -7,14 +7,14 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear import dynamics
+from flexclear.dynamics import analyses
+from flexclear.dynamics.run import progress_rate, trajectory
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.scene.integrators import INTEGRATORS
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
 from tests.analytic.integrator_scenes import (
     NO_PROJECTION,
     SCENES,

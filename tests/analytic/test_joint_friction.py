@@ -12,12 +12,12 @@ import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BALL
-from flexclear.pipeline.dynamics.effects.joint_friction.equations import eliminate, find_loads
-from flexclear.pipeline.dynamics.specialise import dual
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.effects.joint_friction.bearings import BALL
+from flexclear.dynamics.effects.joint_friction.equations import eliminate, find_loads
+from flexclear.dynamics.specialise import dual
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import GRAVITY, Table, joint, rigid, scene, simulate
 
@@ -182,7 +182,7 @@ def of_wrench(kind: str, sizes: dict[str, Any], axis: np.ndarray, force: np.ndar
 
 def axes_of(dataset: xr.Dataset, table: Scene, name: str) -> list[np.ndarray]:
     """Along which the bearings of a joint lie, world axes, (time, 3) each."""
-    from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, quaternion_to_matrix
+    from flexclear.numerics.rotations import axes_to_matrix, quaternion_to_matrix
 
     found = []
     for frame, k in zip(table.joint[name].between, (0, 1), strict=True):

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.linear.bench import state
-from flexclear.pipeline.dynamics.linear.equilibrium import balanced
-from flexclear.pipeline.dynamics.linear.vibrations import vibrations
-from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.dynamics import analyses
+from flexclear.dynamics.linear.bench import state
+from flexclear.dynamics.linear.equilibrium import balanced
+from flexclear.dynamics.linear.vibrations import vibrations
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 from tests.analytic.beam_models import build, lowest
 from tests.analytic.mechanism_runs import TREE, bundles, frequencies
 from tests.properties.mechanisms import GRAVITY, Table, joint, rigid

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from flexclear.papers.wang_wang_2019.published import TABLE8
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_between
+from flexclear.numerics.rotations import quaternion_to_matrix, rotation_between
+from papers.wang_wang_2019.published import TABLE8
 from tests.analytic.mechanism_runs import (
     TREE,
     impacts,

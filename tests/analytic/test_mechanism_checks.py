@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_vector_to_matrix, skew
+from flexclear.numerics.rotations import quaternion_to_matrix, rotation_vector_to_matrix, skew
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate
 

@@ -8,22 +8,21 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear import load_scene
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.artifacts.effect_size import recorded as recorded_quantities
-from flexclear.pipeline.core.scene.load import edited, with_numbers
-from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.effects import schemes
-from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search, by_default
-from flexclear.pipeline.dynamics.run.method_choice.method_selection import Costs, Rates
-from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
+from flexclear import dynamics, load_scene
+from flexclear.artifacts import quantities
+from flexclear.artifacts.effect_size import recorded as recorded_quantities
+from flexclear.dynamics import analyses
+from flexclear.dynamics.effects import schemes
+from flexclear.dynamics.record.point import Runner
+from flexclear.dynamics.run import progress_rate, trajectory
+from flexclear.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search, by_default
+from flexclear.dynamics.run.method_choice.method_selection import Costs, Rates
+from flexclear.dynamics.run.progress_rate import Look, limited, pace
+from flexclear.scene.load import edited, with_numbers
+from flexclear.scene.quantity import parse
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 
 RINGING = TREE / "scenes" / "sps4" / "far_cb.toml"

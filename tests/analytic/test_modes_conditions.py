@@ -10,18 +10,18 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import compliance as core
-from flexclear.pipeline.core.artifacts import deficits as words
-from flexclear.pipeline.core.artifacts import modal
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe.model import Model
-from flexclear.pipeline.structure.fe.recipe import read_recipe
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.modes import bundle, deficits, eigen
-from flexclear.pipeline.structure.modes.basis import ModeRequest
-from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.pipeline.structure.modes.statics import Flexibility, support
+from flexclear.artifacts import compliance as core
+from flexclear.artifacts import deficits as words
+from flexclear.artifacts import modal
+from flexclear.structure.fe.model import Model
+from flexclear.structure.fe.recipe import read_recipe
+from flexclear.structure.kinds import kind
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.structure.modes import bundle, deficits, eigen
+from flexclear.structure.modes.basis import ModeRequest
+from flexclear.structure.modes.solution import solve
+from flexclear.structure.modes.statics import Flexibility, support
+from flexclear.system.errors import InputError
 
 MESHES = Path(__file__).parents[2] / "meshes"
 #: the rod of ../../meshes/actuated_rod.toml
@@ -104,8 +104,8 @@ def means(model: Model) -> sp.csr_array:
 def test_dense_and_sparse_solvers_agree_on_held_functionals(
     monkeypatch: pytest.MonkeyPatch, body: Flexibility, rows: Callable[[Model], sp.csr_array]
 ) -> None:
-    from flexclear.pipeline.core.system.progress import silent
-    from flexclear.pipeline.structure.modes import normal
+    from flexclear.structure.modes import normal
+    from flexclear.system.progress import silent
 
     held = rows(body.model)
     dense = normal.lowest(body.model, held, 8, lambda: body, silent)

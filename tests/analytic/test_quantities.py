@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.artifacts.quantities import evaluate
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.owners import COORDINATES
-from flexclear.pipeline.core.scene.quantity import KINDS, OF_CONTACTS, Quantity, Recorded, parse, parse_recorded
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import simulate
-from flexclear.pipeline.dynamics.model.driving import joint_type
-from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.post.overview import comparison
-from flexclear.pipeline.post.overview.curves import curves
+from flexclear.artifacts import quantities
+from flexclear.artifacts.quantities import evaluate
+from flexclear.dynamics import simulate
+from flexclear.dynamics.model.driving import joint_type
+from flexclear.dynamics.record.point import Runner
+from flexclear.post.overview import comparison
+from flexclear.post.overview.curves import curves
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.owners import COORDINATES
+from flexclear.scene.quantity import KINDS, OF_CONTACTS, Quantity, Recorded, parse, parse_recorded
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import run_with_sections
 from tests.properties import mechanisms
 from tests.properties.mechanisms import frame, joint, rigid, simulated
@@ -263,7 +263,7 @@ def test_accuracies_have_the_unit_of_the_quantity() -> None:
 )
 def test_any_quantity_can_be_asked_for_in_accuracy(name: str) -> None:
     """The run that is delivered errs by no more than was asked for, against the closed form where there is one."""
-    from flexclear.pipeline.dynamics.run.method_choice.accuracy import deliver
+    from flexclear.dynamics.run.method_choice.accuracy import deliver
 
     asked = edited(driven(), {"accuracy": {name: {"relative": 1e-6}}, "time.end": "20 ms"})
     done = deliver(asked, lambda one, _: simulate(edited(one, {"accuracy": None}), {}, silent), silent)

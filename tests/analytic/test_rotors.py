@@ -8,12 +8,12 @@ import xarray as xr
 from numpy.polynomial import Legendre
 from scipy.linalg import eigh
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
+from flexclear import dynamics
+from flexclear.dynamics import analyses
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, frequencies
 from tests.properties.mechanisms import GRAVITY, Table, joint, rigid, scene
 from tests.reference.turning_beams import SPIN_UP, WRIGHT

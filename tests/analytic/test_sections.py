@@ -8,16 +8,16 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flexclear as fc
+from flexclear import dynamics
 from flexclear.commands.__main__ import main
 from flexclear.commands.sections import write_page
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.post.sections import chaos
-from flexclear.pipeline.post.sections.verdict import derive, judge
+from flexclear.dynamics import analyses
+from flexclear.post.sections import chaos
+from flexclear.post.sections.verdict import derive, judge
+from flexclear.scene.load import edited
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
 
 N = 600
 

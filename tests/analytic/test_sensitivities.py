@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.load import edited, load_scene, number_at
-from flexclear.pipeline.core.scene.quantity import parse_recorded
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
-from flexclear.pipeline.dynamics.sensitivity.parameters import Parameter
+from flexclear.dynamics.record.point import Runner
+from flexclear.dynamics.sensitivity.dataset import sensitivities
+from flexclear.dynamics.sensitivity.parameters import Parameter
+from flexclear.scene.load import edited, load_scene, number_at
+from flexclear.scene.quantity import parse_recorded
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint
 from tests.properties.mechanisms import scene as small
@@ -61,7 +61,7 @@ def test_a_pendulum_swings_faster_with_gravity() -> None:
     scene = load("pendulum")
     number = "load.gravity.acceleration.1"
     found = sensitivities(scene, {}, silent, ["hinge.position", "hinge.velocity.final"], [number, "body.bob.mass"])
-    from flexclear.pipeline import dynamics
+    from flexclear import dynamics
 
     run = dynamics.simulate(scene, {}, silent)
     rate = run.joint_velocity.sel(coordinate="hinge").interp(time=found.time).values

@@ -7,14 +7,14 @@ import scipy.sparse.linalg
 from skfem import Basis, ElementHex1, ElementTetP2, ElementVector, MeshHex, MeshTet2
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.structure.fe.solid import elasticity, lattice
-from flexclear.pipeline.structure.fe.solid.elasticity import Solid
-from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, shape_functions
-from flexclear.pipeline.structure.fe.solid.geometry import Geometry, check
-from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.sparse.dissection import dissect
-from flexclear.pipeline.structure.sparse.multifrontal import Front, cholesky, negative_pivots
+from flexclear.structure.fe.solid import elasticity, lattice
+from flexclear.structure.fe.solid.elasticity import Solid
+from flexclear.structure.fe.solid.elements import ELEMENTS, shape_functions
+from flexclear.structure.fe.solid.geometry import Geometry, check
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.structure.sparse.dissection import dissect
+from flexclear.structure.sparse.multifrontal import Front, cholesky, negative_pivots
+from flexclear.system.errors import InputError, SolverError
 from tests.analytic.solid_models import block, build
 
 LAME, SHEAR = lame_parameters(7.17e10, 0.33)

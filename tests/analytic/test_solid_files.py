@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe.solid import lattice
-from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.structure.fe.solid import lattice
+from flexclear.structure.fe.solid.elements import ELEMENTS
+from flexclear.structure.modes.solution import solve
+from flexclear.system.errors import InputError
 from tests.analytic.solid_models import ALUMINIUM, build
 
 STEEL = {"density": 7800.0, "youngs_modulus": 2.1e11, "poisson": 0.3}

@@ -9,14 +9,14 @@ import scipy.io
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe.exchange import files
-from flexclear.pipeline.structure.fe.model import Model
-from flexclear.pipeline.structure.fe.recipe import read_recipe
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.structure.fe.exchange import files
+from flexclear.structure.fe.model import Model
+from flexclear.structure.fe.recipe import read_recipe
+from flexclear.structure.kinds import kind
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
+from flexclear.system.errors import InputError
 from tests.analytic.beam_models import RECIPE
 from tests.analytic.solid_models import block, build
 

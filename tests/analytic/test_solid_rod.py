@@ -10,16 +10,16 @@ import xarray as xr
 from pydantic import ValidationError
 
 import flexclear as fc
+from flexclear.artifacts.store import write_dataset
 from flexclear.commands.__main__ import main
-from flexclear.pipeline.core.artifacts.store import write_dataset
-from flexclear.pipeline.core.scene.parts import FlexibleBody, Modes
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.structure.fe.exchange import files
-from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.scene.parts import FlexibleBody, Modes
 from flexclear.stages import meshing, modal_analysis, reduction
+from flexclear.structure.fe.exchange import files
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
 from tests.analytic.solid_models import ALUMINIUM, block, build, rod
 
 #: exact Timoshenko (kappa 0.8886), torsion and axial frequencies [Hz] of the free rod, as in docs/paper.md
@@ -148,8 +148,8 @@ def stored(data: xr.Dataset, path: Path) -> xr.Dataset:
 def test_a_solid_goes_through_the_stages(tmp_path: Path) -> None:
     recipe = MESHES / "checks" / "solid_rod.toml"
     body = FlexibleBody(type="flexible", mesh=str(recipe), modes=Modes(reference="craig-bampton", up_to="5000 Hz"))
-    assert meshing.modules(recipe) == ("flexclear.pipeline.structure.kinds.solid",)
-    assert "flexclear.pipeline.structure.kinds.solid" in modal_analysis.modules(body, "scene")
+    assert meshing.modules(recipe) == ("flexclear.structure.kinds.solid",)
+    assert "flexclear.structure.kinds.solid" in modal_analysis.modules(body, "scene")
     made = meshing.run(meshing.params(recipe), {}, silent)
     mesh = stored(made["nc"], tmp_path / "mesh.nc")
     solved = modal_analysis.run(modal_analysis.params(body), {"mesh": mesh}, silent)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.starts import ideal, snapshot
+from flexclear.dynamics.starts import ideal, snapshot
+from flexclear.scene.clearance import ClearanceRevolute
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import simulated
 from tests.properties.test_assembly import loose
@@ -178,7 +178,7 @@ def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_
     Pin and journal touch as deep as carries the force of the twin's joint. Of the two ways in which the twin can be
     assembled where only the drive says how its crank stands, one is taken, and both are reported.
     """
-    template = TREE / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
+    template = TREE / "pipeline" / "flexclear" / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
     stop = {"joint": "guide", "upper": "0.4 m", "normal": {"law": "flores", "restitution": 0.5, "stiffness": 1e8}}
     unplaced = {f"body.{name}.pose": None for name in ("crank", "rod", "slider")}
     law = {"type": "polynomial", "coefficients": ["20 deg", "100 rpm"]}
@@ -204,7 +204,7 @@ def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_
 
 def test_flexible_bodies_begin_an_ideal_start_as_its_loads_hold_them() -> None:
     """Their modes do not accelerate then, so that no first peak of a force is that of springing into their shape."""
-    template = TREE / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
+    template = TREE / "pipeline" / "flexclear" / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
     scene = edited(load_scene(template), {"start": {"at": "ideal"}})
     engine, y = ideal._started(ideal.placed(scene), bundles(scene), lambda fraction, text: None)
     speeds = ideal._modal_speeds(engine)

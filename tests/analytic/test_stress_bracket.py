@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import skfem
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix, von_mises
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
+from flexclear import dynamics
+from flexclear.numerics.rotations import rotation_vector_to_matrix, von_mises
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.analytic.solid_models import build
 from tests.analytic.test_stress_solid import by_scikit_fem, everywhere, nodes_of

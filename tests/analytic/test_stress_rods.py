@@ -9,15 +9,15 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.record.stress import Motion, peak_stresses, section_forces
-from flexclear.pipeline.structure.fe import section as sections
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.pipeline.structure.stress.beam import Outline, outline, recover
+from flexclear.dynamics.record.stress import Motion, peak_stresses, section_forces
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.scene.load import load_scene
 from flexclear.stages.graph import Graph
+from flexclear.structure.fe import section as sections
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
+from flexclear.structure.stress.beam import Outline, outline, recover
+from flexclear.system.errors import InputError
 from tests.analytic.beam_models import GENERAL, build
 from tests.analytic.beam_solutions import PAPER_ROD as ROD
 from tests.analytic.mechanism_runs import run_with_sections as run
@@ -116,7 +116,7 @@ def test_round_outlines_carry_no_shear_across_themselves(
 @pytest.mark.parametrize("hole", [0.0, HOLE])
 def test_shear_of_a_round_section_sums_to_its_force(hole: float) -> None:
     """Midpoint rule on rings made of the maps of thin tubes would hide the hole; so fibres of the solution itself."""
-    from flexclear.pipeline.structure.stress.beam import _flexure
+    from flexclear.structure.stress.beam import _flexure
 
     n = 200
     r = hole + (np.arange(n) + 0.5) / n * (R - hole)
@@ -180,9 +180,9 @@ def test_absent_means_not_in_any_key(root: Path) -> None:
     for graph, there in ((without, False), (asked, True)):
         bundles, simulate = graph.bundle["rod"], graph.simulate
         assert ("stress" in bundles.params) is there
-        assert ("flexclear.pipeline.structure.stress.beam" in bundles.modules) is there
+        assert ("flexclear.structure.stress.beam" in bundles.modules) is there
         assert ("stress" in simulate.params["scene"]["output"]) is there
-        assert ("flexclear.pipeline.dynamics.record.stress" in simulate.modules) is there
+        assert ("flexclear.dynamics.record.stress" in simulate.modules) is there
 
 
 @pytest.mark.parametrize("names", [["wall"], ["rod", "ground"], []])

@@ -14,19 +14,19 @@ import xarray as xr
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 import flexclear as fc
-from flexclear.pipeline.core.artifacts import modal  # noqa: F401  (registers `dataset.modal`)
-from flexclear.pipeline.core.numerics.rotations import components, matrices, principal, von_mises
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import FlexclearError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.render import player
-from flexclear.pipeline.post.render.mechanism import mechanism
-from flexclear.pipeline.post.shapes import body_shape
-from flexclear.pipeline.post.single_run.series import derive
-from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
-from flexclear.pipeline.structure.fe.solid.model import solid_of, unknowns_of
-from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.stress.solid import at_nodes
+from flexclear.artifacts import modal  # noqa: F401  (registers `dataset.modal`)
+from flexclear.numerics.rotations import components, matrices, principal, von_mises
+from flexclear.post.render import player
+from flexclear.post.render.mechanism import mechanism
+from flexclear.post.shapes import body_shape
+from flexclear.post.single_run.series import derive
+from flexclear.scene.load import load_scene
+from flexclear.structure.fe.solid.elements import ELEMENTS
+from flexclear.structure.fe.solid.model import solid_of, unknowns_of
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.structure.stress.solid import at_nodes
+from flexclear.system.errors import FlexclearError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import bundles, run_with_sections
 from tests.analytic.solid_models import ALUMINIUM, block, build
 
@@ -69,7 +69,7 @@ def cantilever(folder: Path, recipe: dict[str, Any], modes: dict[str, Any], **mo
     for key, value in more.items():
         table[key] = table.get(key, {}) | value
     scene = load_scene(written(folder, "scene.toml", table))
-    from flexclear.pipeline import dynamics
+    from flexclear import dynamics
 
     made = bundles(scene)
     return made["part"], dynamics.simulate(scene, made, silent)

@@ -7,13 +7,13 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.record.dataset import recorded
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.run import integrate
+from flexclear.dynamics.record.dataset import recorded
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.run import integrate
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError
 from tests.analytic import four_bars
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import Table, simulate

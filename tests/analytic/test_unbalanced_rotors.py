@@ -13,13 +13,13 @@ from numpy.testing import assert_allclose
 from benchmarks.families.classes import ACROSS, ALONG, ARM, MASS, MIXED, SIDE, SLOPE, deflection, rotor
 from flexclear.commands.__main__ import main
 from flexclear.commands.frequencies import speeds
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.linear.campbell import campbell
+from flexclear.dynamics import analyses
+from flexclear.dynamics.linear.campbell import campbell
+from flexclear.numerics.rotations import rotation_vector_to_matrix
+from flexclear.scene.load import edited
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, frequencies
 from tests.properties.mechanisms import GRAVITY, Table, joint, rigid, scene
 

@@ -9,17 +9,17 @@ import pytest
 import xarray as xr
 
 from benchmarks.families import classes
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
-from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.dynamics import analyses
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
+from flexclear.dynamics.run.run import engine_of
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate, simulated
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.structure.fe.solid.elements import shape_functions
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.numerics.rotations import rotation_vector_to_matrix
+from flexclear.structure.fe.solid.elements import shape_functions
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
 from tests.analytic import solid_models
 from tests.analytic.beam_models import RECIPE
 from tests.analytic.beam_solutions import PAPER_ROD

@@ -11,14 +11,10 @@ from typing import Any
 
 import pytest
 
-from flexclear.pipeline.core.scene.load import compose, load_scene
-from flexclear.pipeline.core.scene.registry import module_of
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.workflow import fingerprint
-from flexclear.pipeline.dynamics import loads
-from flexclear.pipeline.dynamics.compile import functions, reach
-from flexclear.pipeline.dynamics.compile.reach import imported
-from flexclear.pipeline.dynamics.compile.sources import (
+from flexclear.dynamics import loads
+from flexclear.dynamics.compile import functions, reach
+from flexclear.dynamics.compile.reach import imported
+from flexclear.dynamics.compile.sources import (
     DESCRIBED,
     batched,
     kernels,
@@ -26,33 +22,37 @@ from flexclear.pipeline.dynamics.compile.sources import (
     specialised,
     tangent,
 )
-from flexclear.pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
-from flexclear.pipeline.dynamics.effects.declared import EFFECTS as DECLARED
-from flexclear.pipeline.dynamics.effects.effect import PACKAGE
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.specialise.topology import topology_of
+from flexclear.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
+from flexclear.dynamics.effects.declared import EFFECTS as DECLARED
+from flexclear.dynamics.effects.effect import PACKAGE
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.specialise.topology import topology_of
+from flexclear.scene.load import compose, load_scene
+from flexclear.scene.registry import module_of
+from flexclear.scene.schema import Scene
+from flexclear.workflow import fingerprint
 from tests.analytic.mechanism_runs import bundles
 from tests.processes import printed
 
-DYNAMICS = "flexclear.pipeline.dynamics"
+DYNAMICS = "flexclear.dynamics"
 CONTACT = (
-    "flexclear.pipeline.dynamics.contact",
-    "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical",
-    "flexclear.pipeline.dynamics.integrate.contact_events",
-    "flexclear.pipeline.dynamics.integrate.contact_phases",
+    "flexclear.dynamics.contact",
+    "flexclear.dynamics.contact.surfaces.clearance_spherical",
+    "flexclear.dynamics.integrate.contact_events",
+    "flexclear.dynamics.integrate.contact_phases",
 )
 APPLIED = (
-    "flexclear.pipeline.dynamics.loads.fields",
-    "flexclear.pipeline.dynamics.loads.composing",
-    "flexclear.pipeline.dynamics.drives.oscillation",
-    "flexclear.pipeline.dynamics.starts",
-    "flexclear.pipeline.dynamics.linear",
+    "flexclear.dynamics.loads.fields",
+    "flexclear.dynamics.loads.composing",
+    "flexclear.dynamics.drives.oscillation",
+    "flexclear.dynamics.starts",
+    "flexclear.dynamics.linear",
 )
-BODIES = "flexclear.pipeline.dynamics.bodies"
-FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.interface", f"{BODIES}.ports", "flexclear.pipeline.structure")
+BODIES = "flexclear.dynamics.bodies"
+FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.interface", f"{BODIES}.ports", "flexclear.structure")
 #: ways over singular poses and out of them, which no run takes that meets none
-POSES = "flexclear.pipeline.dynamics.run.singular_poses"
+POSES = "flexclear.dynamics.run.singular_poses"
 SINGULAR = tuple(f"{POSES}.{name}" for name in ("collocation", "passing", "beginning"))
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
@@ -61,16 +61,16 @@ CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 RUN = """
 import sys
 from dataclasses import replace
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear import dynamics
+from flexclear.scene.load import load_scene
 dynamics.simulate(load_scene(sys.argv[1], {"time.end": "0.2 ms"}), {}, lambda share, text: None)
-print(*[name for name in sys.modules if name.startswith("flexclear.pipeline.")])
+print(*[name for name in sys.modules if name.startswith("flexclear.")])
 """
 #: reads a scene, then says which models of its parts have a schema of their own
 BUILT = """
 import sys
-from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.scene.fields import Part
+from flexclear.scene.load import load_scene
 load_scene(sys.argv[1])
 found = [Part]
 for model in found:
@@ -94,7 +94,7 @@ def below(names: Set[str], families: tuple[str, ...]) -> set[str]:
 
 def test_a_run_of_an_ideal_scene_imports_no_contact_and_no_flexible_body(root: Path) -> None:
     names = imported_by_a_run(root, IDEAL)
-    assert "flexclear.pipeline.dynamics.joints.spherical" in names
+    assert "flexclear.dynamics.joints.spherical" in names
     assert below(names, (*CONTACT, *FLEXIBLE, *APPLIED, *SINGULAR)) == set()
 
 
@@ -104,7 +104,7 @@ def code_of_effects(names: Set[str]) -> set[str]:
 
 
 def test_declarations_of_effects_are_read_without_their_code() -> None:
-    text = "import sys; from flexclear.pipeline.dynamics import effects; print(*sys.modules)"
+    text = "import sys; from flexclear.dynamics import effects; print(*sys.modules)"
     names = set(printed(text).split())
     assert {f"{PACKAGE}.{effect.name}.effect" for effect in DECLARED} <= names
     assert code_of_effects(names) == set()
@@ -130,8 +130,8 @@ def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
     """Also shows that the test above would notice."""
     names = imported_by_a_run(root, CSJ)
     laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
-    normal = {"flexclear.pipeline.dynamics.contact.normal.lankarani_nikravesh"}
-    friction = "flexclear.pipeline.dynamics.contact.friction"
+    normal = {"flexclear.dynamics.contact.normal.lankarani_nikravesh"}
+    friction = "flexclear.dynamics.contact.friction"
     assert laws == normal | {f"{friction}.{n}" for n in ("law", "modified_coulomb")}
     assert below(names, (*FLEXIBLE, *SINGULAR)) == set()
 
@@ -162,20 +162,20 @@ def reached(texts: dict[str, str]) -> set[str]:
 
 #: effect -> word that its generated source must have, modules it must reach
 EFFECTS = {
-    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical"),
-    "normal law": ("import hysteretic", "flexclear.pipeline.dynamics.contact.form.hysteretic"),
-    "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
-    "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
-    "closures": ("closures=", "flexclear.pipeline.dynamics.equations.closures"),
-    "singular poses": ("poses=singular_step", "flexclear.pipeline.dynamics.integrate.singular_step"),
-    "couplings": ("make_coupled_closing", "flexclear.pipeline.dynamics.effects.gears.equations"),
-    "stops": ("make_stops", "flexclear.pipeline.dynamics.effects.stops.contact"),
-    "stiffening": ("flexible_bodies(bodies)", "flexclear.pipeline.dynamics.effects.stiffening.bodies"),
-    "loads": ("make_loads", "flexclear.pipeline.dynamics.loads.composing"),
-    "harmonics": ("import oscillate", "flexclear.pipeline.dynamics.drives.oscillation"),
-    "joint friction": ("make_joint_friction", "flexclear.pipeline.dynamics.effects.joint_friction.equations"),
-    "wear": ("import wearing", "flexclear.pipeline.dynamics.effects.wear.contact"),
-    "guards": ("integrate.guards import", "flexclear.pipeline.dynamics.integrate.guards"),
+    "contact": ("clearance_spherical", "flexclear.dynamics.contact.surfaces.clearance_spherical"),
+    "normal law": ("import hysteretic", "flexclear.dynamics.contact.form.hysteretic"),
+    "friction": ("modified_coulomb", "flexclear.dynamics.contact.friction.modified_coulomb"),
+    "flexible bodies": ("flexible_bodies", "flexclear.dynamics.bodies.flexible"),
+    "closures": ("closures=", "flexclear.dynamics.equations.closures"),
+    "singular poses": ("poses=singular_step", "flexclear.dynamics.integrate.singular_step"),
+    "couplings": ("make_coupled_closing", "flexclear.dynamics.effects.gears.equations"),
+    "stops": ("make_stops", "flexclear.dynamics.effects.stops.contact"),
+    "stiffening": ("flexible_bodies(bodies)", "flexclear.dynamics.effects.stiffening.bodies"),
+    "loads": ("make_loads", "flexclear.dynamics.loads.composing"),
+    "harmonics": ("import oscillate", "flexclear.dynamics.drives.oscillation"),
+    "joint friction": ("make_joint_friction", "flexclear.dynamics.effects.joint_friction.equations"),
+    "wear": ("import wearing", "flexclear.dynamics.effects.wear.contact"),
+    "guards": ("integrate.guards import", "flexclear.dynamics.integrate.guards"),
 }
 SPRING = ("spring-damper",)
 SMOOTH = {"surfaces": ("clearance-spherical",), "forms": ("hysteretic",)}
@@ -238,8 +238,8 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     found, present = CASES[case]
     modules = reached(generated(found))
     requested = {module_of(JOINTS, n) for n in found.joints}
-    requested.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
-    assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == requested
+    requested.add("flexclear.dynamics.joints.coordinate")  # with which every joint names its freedoms
+    assert below(modules, ("flexclear.dynamics.joints",)) == requested
     if not {"contact", "stops", "joint friction"} & present:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:
@@ -260,7 +260,7 @@ def test_lines_of_generated_files_tell_all_that_they_import(case: str) -> None:
 
 def test_frictionless_clearance_reaches_no_friction_law() -> None:
     modules = reached(generated(CASES["smooth clearance"][0]))
-    assert below(modules, ("flexclear.pipeline.dynamics.contact.friction",)) == set()
+    assert below(modules, ("flexclear.dynamics.contact.friction",)) == set()
 
 
 # What the machine code is keyed by ----------------------------------------------------------------------------------
@@ -277,7 +277,7 @@ def test_the_tables_of_all_effects_are_part_of_the_key() -> None:
 
 def test_the_numbers_of_event_kinds_are_part_of_the_key() -> None:
     """Kernels have them compiled in, and datasets hold them: code of another numbering must not be taken."""
-    assert "flexclear.pipeline.core.scene.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
+    assert "flexclear.scene.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
 
 
 def digest(scene: Scene) -> str:
@@ -404,8 +404,8 @@ def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
 BOTH = """
 import sys
 from dataclasses import replace
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear import dynamics
+from flexclear.scene.load import load_scene
 for path in sys.argv[1:]:
     done = dynamics.simulate(load_scene(path, {"time.end": "0.2 ms"}), {}, lambda share, text: None)
     assert abs(done.energy_error).max() < 1e-9, path

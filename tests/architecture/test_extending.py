@@ -20,14 +20,14 @@ from tests.processes import copied, printed, python
 
 #: example -> folder that its module is put in
 PLACES = {
-    "kutta3": "pipeline/dynamics/integrate",
-    "pin_in_slot": "pipeline/dynamics/joints",
-    "safaeifar_farshidianfar": "pipeline/dynamics/contact/normal",
-    "smooth_coulomb": "pipeline/dynamics/contact/friction",
-    "quadratic_drag": "pipeline/dynamics/loads",
-    "cycloidal": "pipeline/dynamics/drives",
-    "momentum": "pipeline/dynamics/record",
-    "mass": "flexclear/commands",
+    "kutta3": "pipeline/flexclear/dynamics/integrate",
+    "pin_in_slot": "pipeline/flexclear/dynamics/joints",
+    "safaeifar_farshidianfar": "pipeline/flexclear/dynamics/contact/normal",
+    "smooth_coulomb": "pipeline/flexclear/dynamics/contact/friction",
+    "quadratic_drag": "pipeline/flexclear/dynamics/loads",
+    "cycloidal": "pipeline/flexclear/dynamics/drives",
+    "momentum": "pipeline/flexclear/dynamics/record",
+    "mass": "pipeline/flexclear/commands",
 }
 
 
@@ -181,7 +181,7 @@ def test_the_page_shows_what_is_tested(root: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["effect", "contact", "model", "record"])
 def test_the_page_shows_the_folder_of_an_effect(root: Path, name: str) -> None:
-    path = "pipeline/dynamics/effects/wear"
+    path = "pipeline/flexclear/dynamics/effects/wear"
     page = (root / "docs" / "extending.md").read_text()
     assert f"`{path}/{name}.py`:\n\n```python\n{(root / path / name).with_suffix('.py').read_text()}```" in page
     assert {one.stem for one in (root / path).glob("*.py")} == {"__init__", "effect", "contact", "model", "record"}
@@ -197,13 +197,13 @@ HEUN = '''"""Heun's method of order 2, with Euler's as its error estimate."""
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate import hermite
-from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
-from flexclear.pipeline.dynamics.integrate.norms import error_scale
-from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
-from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.scene.integrators import INTEGRATORS
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate import hermite
+from flexclear.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from flexclear.dynamics.integrate.norms import error_scale
+from flexclear.dynamics.integrate.runge_kutta import make_stages
+from flexclear.dynamics.kernels import kernel
 
 A = np.array([[0.0, 0.0], [1.0, 0.0]])
 B, C = np.array([0.5, 0.5]), np.array([0.0, 1.0])
@@ -241,15 +241,15 @@ ASKED = """
 import json
 from pathlib import Path
 from flexclear.commands import cost_design
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.json_schema import scene_schema
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import FlexclearError
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.dynamics.compile.functions import digest
-from flexclear.pipeline.dynamics.compile.sources import sources
-from flexclear.pipeline.dynamics.effects import Parts, Scheme
-from flexclear.pipeline.post.cost.work_precision import LOOKS
+from flexclear import dynamics
+from flexclear.scene.json_schema import scene_schema
+from flexclear.scene.load import load_scene
+from flexclear.system.errors import FlexclearError
+from flexclear.workflow.fingerprint import Sources
+from flexclear.dynamics.compile.functions import digest
+from flexclear.dynamics.compile.sources import sources
+from flexclear.dynamics.effects import Parts, Scheme
+from flexclear.post.cost.work_precision import LOOKS
 from flexclear.stages import simulation
 
 silent = lambda share, text: None
@@ -285,8 +285,8 @@ IMPORTS = ASKED[: ASKED.index("silent = ")]
 @pytest.fixture(scope="module")
 def heun(root: Path, tree: Path) -> dict[str, Any]:
     """What the tree answers when Heun's method is added to it by a module and a line."""
-    (tree / "pipeline/dynamics/integrate/heun_euler.py").write_text(HEUN)
-    listed = tree / "pipeline/core/scene/integrators.py"
+    (tree / "pipeline/flexclear/dynamics/integrate/heun_euler.py").write_text(HEUN)
+    listed = tree / "pipeline/flexclear/scene/integrators.py"
     before, above, after = listed.read_text().partition(ABOVE)
     assert above
     listed.write_text(f"{before}{LINE}\n        {above}{after}")
@@ -331,7 +331,7 @@ def test_figures_distinguish_it_from_all_others(heun: dict[str, Any]) -> None:
 
 def test_keys_hold_its_module_and_what_goes_on_for_it(heun: dict[str, Any]) -> None:
     new, own = map(set, heun["keys"])
-    package = "flexclear.pipeline.dynamics.integrate"
+    package = "flexclear.dynamics.integrate"
     assert {f"{package}.heun_euler", f"{package}.radau"} <= new
     assert f"{package}.heun_euler" not in own
 

@@ -5,18 +5,18 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.core.scene.solver import Solver
-from flexclear.pipeline.dynamics.compile import reach
-from flexclear.pipeline.dynamics.compile.sources import sources
-from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
-from flexclear.pipeline.dynamics.equations import composite
-from flexclear.pipeline.dynamics.integrate import NAMES
-from flexclear.pipeline.dynamics.integrate.method import keep_nothing
+from flexclear.dynamics.compile import reach
+from flexclear.dynamics.compile.sources import sources
+from flexclear.dynamics.effects import Parts, Scheme, scheme_of
+from flexclear.dynamics.equations import composite
+from flexclear.dynamics.integrate import NAMES
+from flexclear.dynamics.integrate.method import keep_nothing
+from flexclear.scene.integrators import INTEGRATORS
+from flexclear.scene.load import load_scene
+from flexclear.scene.registry import lookup
+from flexclear.scene.solver import Solver
 
-PACKAGE = "flexclear.pipeline.dynamics.integrate"
+PACKAGE = "flexclear.dynamics.integrate"
 PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 #: modules of one integrator, reached by those that name it only
 PRIVATE = {

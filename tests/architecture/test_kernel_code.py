@@ -11,9 +11,9 @@ import pytest
 from numba import carray, cfunc, njit
 from numba.core.codegen import CPUCodeLibrary
 
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.kernels import kernel, release_is_tested
-from flexclear.pipeline.dynamics.lowering import Part, Whole, WholeCompiler
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.kernels import kernel, release_is_tested
+from flexclear.dynamics.lowering import Part, Whole, WholeCompiler
 
 #: with other releases kernels compile as Numba does it, to the same results
 needs_lowering = pytest.mark.skipif(not release_is_tested(), reason="`lowering` has not been tested with this release")
@@ -148,7 +148,7 @@ def kernels_of(root: Path) -> tuple[tuple[str, ast.FunctionDef], ...]:
     """All kernels, with the paths of their modules."""
     return tuple(
         (str(path.relative_to(root)), found)
-        for path in sorted((root / "pipeline" / "dynamics").rglob("*.py"))
+        for path in sorted((root / "pipeline" / "flexclear" / "dynamics").rglob("*.py"))
         for found in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(found, ast.FunctionDef) and "kernel" in map(ast.unparse, found.decorator_list)
     )

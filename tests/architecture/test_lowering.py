@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numba import cfunc
 
-from flexclear.pipeline.dynamics import kernels
-from flexclear.pipeline.dynamics.compile import machine_code
+from flexclear.dynamics import kernels
+from flexclear.dynamics.compile import machine_code
 from tests.processes import printed
 
 #: each in a process of its own that begins where Numba has compiled once
@@ -24,8 +24,8 @@ for hide in sys.argv[1:]:
         continue
     try:
         exec(hide)
-        from flexclear.pipeline.dynamics import kernels
-        from flexclear.pipeline.dynamics.vectors import cross
+        from flexclear.dynamics import kernels
+        from flexclear.dynamics.vectors import cross
         @njit
         def probe(a, b):
             return cross(a, b)
@@ -35,7 +35,7 @@ for hide in sys.argv[1:]:
 """
 #: hidden from `lowering` alone: Numba itself needs it
 HERE = """
-import flexclear.pipeline.dynamics.lowering as lowering
+import flexclear.dynamics.lowering as lowering
 @property
 def hidden(self):
     raise AttributeError

@@ -5,12 +5,12 @@ import pytest
 from numba import njit, types
 from numba.core.errors import NumbaError, TypingError
 
-import flexclear.pipeline.dynamics.compile.calls  # noqa: F401  (registers the types of named fields)
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects.declared import EFFECTS
-from flexclear.pipeline.dynamics.fields import Data, data
-from flexclear.pipeline.dynamics.memory import ARRAYS, row_fields
-from flexclear.pipeline.dynamics.memory import NAMED as TABLES
+import flexclear.dynamics.compile.calls  # noqa: F401  (registers the types of named fields)
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.effects.declared import EFFECTS
+from flexclear.dynamics.fields import Data, data
+from flexclear.dynamics.memory import ARRAYS, row_fields
+from flexclear.dynamics.memory import NAMED as TABLES
 
 ROWS = 3
 

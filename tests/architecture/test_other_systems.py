@@ -18,16 +18,16 @@ import pytest
 import flexclear as fc
 from flexclear.commands import reproduction, scenes
 from flexclear.commands.__main__ import COMMANDS, main
-from flexclear.pipeline.core.scene.load import scene_name
-from flexclear.pipeline.core.system import file_names, platforms
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.scene.load import scene_name
+from flexclear.system import file_names, platforms
+from flexclear.system.errors import InputError
 from tests.architecture import windows_rules as rules
 from tests.processes import python
 
 #: what of `os` and `signal` is not on Windows, or means something else there
 ELSEWHERE = (*rules.MODULES, *rules.FUNCTIONS, "SIGKILL", "link", "kill")
 #: the one module of each tree that may ask for them
-ONES = ("pipeline/core/system/platforms.py", "benchmarks/processes.py")
+ONES = ("pipeline/flexclear/system/platforms.py", "benchmarks/processes.py")
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -62,7 +62,7 @@ def without_links(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
             (folder / "flexclear" / path.name).write_text(os.readlink(path))
         elif path.is_file():
             shutil.copy(path, folder / "flexclear")
-    shutil.copytree(root / "flexclear/commands", folder / "flexclear/commands")
+    shutil.copytree(root / "pipeline/flexclear/commands", folder / "pipeline/flexclear/commands")
     shutil.copy(root / "pyproject.toml", folder)
     return folder
 
@@ -87,7 +87,7 @@ def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
 
 
 def _sources(root: Path, *more: str) -> list[Path]:
-    folders = ("flexclear/commands", "papers", "pipeline", "stages", *more)
+    folders = ("pipeline/flexclear/commands", "papers", "pipeline", "stages", *more)
     return [path for name in folders for path in sorted((root / name).rglob("*.py"))]
 
 
@@ -158,7 +158,7 @@ def test_a_checkout_without_links_has_the_keys_of_one_with_links(root: Path, wit
         "from flexclear.commands.scenes import graphs, open_workplace\n"
         "place = open_workplace()\n"
         "(graph,) = graphs(['checks/pendulum'])\n"
-        "from flexclear.pipeline.core.workflow.execute import key_of\n"
+        "from flexclear.workflow.execute import key_of\n"
         "print(key_of(graph.simulate, {}, place.sources))\n"
     )
     keys = {run(folder, "-c", text, FLEXCLEAR_RESULTS="/nonexistent").stdout for folder in (root, without_links)}

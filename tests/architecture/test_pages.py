@@ -13,9 +13,9 @@ from pathlib import Path
 import grimp
 import pytest
 
-from flexclear.pipeline.dynamics import loads
+from flexclear.dynamics import loads
 
-DYNAMICS = "flexclear.pipeline.dynamics"
+DYNAMICS = "flexclear.dynamics"
 LOADS = {name.rpartition(".")[2] for name in loads.NAMES.values() if name.startswith(".effects.")}
 Arrows = set[tuple[str, str]]
 
@@ -77,7 +77,7 @@ def bare(name: str) -> str:
 
 
 def parts(root: Path) -> set[str]:
-    tower = root / "pipeline" / "dynamics"
+    tower = root / "pipeline" / "flexclear" / "dynamics"
     folders = {path.parent.name + "/" for path in tower.glob("*/__init__.py")}
     return folders | {path.name for path in tower.glob("*.py") if path.name != "__init__.py"}
 
@@ -106,7 +106,7 @@ def test_declarations_of_effects_import_no_code(root: Path) -> None:
         f"{DYNAMICS}.effects.{n}" for n in ("effect", "composition")
     }
     assert len(declarations) == len(
-        [p for p in (root / "pipeline/dynamics/effects").iterdir() if (p / "effect.py").exists()]
+        [p for p in (root / "pipeline/flexclear/dynamics/effects").iterdir() if (p / "effect.py").exists()]
     )
 
 
@@ -128,8 +128,17 @@ def test_the_way_of_the_data_leads_through_modules_that_exist(root: Path) -> Non
 #: what stands in backticks and looks like a file or module of the project, but for names in angles and asterisks
 FILE = re.compile(r"[\w.*<>-]+(/[\w.*<>-]+)+/?|[\w*<>]+\.(py|md|toml|json|jsonl)")
 MODULE = re.compile(r"(pipeline|stages|tests|benchmarks)(\.\w+)+")
-#: folders that names below begin in: `model/tree` is `pipeline/dynamics/model/tree.py`
-FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs", "scenes")
+#: folders that names below begin in: `model/tree` is `pipeline/flexclear/dynamics/model/tree.py`
+FROM = (
+    "",
+    "pipeline",
+    "pipeline/core",
+    "pipeline/flexclear/dynamics",
+    "pipeline/flexclear/structure",
+    "pipeline/flexclear/post",
+    "docs",
+    "scenes",
+)
 #: first parts of names that are no sources: written by runs, quantities, units, symbols
 ELSEWHERE = {".venv", "results", "mesh", "modes", "bundle", "figures", "tables", "report"}
 #: files that runs or users make
@@ -181,7 +190,7 @@ def test_every_file_and_module_that_a_page_names_exists(root: Path) -> None:
     assert gone == {}
 
 
-@pytest.mark.parametrize("name", ["assembly/tree", "pipeline.dynamics.assembly", "model/trees.py", "tables.py"])
+@pytest.mark.parametrize("name", ["assembly/tree", "dynamics.assembly", "model/trees.py", "tables.py"])
 def test_a_name_that_is_gone_is_noticed(root: Path, name: str) -> None:
     assert missing(root, f"See `{name}`.") == [name]
 
@@ -196,9 +205,9 @@ def test_equations_and_the_functions_that_theory_names_name_each_other(root: Pat
     """Functions of the dynamics, each before the path of its module."""
     page, found = (root / "docs" / "theory.md").read_text(encoding="utf-8"), 0
     for numbers, where in re.findall(
-        r"^\| ([(\d][^|]*) \|[^|]*\| ([^|]*pipeline/dynamics[^|]*) \|$", page, re.MULTILINE
+        r"^\| ([(\d][^|]*) \|[^|]*\| ([^|]*pipeline/flexclear/dynamics[^|]*) \|$", page, re.MULTILINE
     ):
-        for names, path in re.findall(r"((?:`\w+`, )+)`(pipeline/dynamics/[\w/]+\.py)`", where):
+        for names, path in re.findall(r"((?:`\w+`, )+)`(pipeline/flexclear/dynamics/[\w/]+\.py)`", where):
             functions = {
                 node.name: ast.get_docstring(node) or ""
                 for node in ast.walk(ast.parse((root / path).read_text(encoding="utf-8")))
@@ -249,7 +258,7 @@ def _functions(path: Path) -> Iterator[tuple[str, str]]:
 
 
 def test_docstrings_of_functions_begin_with_a_sentence() -> None:
-    folders = [ROOT / folder for folder in ("pipeline", "stages", "papers", "flexclear/commands")]
+    folders = [ROOT / folder for folder in ("pipeline", "stages", "papers", "pipeline/flexclear/commands")]
     functions = [one for folder in folders for path in sorted(folder.rglob("*.py")) for one in _functions(path)]
     assert len(functions) > 1000
     assert [name for name, text in functions if text.split()[0].strip(",.:;") in FRAGMENTS] == []

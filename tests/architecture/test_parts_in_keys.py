@@ -6,17 +6,17 @@ from typing import Any
 
 import pytest
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.registry import lookup, module_of
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.dynamics import effects
-from flexclear.pipeline.dynamics.compile import reach
-from flexclear.pipeline.dynamics.compile.reach import met, modules
-from flexclear.pipeline.dynamics.compile.sources import kernels, sources
-from flexclear.pipeline.dynamics.effects import Parts, Scheme
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.dynamics import effects
+from flexclear.dynamics.compile import reach
+from flexclear.dynamics.compile.reach import met, modules
+from flexclear.dynamics.compile.sources import kernels, sources
+from flexclear.dynamics.effects import Parts, Scheme
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.load import load_scene
+from flexclear.scene.registry import lookup, module_of
+from flexclear.scene.schema import Scene
+from flexclear.workflow.fingerprint import Sources
 
 BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
 
@@ -112,12 +112,12 @@ BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
             }
         },
         Parts(("cylindrical",), forms=("hysteretic",), effects=("stops",)),
-        "flexclear.pipeline.dynamics.effects.stops.contact",
+        "flexclear.dynamics.effects.stops.contact",
     ),
     "gear": (
         {"gear": {"screw": {"first": "J.rotation", "second": "J.translation", "ratio": 0.1}}},
         Parts(("cylindrical",), closures=True, effects=("gears",)),
-        "flexclear.pipeline.dynamics.effects.gears.equations",
+        "flexclear.dynamics.effects.gears.equations",
     ),
 }
 
@@ -140,7 +140,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
         assert effect.modules <= set(modules(scene))
         assert effect.modules & set(without) == set()
     if family == "stop":
-        assert "flexclear.pipeline.dynamics.contact.normal.flores" in modules(scene)
+        assert "flexclear.dynamics.contact.normal.flores" in modules(scene)
 
 
 def reached(root: Path, scene: Scene) -> set[str]:
@@ -148,7 +148,7 @@ def reached(root: Path, scene: Scene) -> set[str]:
     return set(Sources(root).closure(["flexclear.stages.simulation", *modules(scene, alone=True)]))
 
 
-DYNAMICS = "flexclear.pipeline.dynamics"
+DYNAMICS = "flexclear.dynamics"
 #: what no single run without `[accuracy]`, with a method of its own and without actuators on a path can reach
 OTHERS = (
     *("analyses", "linear", "plan", "sensitivity", "record.ensemble", "record.sections", "run.method_choice"),
@@ -161,7 +161,7 @@ def test_a_single_run_depends_on_no_other_result(root: Path) -> None:
     names = reached(root, load_scene(root / "scenes" / "sps4" / "csj.toml"))
     found = {n for n in names for other in OTHERS if n.startswith(f"{DYNAMICS}.{other}")}
     assert found == set()
-    assert {n for n in names if n.startswith(("flexclear.pipeline.structure", "flexclear.pipeline.post"))} == set()
+    assert {n for n in names if n.startswith(("flexclear.structure", "flexclear.post"))} == set()
 
 
 #: scene, what it is given, and which ways of a run it then may take

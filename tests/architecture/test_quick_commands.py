@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.papers.wang_wang_2019 import tasks as report
-from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
-from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key
+from flexclear.artifacts.store import Record, Store
 from flexclear.stages.workplace import Workplace
+from flexclear.workflow.fingerprint import TREE, Sources
+from flexclear.workflow.task import Task, facts, in_order, key
+from papers.wang_wang_2019 import tasks as report
 from tests.processes import printed, python
 
 #: what such a command may import: its own code, and what checks scenes

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.single_run.series import derive
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.post.single_run.series import derive
+from flexclear.structure.modes.solution import solve
 from tests.analytic.beam_models import build
 from tests.paper import synthetic
 

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline.core.artifacts.schema import BUNDLE, ENSEMBLE, RUN, conform
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
+from flexclear.artifacts.schema import BUNDLE, ENSEMBLE, RUN, conform
+from flexclear.numerics.rotations import quaternion_to_matrix
 
 END, INTERVAL = 0.18, 1e-4
 A = 1e-3 * np.array([[86.603, 50, 0], [86.603, -50, 0], [-86.603, 50, 0], [-86.603, -50, 0]])

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.papers.wang_wang_2019 import figures
-from flexclear.papers.wang_wang_2019.figures import joint
-from flexclear.pipeline.core.system.progress import silent
+from flexclear.system.progress import silent
+from papers.wang_wang_2019 import figures
+from papers.wang_wang_2019.figures import joint
 from tests.paper.material import everything
 
 TREE = Path(__file__).resolve().parents[2]

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import pytest
 
-from flexclear.papers.wang_wang_2019 import figures, report
-from flexclear.papers.wang_wang_2019.published import DISCREPANCIES
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.pages import in_folder
+from flexclear.post.pages import in_folder
+from flexclear.system.progress import silent
+from papers.wang_wang_2019 import figures, report
+from papers.wang_wang_2019.published import DISCREPANCIES
 from tests.paper.material import everything
 
 RENDERED = "sps4/far_csj_cb"

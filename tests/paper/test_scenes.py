@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.model.merge import Placement, frames_of, merge, start_places
+from flexclear.dynamics.model.merge import Placement, frames_of, merge, start_places
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import bundles
 from tests.reference import sps4
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.figures import figure, table10, table_verdicts
-from flexclear.papers.wang_wang_2019.figures.errors import number
-from flexclear.papers.wang_wang_2019.figures.given import euler_bernoulli_ratio
-from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
+from flexclear.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
+from papers.wang_wang_2019.figures import figure, table10, table_verdicts
+from papers.wang_wang_2019.figures.errors import number
+from papers.wang_wang_2019.figures.given import euler_bernoulli_ratio
 from tests.paper import synthetic
 from tests.paper.material import WOBBLE, everything
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.model import initial
-from flexclear.pipeline.dynamics.model import model as modelling
-from flexclear.pipeline.dynamics.model.arrays import WorkSpace, _work_lengths
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.specialise.trace import Trace
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile import sources
+from flexclear.dynamics.model import initial
+from flexclear.dynamics.model import model as modelling
+from flexclear.dynamics.model.arrays import WorkSpace, _work_lengths
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.specialise.trace import Trace
+from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import GRAVITY, Table, joint
 from tests.properties.test_specialised import keep_independent

@@ -6,8 +6,8 @@ from typing import Any
 
 from numba import njit
 
-import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
-from flexclear.pipeline.dynamics.fields import data
+import flexclear.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
+from flexclear.dynamics.fields import data
 
 
 @cache

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
+from flexclear import dynamics
+from flexclear.dynamics.run.horizon.horizon import Pair
+from flexclear.numerics.rotations import rotation_vector_to_matrix
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 
 Table = dict[str, Any]
 GRAVITY = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}}

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
+from flexclear.numerics.rotations import rotation_vector_to_matrix
 from tests.properties.mechanisms import Table
 
 Array = np.ndarray

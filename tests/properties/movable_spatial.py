@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
+from flexclear.numerics.rotations import rotation_vector_to_matrix
 from tests.properties.movable import WORLD, Array, Joint, Mechanism, Random, X, Z, across, any_turn, axes, link, unit
 
 #: joints on one axis between the same two bodies (z; that of slides too), and what they leave free together

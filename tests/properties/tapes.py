@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.specialise.code import Program
-from flexclear.pipeline.dynamics.specialise.tape import Branch, Loop, Symbol
-from flexclear.pipeline.dynamics.specialise.topology import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
+from flexclear.dynamics.specialise.code import Program
+from flexclear.dynamics.specialise.tape import Branch, Loop, Symbol
+from flexclear.dynamics.specialise.topology import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,

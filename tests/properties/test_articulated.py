@@ -6,32 +6,32 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.bodies.flexible import flexible_bodies
-from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.effects import Scheme
-from flexclear.pipeline.dynamics.equations import articulated, composite
-from flexclear.pipeline.dynamics.equations.closures import make_closing
-from flexclear.pipeline.dynamics.equations.projection import make_stiffen
-from flexclear.pipeline.dynamics.fields import data
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.model.interface_basis import modes_of
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
-from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.specialise import program
-from flexclear.pipeline.dynamics.specialise.topology import topology_of
-from flexclear.pipeline.dynamics.specialise.trace import Trace
+from flexclear import dynamics
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.bodies.flexible import flexible_bodies
+from flexclear.dynamics.compile import sources
+from flexclear.dynamics.effects import Scheme
+from flexclear.dynamics.equations import articulated, composite
+from flexclear.dynamics.equations.closures import make_closing
+from flexclear.dynamics.equations.projection import make_stiffen
+from flexclear.dynamics.fields import data
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.model import selection
+from flexclear.dynamics.model.interface_basis import modes_of
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
+from flexclear.dynamics.run.run import engine_of
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.dynamics.specialise import program
+from flexclear.dynamics.specialise.topology import topology_of
+from flexclear.dynamics.specialise.trace import Trace
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
 from tests.properties.articulated_chains import Evaluated, Long, bending, evaluated, reduced, rods, tabulated

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError
-from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.dynamics.model.mechanism import Mechanism, build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import FlexclearError, InputError
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, body, frame, joint, matrix, rigid, scene
 from tests.properties.test_dynamics_start import angles, driven, start_of

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.compile import functions
-from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.dynamics.compile import functions
+from flexclear.dynamics.run.run import engine_of
+from flexclear.numerics.rotations import rotation_vector_to_matrix
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table, frame, joint, scene, turned
 from tests.properties.mechanisms import body as rigid

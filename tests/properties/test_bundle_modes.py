@@ -8,16 +8,16 @@ import pytest
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.system.errors import InputError, SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.structure.fe import beam
-from flexclear.pipeline.structure.fe.model import Model
-from flexclear.pipeline.structure.fe.recipe import read_recipe
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.pipeline.structure.modes import eigen, normal, reference
-from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.pipeline.structure.modes.statics import Flexibility, support
+from flexclear.structure.fe import beam
+from flexclear.structure.fe.model import Model
+from flexclear.structure.fe.recipe import read_recipe
+from flexclear.structure.kinds import kind
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.structure.modes import eigen, normal, reference
+from flexclear.structure.modes.solution import solve
+from flexclear.structure.modes.statics import Flexibility, support
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 from tests.processes import printed
 
 ROOT = Path(__file__).parents[2]
@@ -135,7 +135,7 @@ from pathlib import Path
 import hashlib
 import numpy as np
 from tests.properties.test_bundle_modes import MANY, rod
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.structure.modes.solution import solve
 np.random.seed({seed})
 shapes = [solve(rod(n), "free-free", 7)["shape"].values for n in (12, MANY)]
 print(hashlib.sha256(b"".join(s.tobytes() for s in shapes)).hexdigest())

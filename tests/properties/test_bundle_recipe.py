@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe.recipe import read_recipe
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.stages import meshing
+from flexclear.structure.fe.recipe import read_recipe
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.solution import solve
+from flexclear.system.errors import InputError
 
 MESHES = Path(__file__).parents[2] / "meshes"
 

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model import selection, tree
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model import selection, tree
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.articulated_chains import evaluated
 from tests.properties.mechanisms import LEAN, frame, joint, two_loops

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.artifacts.quantities import standard_error
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
-from flexclear.pipeline.post.cost.study import Point, assemble, resolved
+from flexclear.artifacts import quantities
+from flexclear.artifacts.quantities import standard_error
+from flexclear.post.cost import answer, causes, statistics, work_precision
+from flexclear.post.cost.study import Point, assemble, resolved
+from flexclear.scene.quantity import Quantity
+from flexclear.system.errors import SolverError
 
 POSITION = Quantity("slider", "position")
 TIMES = Quantity("pin", "impact_times")

@@ -7,17 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model import initial
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.specialise import dual, program
-from flexclear.pipeline.dynamics.specialise.code import Program
-from flexclear.pipeline.dynamics.specialise.derivative import tangent
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Tape, UnsuitedError
-from flexclear.pipeline.dynamics.specialise.topology import (
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model import initial
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.specialise import dual, program
+from flexclear.dynamics.specialise.code import Program
+from flexclear.dynamics.specialise.derivative import tangent
+from flexclear.dynamics.specialise.tape import FLOAT, Tape, UnsuitedError
+from flexclear.dynamics.specialise.topology import (
     RATES,
     RATES_CHANGE,
     STATE,
@@ -25,6 +23,8 @@ from flexclear.pipeline.dynamics.specialise.topology import (
     start,
     topology_of,
 )
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties import tapes
 from tests.properties.test_specialised import RIGID, keep_independent, rates_kernel

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.contact import forces, friction
-from flexclear.pipeline.dynamics.contact import form as forms
-from flexclear.pipeline.dynamics.contact import surfaces as surfaces_of_joints
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import Model, tabulate
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact import forces, friction
+from flexclear.dynamics.contact import form as forms
+from flexclear.dynamics.contact import surfaces as surfaces_of_joints
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.numerics.rotations import rotation_vector_to_matrix
+from flexclear.scene.registry import lookup
+from flexclear.scene.schema import Scene
 from tests.properties.kernels import from_arrays, from_python
 
 FRICTION: dict[str, dict[str, Any]] = {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.scene.schema import Scene
 from tests.properties.mechanisms import Table, joint, rigid, scene, simulate, simulated
 
 #: radius of the swing [m] and its rate [rad/s]; the period is 2 pi s

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.dynamics.model import tree
+from flexclear.dynamics.model import tree
 from tests.properties.mechanisms import simulate, two_loops
 
 #: joints that may close the two loops; the tree takes the others

@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from flexclear import load_scene
-from flexclear.pipeline.core.scene.laws import Law, Step
-from flexclear.pipeline.dynamics import drives
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.drives.oscillation import oscillate
-from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, jump, pieces_of
-from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws
-from flexclear.pipeline.dynamics.model import laws
-from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.dynamics import drives
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.drives.oscillation import oscillate
+from flexclear.dynamics.drives.pieces import Piece, Pieces, jump, pieces_of
+from flexclear.dynamics.equations.prescribed_motion import make_laws
+from flexclear.dynamics.model import laws
+from flexclear.dynamics.run.run import engine_of
+from flexclear.scene.laws import Law, Step
 from tests.analytic.mechanism_runs import run
 from tests.properties.kernels import from_python
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline.core.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
-from flexclear.pipeline.core.scene.registry import lookup, module_of
-from flexclear.pipeline.dynamics.contact import friction
+from flexclear.dynamics.contact import friction
+from flexclear.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
+from flexclear.scene.registry import lookup, module_of
 from tests.properties.kernels import from_python
 from tests.properties.test_dynamics_drives import adams_step
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import (
+from flexclear.numerics.rotations import (
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from flexclear.pipeline.core.scene.fields import Pose
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.scene.fields import Pose
+from flexclear.scene.load import load_scene
 from tests.analytic.mechanism_runs import TREE, impacts
 from tests.properties.mechanisms import Table, simulate
 

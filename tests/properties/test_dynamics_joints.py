@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_quaternion, skew
-from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.dynamics import joints
+from flexclear.dynamics import joints
+from flexclear.numerics.rotations import rotation_vector_to_quaternion, skew
+from flexclear.scene.registry import lookup
 from tests.properties.kernels import from_python
 
 #: places in a work space of the tests' own

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.scene.clearance import NormalLaw
-from flexclear.pipeline.core.scene.registry import lookup
-from flexclear.pipeline.dynamics.contact import form as forms
-from flexclear.pipeline.dynamics.contact import normal
-from flexclear.pipeline.dynamics.contact.law import Resolved
+from flexclear.dynamics.contact import form as forms
+from flexclear.dynamics.contact import normal
+from flexclear.dynamics.contact.law import Resolved
+from flexclear.scene.clearance import NormalLaw
+from flexclear.scene.registry import lookup
 from tests.properties.kernels import from_python
 
 Parameters = tuple[float, float, float, float]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import loads
+from flexclear.dynamics import loads
+from flexclear.scene.schema import Scene
 from tests.properties.mechanisms import GRAVITY, body, frame, joint, matrix, scene, simulate, turned
 
 WAVE = {"type": "harmonic", "amplitude": [2.0], "frequency": ["3 Hz"], "offset": 1.0}

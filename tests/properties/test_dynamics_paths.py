@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_vector_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model.laws import drive_laws
+from flexclear.dynamics.model.laws import drive_laws
+from flexclear.numerics.rotations import quaternion_to_matrix, rotation_vector_to_matrix
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, scene, simulate
 

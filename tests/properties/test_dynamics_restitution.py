@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline.core.scene.clearance import NormalLaw
-from flexclear.pipeline.dynamics.contact import restitution
-from flexclear.pipeline.dynamics.contact.normal import kelvin_voigt, lankarani_nikravesh
+from flexclear.dynamics.contact import restitution
+from flexclear.dynamics.contact.normal import kelvin_voigt, lankarani_nikravesh
+from flexclear.scene.clearance import NormalLaw
 from tests.properties.test_dynamics_laws import NORMAL, Law
 from tests.reference import contact_solutions as exact
 

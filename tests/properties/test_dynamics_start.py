@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model.assembly import assembled
-from flexclear.pipeline.dynamics.model.given_start import corrected_starts
-from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
+from flexclear import dynamics
+from flexclear.dynamics.model.assembly import assembled
+from flexclear.dynamics.model.given_start import corrected_starts
+from flexclear.dynamics.model.mechanism import Mechanism, build
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import body, frame, ground, joint, rigid, scene, simulate, two_loops

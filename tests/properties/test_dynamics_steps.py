@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run import trajectory as stepping
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import observed
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.run import trajectory as stepping
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import observed
+from flexclear.scene.integrators import INTEGRATORS
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 from tests.properties.mechanisms import ground, joint, rigid, scene
 

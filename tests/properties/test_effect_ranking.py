@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.effect_ranking import (
+from flexclear.artifacts.points import Point
+from flexclear.post.answers.effect_ranking import (
     IDEAL,
     Pair,
     assemble,
@@ -17,6 +16,7 @@ from flexclear.pipeline.post.answers.effect_ranking import (
     table,
     undecided,
 )
+from flexclear.scene.quantity import Quantity
 
 VELOCITY = Quantity("slider", "velocity")
 TIME = np.linspace(0.0, 1.0, 201)

@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from flexclear.pipeline.core.system.errors import (
+from flexclear.system.errors import (
     INTERRUPTED,
     FlexclearError,
     InputError,

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model.assembly import assembled, residuals
-from flexclear.pipeline.dynamics.model.constraints import constraints
-from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.dynamics.model.assembly import assembled, residuals
+from flexclear.dynamics.model.constraints import constraints
+from flexclear.dynamics.model.mechanism import build
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.properties.mechanisms import Table, joint, rigid, scene
 
 

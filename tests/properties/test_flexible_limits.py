@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene, read_toml
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.geometric_stiffness import variables
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear import dynamics
+from flexclear.scene.load import load_scene, read_toml
+from flexclear.scene.schema import Scene
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.geometric_stiffness import variables
+from flexclear.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE, bundles
 
 END = 0.01

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.load import read_toml
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
-from flexclear.pipeline.structure.modes.geometric_stiffness import variables
-from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.dynamics import analyses
+from flexclear.scene.load import read_toml
+from flexclear.scene.schema import Scene
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.geometric_stiffness import variables
+from flexclear.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import ground, joint, rigid, scene
 

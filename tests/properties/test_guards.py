@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from numba import njit
 
-import flexclear.pipeline.dynamics.compile.calls  # noqa: F401  (registers the types of named fields)
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.fields import data
-from flexclear.pipeline.dynamics.integrate import guards
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
+import flexclear.dynamics.compile.calls  # noqa: F401  (registers the types of named fields)
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.fields import data
+from flexclear.dynamics.integrate import guards
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE
 from tests.analytic.test_joint_friction_kinks import COULOMB, brakes
 

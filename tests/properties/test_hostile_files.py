@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flexclear.artifacts import maintenance
+from flexclear.artifacts.disk import checked, read_checked, sha256
+from flexclear.artifacts.store import Store, read_record
 from flexclear.commands import cost, scenes
-from flexclear.pipeline.core.artifacts import maintenance
-from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
-from flexclear.pipeline.core.artifacts.store import Store, read_record
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.sweep import read_sweep
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError
-from flexclear.pipeline.core.workflow.journal import Journal, signature
-from flexclear.pipeline.post.render import forms
-from flexclear.pipeline.structure.fe.exchange import files
-from flexclear.pipeline.structure.fe.solid import imported
-from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
+from flexclear.post.render import forms
+from flexclear.scene.load import load_scene
+from flexclear.scene.sweep import read_sweep
 from flexclear.stages.graph import Graph
+from flexclear.structure.fe.exchange import files
+from flexclear.structure.fe.solid import imported
+from flexclear.structure.fe.solid.recipe import MeshFile
+from flexclear.system.errors import FlexclearError, InputError
+from flexclear.workflow.journal import Journal, signature
 from tests.properties.test_scene_words import BASE
 
 #: processor time [s] after which work counts as endless: refusals take 0.3 s, and what they refuse takes hours

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear import dynamics
+from flexclear.dynamics.model.mechanism import build
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError
+from flexclear.system.progress import silent
 from tests.properties.mechanisms import joint, rigid, scene
 
 STIFFNESS, FREQUENCY = 400.0, 20.0

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model import numbering
-from flexclear.pipeline.dynamics.model.interface_basis import InterfaceBasis, basis, modes_of
-from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model import numbering
+from flexclear.dynamics.model.interface_basis import InterfaceBasis, basis, modes_of
+from flexclear.dynamics.model.mechanism import Mechanism, build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.articulated_chains import evaluated
 from tests.properties.mechanisms import joint, rigid

@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Places
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Places
 
 ARGUMENTS = 12
 

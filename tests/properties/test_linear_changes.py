@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, hold
-from flexclear.pipeline.dynamics.linear.tangent import Tangent, damping, stiffness, tangent
-from flexclear.pipeline.dynamics.linear.vibrations import vibrations
-from flexclear.pipeline.dynamics.model import model as modelling
+from flexclear.dynamics import analyses
+from flexclear.dynamics.compile import sources
+from flexclear.dynamics.linear.bench import Bench, balance, hold
+from flexclear.dynamics.linear.tangent import Tangent, damping, stiffness, tangent
+from flexclear.dynamics.linear.vibrations import vibrations
+from flexclear.dynamics.model import model as modelling
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.articulated_chains import rods
 from tests.properties.mechanisms import GRAVITY, body, frame, joint, scene

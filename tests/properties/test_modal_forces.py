@@ -3,13 +3,13 @@
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import skew
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.linear.clearance_response import modal_forces
-from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
-from flexclear.pipeline.dynamics.run.run import integrate
+from flexclear.dynamics.linear.clearance_response import modal_forces
+from flexclear.dynamics.record.motion import Motions
+from flexclear.dynamics.record.wrenches import joint_wrenches
+from flexclear.dynamics.run.run import integrate
+from flexclear.numerics.rotations import skew
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 
 MASS, COM, INERTIA = 1.3, np.array([0.2, 0.05, -0.03]), np.diag([0.01, 0.03, 0.035])
 FRAMES = {

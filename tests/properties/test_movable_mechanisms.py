@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse
-from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.model.rates import ZERO_SINGULAR_VALUE, rates
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.mobility import Mobility, analyse
+from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.model.rates import ZERO_SINGULAR_VALUE, rates
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.properties import movable
 from tests.properties.mechanisms import Table
 from tests.properties.movable import Joint, Mechanism, Random, Setting

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError, ResourceError
-from flexclear.pipeline.structure.kinds import kind
+from flexclear.scene.limits import Limits
+from flexclear.scene.load import load_scene
 from flexclear.stages import meshing
 from flexclear.stages.graph import Graph
+from flexclear.structure.kinds import kind
+from flexclear.system.errors import InputError, ResourceError
 from tests.properties.mutants import mutant, sound
 
 #: processor time [s] after which work counts as endless (measured 0.4 s), resident memory [MB] and bytes of a message
@@ -71,7 +71,7 @@ def test_a_title_is_no_formula() -> None:
     matplotlib.use("Agg")
     from matplotlib.figure import Figure
 
-    from flexclear.pipeline.post.plotting.style import heading
+    from flexclear.post.plotting.style import heading
 
     figure = Figure()
     heading(figure, r"Costs $x^{ and \frac$", "below")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, same_starts
+from flexclear.artifacts.points import Point
 from flexclear.commands import plan
-from flexclear.pipeline.core.artifacts.effect_size import POOLED, Agreement, agreement, same_starts
-from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.plan import _verdict, until_decided, verdict
+from flexclear.post.answers.plan import _verdict, until_decided, verdict
+from flexclear.scene.quantity import Quantity
 
 
 @pytest.mark.parametrize(

@@ -12,19 +12,19 @@ import meshio
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.post.render import film_speed, forms, gl, joint_view, player, surfaces, vibrations
-from flexclear.pipeline.post.render.forms import Seat, equivalent, wheels
-from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
-from flexclear.pipeline.post.render.pictures import MAKERS, Shown, make
-from flexclear.pipeline.post.render.vibrations import Vibrations
-from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, surface
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes.bundle import drawn
+from flexclear.dynamics import analyses
+from flexclear.post.render import film_speed, forms, gl, joint_view, player, surfaces, vibrations
+from flexclear.post.render.forms import Seat, equivalent, wheels
+from flexclear.post.render.mechanism import Looks, Mechanism, mechanism, placed
+from flexclear.post.render.pictures import MAKERS, Shown, make
+from flexclear.post.render.vibrations import Vibrations
+from flexclear.post.shapes.body_shape import AROUND, PER_CELL, surface
+from flexclear.scene.load import load_scene
 from flexclear.stages import rendering, simulation
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes.bundle import drawn
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)

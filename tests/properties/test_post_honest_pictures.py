@@ -5,13 +5,16 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from flexclear.pipeline.post.overview.curves import NOISE, impacts, noise, without_noise
-from flexclear.pipeline.post.render.mechanism import CLEARANCE_COLOR, SOCKET
-from flexclear.pipeline.post.render.ruler import exaggeration
-from flexclear.pipeline.post.render.view import plane, view
+from flexclear.post.overview.curves import NOISE, impacts, noise, without_noise
+from flexclear.post.render.mechanism import CLEARANCE_COLOR, SOCKET
+from flexclear.post.render.ruler import exaggeration
+from flexclear.post.render.view import plane, view
 
 #: mechanism with a loose joint, and the key of the radius of its pin or ball
-LOOSE = [("stages/templates/slider_crank/slider_crank.toml", "pin_radius"), ("scenes/sps4/csj.toml", "ball_radius")]
+LOOSE = [
+    ("pipeline/flexclear/stages/templates/slider_crank/slider_crank.toml", "pin_radius"),
+    ("scenes/sps4/csj.toml", "ball_radius"),
+]
 
 
 @pytest.mark.parametrize("path, key", LOOSE)

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post.render import gl
-from flexclear.pipeline.post.render.forms import equivalent
-from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed
-from flexclear.pipeline.post.render.panel import panel
-from flexclear.pipeline.post.render.pictures import Shown, make
-from flexclear.pipeline.post.shapes import body_shape
-from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scale_to
-from flexclear.pipeline.post.shapes.body_shape import rod_surface as surface
-from flexclear.pipeline.post.single_run.series import derive
+from flexclear.post.render import gl
+from flexclear.post.render.forms import equivalent
+from flexclear.post.render.mechanism import Looks, mechanism, part_pose, placed
+from flexclear.post.render.panel import panel
+from flexclear.post.render.pictures import Shown, make
+from flexclear.post.shapes import body_shape
+from flexclear.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scale_to
+from flexclear.post.shapes.body_shape import rod_surface as surface
+from flexclear.post.single_run.series import derive
+from flexclear.system.errors import SolverError
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
@@ -99,7 +99,7 @@ def test_a_drawn_part_of_a_joint_is_where_its_frame_is():
 
 
 def test_all_that_is_drawn_is_in_the_picture():
-    from flexclear.pipeline.post.render.view import ANGLE, eye
+    from flexclear.post.render.view import ANGLE, eye
 
     drawn = mechanism(synthetic.run("sps4/far_cb", modes=7), {"rod1": synthetic.bundle()})
     place, focus = eye(drawn.view, drawn.cloud, 1.5)
@@ -184,7 +184,7 @@ def test_state_of_gl_is_said_without_drawing():
 
 
 def test_without_gl_there_is_no_film_but_an_error_that_says_why(monkeypatch):
-    monkeypatch.setattr("flexclear.pipeline.post.render.gl.works", lambda: False)
+    monkeypatch.setattr("flexclear.post.render.gl.works", lambda: False)
     shown = Shown(run=synthetic.run("sps4/far_cb", modes=7), bundles={"rod1": synthetic.bundle()})
     with pytest.raises(SolverError, match="libgl1"):
         make("motion", "mp4", shown)
@@ -194,7 +194,7 @@ def test_without_gl_there_is_no_film_but_an_error_that_says_why(monkeypatch):
 @needs_gl
 def test_a_film_moves():
     """A second picture of one scene shows what has moved since the first: the rod, and everything else."""
-    from flexclear.pipeline.post.render import film
+    from flexclear.post.render import film
 
     run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
     drawn = mechanism(run, {"rod1": synthetic.bundle()})

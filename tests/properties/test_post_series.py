@@ -6,17 +6,17 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation, velocity_at_events
-from flexclear.papers.wang_wang_2019.figures.phase import at_times
-from flexclear.pipeline.core.artifacts.quantities import common_times
-from flexclear.pipeline.core.numerics.rotations import (
+from flexclear.artifacts.quantities import common_times
+from flexclear.numerics.rotations import (
     angle_about_y,
     quaternion_product,
     rotation_between,
     rotation_vector_to_quaternion,
     turning,
 )
-from flexclear.pipeline.post.single_run.series import derive, horizon, spread
+from flexclear.post.single_run.series import derive, horizon, spread
+from papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation, velocity_at_events
+from papers.wang_wang_2019.figures.phase import at_times
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)

@@ -5,17 +5,17 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.numerics.rotations import continued, matrix_to_quaternion, quaternion_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.equations.named_bodies import put_quaternion
-from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.topology import topology
-from flexclear.pipeline.dynamics.run.evaluation.observation import observe
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engine_of, observed
-from flexclear.pipeline.dynamics.run.run import integrate as whole
-from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.dynamics.equations.named_bodies import put_quaternion
+from flexclear.dynamics.record.motion import Motions
+from flexclear.dynamics.record.topology import topology
+from flexclear.dynamics.run.evaluation.observation import observe
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.run import integrate as whole
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.numerics.rotations import continued, matrix_to_quaternion, quaternion_to_matrix
+from flexclear.scene.load import load_scene
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.kernels import from_python
 

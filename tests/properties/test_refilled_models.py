@@ -8,15 +8,15 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.core.scene.load import FAMILIES, edited, load_scene, with_numbers
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model import refill
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.mobility import analyse
-from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.model.refill import CHANGEABLE, refilled
+from flexclear.dynamics.model import refill
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.mobility import analyse
+from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.model.refill import CHANGEABLE, refilled
+from flexclear.scene.fields import Part
+from flexclear.scene.load import FAMILIES, edited, load_scene, with_numbers
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 
 STROKE = {"type": "step", "start": [0.0], "end": [0.1], "change": ["20 mm"]}
 #: scene, its changes, and whether refilling must do

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.clearance import ClearanceRevolute
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import parse
 from flexclear.stages import simulation
+from flexclear.system.errors import InputError
 
 TREE = Path(__file__).resolve().parents[2]
 
@@ -101,7 +101,7 @@ def test_an_edit_takes_parts_and_keys_away_and_refuses_those_that_are_not_there(
 
 
 def test_forces_along_angles_have_the_unit_of_torques_before_anything_is_run() -> None:
-    scene = load_scene(TREE / "stages" / "templates" / "slider_crank" / "slider_crank.toml")
+    scene = load_scene(TREE / "pipeline" / "flexclear" / "stages" / "templates" / "slider_crank" / "slider_crank.toml")
     law = {"law": "flores", "restitution": 0.5, "stiffness": 1e8}
     stops = {
         "way": {"joint": "guide", "upper": 0.4, "normal": law},

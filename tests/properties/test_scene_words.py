@@ -9,16 +9,16 @@ import pytest
 import xarray as xr
 from pydantic import TypeAdapter, ValidationError
 
-from flexclear.pipeline.core.artifacts import deficits
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_between, rotation_vector_to_matrix
-from flexclear.pipeline.core.scene import units
-from flexclear.pipeline.core.scene.fields import Inertia, Pose, Position
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.units import UNITS, any_quantity, quantity, unit
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.structure.fe.beam_recipe import NodeFrame
-from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame
+from flexclear.artifacts import deficits
+from flexclear.dynamics.model.mechanism import build
+from flexclear.numerics.rotations import quaternion_to_matrix, rotation_between, rotation_vector_to_matrix
+from flexclear.scene import units
+from flexclear.scene.fields import Inertia, Pose, Position
+from flexclear.scene.load import load_scene
+from flexclear.scene.units import UNITS, any_quantity, quantity, unit
+from flexclear.structure.fe.beam_recipe import NodeFrame
+from flexclear.structure.fe.recipe_parts import TurnedFrame
+from flexclear.system.errors import InputError
 
 
 @pytest.mark.parametrize(

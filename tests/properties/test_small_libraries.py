@@ -13,11 +13,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.csgraph import reverse_cuthill_mckee as scipy_order
 
-from flexclear.pipeline.core.numerics.rotations import cross, matrix_to_quaternion, quaternion_to_matrix, turned
-from flexclear.pipeline.dynamics.contact.restitution import root
-from flexclear.pipeline.dynamics.integrate.phi_functions import PHI_COUNT, phi_functions
-from flexclear.pipeline.dynamics.model.index_tables import reverse_cuthill_mckee
-from flexclear.pipeline.dynamics.model.interface_basis import _families
+from flexclear.dynamics.contact.restitution import root
+from flexclear.dynamics.integrate.phi_functions import PHI_COUNT, phi_functions
+from flexclear.dynamics.model.index_tables import reverse_cuthill_mckee
+from flexclear.dynamics.model.interface_basis import _families
+from flexclear.numerics.rotations import cross, matrix_to_quaternion, quaternion_to_matrix, turned
 from tests.properties.kernels import from_python
 
 

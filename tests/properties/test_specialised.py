@@ -11,30 +11,30 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.choice import repeat
-from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, machine_code, sources
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.model import initial, selection
-from flexclear.pipeline.dynamics.model.mechanism import build
-from flexclear.pipeline.dynamics.model.mobility import analyse
-from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised_code
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engine_of, observed
-from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
-from flexclear.pipeline.dynamics.specialise import dual
-from flexclear.pipeline.dynamics.specialise import program as tracing
-from flexclear.pipeline.dynamics.specialise.code import Emitter, Program
-from flexclear.pipeline.dynamics.specialise.program import program
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
-from flexclear.pipeline.dynamics.specialise.topology import topology_of
-from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
+from flexclear import dynamics
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.choice import repeat
+from flexclear.dynamics.compile import compiler_process, files, functions, machine_code, sources
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.model import initial, selection
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.mobility import analyse
+from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.trajectory import integrate
+from flexclear.dynamics.sensitivity.dataset import sensitivities
+from flexclear.dynamics.specialise import dual
+from flexclear.dynamics.specialise import program as tracing
+from flexclear.dynamics.specialise.code import Emitter, Program
+from flexclear.dynamics.specialise.program import program
+from flexclear.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
+from flexclear.dynamics.specialise.topology import topology_of
+from flexclear.dynamics.specialise.trace import Memory, Trace
+from flexclear.scene.load import edited, load_scene
+from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.post.answers import stability
+from flexclear.post.answers import stability
 
 
 def run(energy_error=1e-9, loops=1e-12, condition=5.0, rejected=1, stiff=0.0, horizon=1.0) -> xr.Dataset:

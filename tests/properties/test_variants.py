@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexclear.artifacts.effect_size import chance, influence, recorded
+from flexclear.artifacts.points import Point
 from flexclear.commands.new import write
-from flexclear.pipeline.core.artifacts.effect_size import chance, influence, recorded
-from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.post.answers.effect_sizes import closed
-from flexclear.pipeline.post.answers.effect_sizes import variants as needed
+from flexclear.post.answers.effect_sizes import closed
+from flexclear.post.answers.effect_sizes import variants as needed
+from flexclear.scene import variants
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import Quantity
+from flexclear.system.errors import InputError
 
 
 @pytest.fixture

@@ -15,13 +15,13 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from flexclear import dynamics
 from flexclear.commands import scenes
 from flexclear.commands.__main__ import main
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.post.single_run import series
+from flexclear.dynamics import analyses
+from flexclear.post.single_run import series
 from flexclear.stages.sweeps import sweep_engine
+from flexclear.workflow import cores
 from tests.processes import copied
 
 #: a process that is silent for so long hangs, however slow or busy the machine is [s]
@@ -32,8 +32,8 @@ import os, time
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.system.errors import SolverError
+from flexclear.scene.schema import Scene
 
 def log(text):
     with open(os.environ["CALLS"], "a") as file:
@@ -199,10 +199,10 @@ class Project:
 def project(tmp_path: Path) -> Iterator[Project]:
     """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
     folder = copied(tmp_path / "project")
-    (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)
-    (folder / "pipeline" / "dynamics" / "analyses.py").write_text("from flexclear.pipeline.dynamics import *\n")
-    derived = "from flexclear.pipeline.dynamics import log\n" + POST
-    (folder / "pipeline" / "post" / "single_run" / "series.py").write_text(derived)
+    (folder / "pipeline" / "flexclear" / "dynamics" / "__init__.py").write_text(ENGINE)
+    (folder / "pipeline" / "flexclear" / "dynamics" / "analyses.py").write_text("from flexclear.dynamics import *\n")
+    derived = "from flexclear.dynamics import log\n" + POST
+    (folder / "pipeline" / "flexclear" / "post" / "single_run" / "series.py").write_text(derived)
     made = Project(folder)
     made.add("ideal", SCENE + JOINT)
     made.add("contact", CONTACT)

@@ -9,17 +9,17 @@ from typing import NamedTuple
 import xarray as xr
 
 from flexclear.commands.new import write
-from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.linear.clearance_response import bounds
-from flexclear.pipeline.dynamics.linear.response import Response, response
-from flexclear.pipeline.dynamics.run.run import Run, integrate
+from flexclear.dynamics.linear.clearance_response import bounds
+from flexclear.dynamics.linear.response import Response, response
+from flexclear.dynamics.run.run import Run, integrate
+from flexclear.scene import variants
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import Quantity
+from flexclear.scene.schema import Scene
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
+from flexclear.system.progress import silent
 
 #: of the leg's rod [m, Pa, kg/m^3], and the mass of its platform [kg]
 LENGTH, RADIUS, MODULUS, DENSITY, PLATFORM = 0.24, 0.01, 71.7e9, 2740.0, 3.0

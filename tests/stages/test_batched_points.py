@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.scene.quantity import parse_recorded
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.kernels import INTERPRETED
-from flexclear.pipeline.dynamics.record import point as points_of
-from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.run import alike
-from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
+from flexclear.artifacts.points import Point
+from flexclear.dynamics.kernels import INTERPRETED
+from flexclear.dynamics.record import point as points_of
+from flexclear.dynamics.record.point import Runner
+from flexclear.dynamics.run import alike
+from flexclear.dynamics.run.evaluation import batched_evaluation
+from flexclear.scene.load import load_scene, with_numbers
+from flexclear.scene.quantity import parse_recorded
+from flexclear.scene.schema import Scene
 from flexclear.stages.sweeps import sweep_engine, sweep_points
 
 #: coefficients of a pin, from none to one that jams it on the way

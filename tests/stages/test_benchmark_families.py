@@ -16,7 +16,7 @@ from benchmarks.__main__ import main
 from benchmarks.families import solids
 from benchmarks.family import Case, Family
 from benchmarks.log import Session
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.system.errors import InputError
 
 FAMILIES = {name: page.named(name) for name in families.NAMES}
 #: constants of families that make a measurement longer and better

@@ -23,13 +23,13 @@ from benchmarks.mechanisms import (
     without_clearance,
     without_friction,
 )
+from flexclear import dynamics
 from flexclear.commands import cost
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.drives.pieces import Pieces
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
 from tests.reference import sps4
 from tests.reference.ideal_motion import ideal
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from flexclear.commands import reproduction
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.system.errors import InputError
 from tests.stages.conftest import Command
 
 ROD = """

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import flexclear as fc
+from flexclear.artifacts.disk import checked
+from flexclear.artifacts.store import Record, Store
 from flexclear.commands import cache, why
 from flexclear.commands.__main__ import main
-from flexclear.pipeline.core.artifacts.disk import checked
-from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.pipeline.core.system import machine
+from flexclear.system import machine
 from tests.stages.conftest import Command
 
 

@@ -10,19 +10,19 @@ import xarray as xr
 
 from flexclear.commands import compare
 from flexclear.commands.new import write
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.parts import MeshedRigidBody
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.scene.variants import ideal
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.post import pages
-from flexclear.pipeline.post.overview import comparison, curves, figures
-from flexclear.pipeline.structure.fe.recipe import read_recipe
-from flexclear.pipeline.structure.kinds import kind
-from flexclear.pipeline.structure.modes import bundle
+from flexclear.post import pages
+from flexclear.post.overview import comparison, curves, figures
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.parts import MeshedRigidBody
+from flexclear.scene.quantity import Quantity
+from flexclear.scene.variants import ideal
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
+from flexclear.structure.fe.recipe import read_recipe
+from flexclear.structure.kinds import kind
+from flexclear.structure.modes import bundle
+from flexclear.system.errors import InputError
 from tests.paper import synthetic
 
 

@@ -14,19 +14,19 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.workflow import cores, schedule
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.progress import Monitor
-from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.dynamics.compile import compiler_process, folder, functions
-from flexclear.pipeline.dynamics.compile.files import compiled, file_lock, load_file, load_files, loaded
+from flexclear.artifacts.paths import kernel_root
+from flexclear.artifacts.store import Store
+from flexclear.dynamics.compile import compiler_process, folder, functions
+from flexclear.dynamics.compile.files import compiled, file_lock, load_file, load_files, loaded
+from flexclear.workflow import cores, schedule
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.progress import Monitor
+from flexclear.workflow.task import Task
 from tests.stages.conftest import PATIENCE
 
 SOURCE = """from numba import cfunc
 
-from flexclear.pipeline.dynamics.compile.files import compiles
+from flexclear.dynamics.compile.files import compiles
 
 
 @compiles(cfunc("int64(int64)"))
@@ -36,7 +36,7 @@ def add(x):
 #: holds the lock of a file, says so, and stays
 HOLDER = """import sys, time
 from pathlib import Path
-from flexclear.pipeline.dynamics.compile.files import file_lock
+from flexclear.dynamics.compile.files import file_lock
 with file_lock(Path(sys.argv[1]), wait=True):
     print("held", flush=True)
     time.sleep(600.0)

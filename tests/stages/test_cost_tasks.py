@@ -11,23 +11,23 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear import dynamics
+from flexclear.artifacts import quantities
+from flexclear.artifacts.store import Store
 from flexclear.commands import cost, cost_design, scenes
 from flexclear.commands.cost_design import Setting
 from flexclear.commands.new import KINDS, write
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.quantity import parse
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import in_order
-from flexclear.pipeline.post.cost.answer import sentences
+from flexclear.post.cost.answer import sentences
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import parse
+from flexclear.scene.schema import Scene
 from flexclear.stages import graph, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, open_workplace
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.task import in_order
 from tests.stages.conftest import Command
 
 OWN = Setting("dop853", 1e-6)

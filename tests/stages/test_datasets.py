@@ -16,16 +16,16 @@ import flexclear as fc
 from benchmarks.site import keys
 from benchmarks.site import reference as datasets
 from benchmarks.site.__main__ import stale
+from flexclear.artifacts.coordinates import COORDINATES
+from flexclear.artifacts.store import write_dataset
 from flexclear.commands.__main__ import main
 from flexclear.commands.new import write
-from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
-from flexclear.pipeline.core.artifacts.store import write_dataset
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics import simulate
-from flexclear.pipeline.post.single_run.series import derive
+from flexclear.dynamics import simulate
+from flexclear.post.single_run.series import derive
+from flexclear.scene.load import load_scene
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
+from flexclear.workflow import cores
 
 #: symbols of UDUNITS-2 that datasets use; a product of them, each with an integer exponent, is a unit
 SYMBOLS = ("kg", "m", "s", "N", "Pa", "J", "W", "Hz", "rad")

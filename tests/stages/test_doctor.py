@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from flexclear.commands import doctor, new
-from flexclear.pipeline.dynamics.compile import files
-from flexclear.pipeline.post.render import gl
+from flexclear.dynamics.compile import files
+from flexclear.post.render import gl
 from tests.processes import printed, python
 from tests.stages.conftest import Command
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.artifacts.table import table
 from flexclear.commands import export
-from flexclear.pipeline.core.artifacts.table import table
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.system.errors import InputError
 
 
 @pytest.fixture

@@ -12,19 +12,19 @@ import meshio
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError, ResourceError
-from flexclear.pipeline.core.system.external_files import companions, read_mesh
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow.execute import execute, find, states
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
-from flexclear.pipeline.core.workflow.task import Task, facts
-from flexclear.pipeline.post import pages
-from flexclear.pipeline.structure.fe.exchange import files
-from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.artifacts.store import Record, Store
+from flexclear.post import pages
+from flexclear.scene.load import load_scene
 from flexclear.stages import meshing, simulation
 from flexclear.stages.graph import Graph
+from flexclear.structure.fe.exchange import files
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.system.errors import InputError, ResourceError
+from flexclear.system.external_files import companions, read_mesh
+from flexclear.system.progress import silent
+from flexclear.workflow.execute import execute, find, states
+from flexclear.workflow.fingerprint import TREE, Sources
+from flexclear.workflow.task import Task, facts
 from tests.analytic.solid_models import block, build
 
 SCENE = """

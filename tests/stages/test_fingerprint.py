@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.workflow.fingerprint import WORDING, library_version
+from flexclear.workflow.fingerprint import WORDING, library_version
 from tests.processes import printed
 
 #: runs the tasks up to a post, and an equilibrium, in a fresh process, and prints the own modules that each has loaded
@@ -15,17 +15,17 @@ LOADED = """
 import json, sys
 from pathlib import Path
 root, scene, shortened = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.execute import execute
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.workflow.task import in_order
+from flexclear.scene.load import load_scene
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.execute import execute
+from flexclear.artifacts.store import Store
+from flexclear.workflow.task import in_order
 from flexclear.stages.graph import Graph
 store, sources, records = Store(Path(root)), Sources(Path.cwd()), {}
 graph = Graph(load_scene(scene, shortened), shown=False)
 for task in [*in_order(graph.up_to("post")), graph.linear()]:
     for name in list(sys.modules):
-        if name.startswith(tuple(f"flexclear.pipeline.{t}" for t in ("structure", "dynamics", "post"))):
+        if name.startswith(tuple(f"flexclear.{t}" for t in ("structure", "dynamics", "post"))):
             del sys.modules[name]
     before = {name for name in sys.modules}
     inputs = {name: records[above] for name, above in task.inputs.items()}

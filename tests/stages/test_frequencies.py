@@ -8,9 +8,9 @@ import xarray as xr
 
 import flexclear as fc
 from flexclear.commands.frequencies import text
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError
+from flexclear.scene.load import load_scene
 from flexclear.stages.graph import Graph
+from flexclear.system.errors import FlexclearError, InputError
 from tests.stages.conftest import Command
 
 

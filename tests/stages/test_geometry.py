@@ -11,10 +11,10 @@ import pytest
 from benchmarks import layouts
 from benchmarks.layouts import DANGLE, DZ, Layout, answer, jacobians, poses
 from flexclear.commands.scenes import find_scene
-from flexclear.papers.wang_wang_2019.published import TABLE8
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.scene.load import load_scene
+from flexclear.scene.schema import Scene
+from papers.wang_wang_2019.published import TABLE8
 
 TREE = Path(__file__).resolve().parents[2]
 TAKEN = (0.07, 0.15, 0.35)

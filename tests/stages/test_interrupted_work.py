@@ -14,21 +14,21 @@ import pytest
 import xarray as xr
 from numba import config
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError, StoppedError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run import pieces, trajectory
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.post.overview import comparison
-from flexclear.pipeline.post.single_run.series import derive
+from flexclear import dynamics
+from flexclear.artifacts.store import Store
+from flexclear.dynamics import analyses
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.run import pieces, trajectory
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.post.overview import comparison
+from flexclear.post.single_run.series import derive
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, StoppedError
+from flexclear.system.progress import silent
+from flexclear.workflow import cores, journal, schedule, stopping
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.task import Task
 from tests.analytic.integrator_scenes import double_pendulum, engine_with
 from tests.analytic.mechanism_runs import TREE
 
@@ -161,7 +161,7 @@ def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
 ) -> None:
     """Where a period is being added to the tape, and where all is there and the dataset is made."""
     expected, left = whole(of), [calls]
-    place = f"flexclear.pipeline.dynamics.record.{of}.{part}"
+    place = f"flexclear.dynamics.record.{of}.{part}"
     proper = pkgutil.resolve_name(place)
 
     def failing(*arguments: Any, **more: Any) -> Any:

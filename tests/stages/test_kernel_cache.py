@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.artifacts.disk import checked, publish
-from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.compile import files, folder, machine_code
-from flexclear.pipeline.dynamics.compile.files import compiled, file_lock, load_files, loaded
+from flexclear.artifacts.disk import checked, publish
+from flexclear.artifacts.paths import kernel_root, results_root
+from flexclear.dynamics.compile import files, folder, machine_code
+from flexclear.dynamics.compile.files import compiled, file_lock, load_files, loaded
+from flexclear.system.errors import InputError
 
 #: a constant that a flipped bit of the code would change
 SOURCE = """from numba import cfunc
 
-from flexclear.pipeline.dynamics.compile.files import compiles
+from flexclear.dynamics.compile.files import compiles
 
 
 @compiles(cfunc("float64(float64)"))

@@ -13,14 +13,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.artifacts.disk import read_checked
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow.encounters import meet, noted
-from flexclear.pipeline.core.workflow.execute import execute, find, states
-from flexclear.pipeline.core.workflow.fingerprint import (
+from flexclear.artifacts.disk import read_checked
+from flexclear.artifacts.store import Store
+from flexclear.scene.load import load_scene
+from flexclear.stages import derived_series, rigid_body, simulation
+from flexclear.stages.graph import Graph
+from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
+from flexclear.workflow.encounters import meet, noted
+from flexclear.workflow.execute import execute, find, states
+from flexclear.workflow.fingerprint import (
     TREE,
     Sources,
     code_digest,
@@ -29,9 +31,7 @@ from flexclear.pipeline.core.workflow.fingerprint import (
     source_file,
     sources_of,
 )
-from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
-from flexclear.stages import derived_series, rigid_body, simulation
-from flexclear.stages.graph import Graph
+from flexclear.workflow.task import Task, facts, flatten, in_order, key, reasons
 from tests.processes import copied
 
 LEAVES = (
@@ -89,7 +89,7 @@ def test_reasons_are_words():
 def test_imports_are_collected_from_anywhere_in_a_module():
     text = b"""
 import numpy as np
-from flexclear.pipeline.core.scene import units
+from flexclear.scene import units
 from . import near
 from ..far import thing
 from typing import TYPE_CHECKING
@@ -105,17 +105,17 @@ def f():
             case 1:
                 from xarray import Dataset
 """
-    own, libraries = imported(text, "flexclear.pipeline.post.module", package=False)
+    own, libraries = imported(text, "flexclear.post.module", package=False)
     assert {
-        "flexclear.pipeline.core.scene",
-        "flexclear.pipeline.core.scene.units",
-        "flexclear.pipeline.post.near",
-        "flexclear.pipeline.far.thing",
+        "flexclear.scene",
+        "flexclear.scene.units",
+        "flexclear.post.near",
+        "flexclear.far.thing",
         "flexclear.commands.run",
     } <= own
     assert libraries == {"numpy", "scipy", "xarray"}
-    own, _ = imported(b"from .near import x", "flexclear.pipeline.post", package=True)
-    assert own == {"flexclear.pipeline.post.near", "flexclear.pipeline.post.near.x"}
+    own, _ = imported(b"from .near import x", "flexclear.post", package=True)
+    assert own == {"flexclear.post.near", "flexclear.post.near.x"}
 
 
 def test_sources_are_parsed_while_other_threads_parse(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,13 +129,13 @@ def test_sources_are_parsed_while_other_threads_parse(monkeypatch: pytest.Monkey
         return parse(source)
 
     monkeypatch.setattr(ast, "parse", disturbed)
-    assert imported(b"import numpy", "flexclear.pipeline.core.x", package=False) == (set(), {"numpy"})
+    assert imported(b"import numpy", "flexclear.x", package=False) == (set(), {"numpy"})
     assert len(calls) == 3
 
 
 def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: Sources):
     """Whatever the search leaves out as the name of something in a module is no file."""
-    closure = sources.closure(["flexclear.stages.simulation", "flexclear.papers.wang_wang_2019.figures.panels"])
+    closure = sources.closure(["flexclear.stages.simulation", "papers.wang_wang_2019.figures.panels"])
     named = {name for module in closure.values() for name in module.own} | {
         n for name in closure for n in parents(name)
     }
@@ -254,11 +254,11 @@ def known(root: Path, sources: Sources) -> dict[str, dict[str, str]]:
 
 #: modules, and the scenes that reach them
 REACHED = {
-    "pipeline/dynamics/contact/friction/modified_coulomb.py": {"sps4/csj"},
-    "pipeline/dynamics/contact/normal/lankarani_nikravesh.py": {"sps4/csj"},
-    "pipeline/dynamics/joints/turn_and_slide.py": {"sps4/ideal", "sps4/csj", "sps4/far_cb"},
-    "pipeline/structure/modes/reference/held.py": {"sps4/far_cb"},
-    "pipeline/dynamics/loads/gravity.py": set(),
+    "pipeline/flexclear/dynamics/contact/friction/modified_coulomb.py": {"sps4/csj"},
+    "pipeline/flexclear/dynamics/contact/normal/lankarani_nikravesh.py": {"sps4/csj"},
+    "pipeline/flexclear/dynamics/joints/turn_and_slide.py": {"sps4/ideal", "sps4/csj", "sps4/far_cb"},
+    "pipeline/flexclear/structure/modes/reference/held.py": {"sps4/far_cb"},
+    "pipeline/flexclear/dynamics/loads/gravity.py": set(),
     "papers/wang_wang_2019/figures/panels.py": set(),
 }
 
@@ -310,11 +310,11 @@ def test_words_do_not_count_and_code_does(edit: str):
 
 #: words of code that runs, and code that only finds words
 WORDS = {
-    "pipeline/core/system/platforms.py": ('"""', '"""More words. '),
-    "pipeline/core/scene/registry.py": ('"""', '"""More words. '),
-    "pipeline/core/scene/clearance.py": ("Young's modulus", "modulus of elasticity"),
-    "pipeline/core/scene/validation_errors.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
-    "pipeline/core/scene/citations.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
+    "pipeline/flexclear/system/platforms.py": ('"""', '"""More words. '),
+    "pipeline/flexclear/scene/registry.py": ('"""', '"""More words. '),
+    "pipeline/flexclear/scene/clearance.py": ("Young's modulus", "modulus of elasticity"),
+    "pipeline/flexclear/scene/validation_errors.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
+    "pipeline/flexclear/scene/citations.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
 }
 
 
@@ -333,10 +333,8 @@ def test_the_memo_of_imports_notices_edits(copy: Path):
     roots = ["flexclear.stages.simulation"]
     assert Sources(copy, memo).closure(roots) == Sources(copy).closure(roots)
     assert memo.is_file()
-    path = copy / "stages" / "simulation.py"
-    path.write_text(
-        path.read_text() + "\nimport flexclear.pipeline.core.numerics.rotations\nimport wave\nimport meshio\n"
-    )
+    path = copy / "pipeline" / "flexclear" / "stages" / "simulation.py"
+    path.write_text(path.read_text() + "\nimport flexclear.numerics.rotations\nimport wave\nimport meshio\n")
     edited = Sources(copy, memo).closure(roots)
     assert edited == Sources(copy).closure(roots)
     assert "meshio" in edited["flexclear.stages.simulation"].libraries
@@ -357,7 +355,7 @@ def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytes
 
 
 def test_library_versions_count(sources: Sources):
-    beam = ("flexclear.pipeline.structure.kinds.beam",)
+    beam = ("flexclear.structure.kinds.beam",)
     found = facts(Task("s", "scene", "flexclear.stages.reduction:run", {}, "", modules=beam), {}, sources)
     assert {"library numpy", "library skfem", "library xarray"} <= found.keys()
     assert re.match(r"\d+\.\d+", found["library skfem"])
@@ -394,7 +392,7 @@ def test_code_for_what_a_run_has_not_met_does_not_count(
     root: Path, copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, meets: bool
 ) -> None:
     """What was made without it stays valid when it is edited, and what was made with it does not."""
-    name = "flexclear.pipeline.post.sections.chaos"
+    name = "flexclear.post.sections.chaos"
 
     def run(params: object, inputs: object, progress: object) -> dict[str, bytes]:
         if meets:
@@ -407,7 +405,7 @@ def test_code_for_what_a_run_has_not_met_does_not_count(
     record = execute(task, {}, store, sources, silent)
     assert (f"module {name}" in record.facts) is meets
     assert find(task, {}, store, sources) == record
-    path = copy / "pipeline" / "post" / "sections" / "chaos.py"
+    path = copy / "pipeline" / "flexclear" / "post" / "sections" / "chaos.py"
     path.write_text(path.read_text() + "\nEDITED = 1\n")
     edited = read_again(copy)
     assert find(task, {}, store, edited) == (None if meets else record)

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexclear.artifacts.paths import kernel_root
 from flexclear.commands import scenes
-from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.scene.limits import check_cells
-from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.system import machine
-from flexclear.pipeline.core.system.errors import InputError, ResourceError
-from flexclear.pipeline.structure.fe.exchange import files
+from flexclear.scene.limits import check_cells
+from flexclear.scene.load import load_scene, with_numbers
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
+from flexclear.structure.fe.exchange import files
+from flexclear.system import machine
+from flexclear.system.errors import InputError, ResourceError
 from tests.stages.conftest import JOINT, SCENE, Command
 
 

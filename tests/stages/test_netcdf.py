@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import netcdf
-from flexclear.pipeline.core.artifacts.labelled import labelled, of
+from flexclear.artifacts import netcdf
+from flexclear.artifacts.labelled import labelled, of
 
 
 def everything() -> xr.Dataset:

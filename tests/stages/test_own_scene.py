@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.artifacts.paths import results_root
 from flexclear.commands import check, scenes, show
 from flexclear.commands.check import examined
 from flexclear.commands.export import as_json
 from flexclear.commands.new import KINDS, TEMPLATES, write
-from flexclear.pipeline.core.artifacts.paths import results_root
-from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.json_schema import scene_schema
-from flexclear.pipeline.core.scene.plausibility import implausible
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import InputError
+from flexclear.scene import lines
+from flexclear.scene.json_schema import scene_schema
+from flexclear.scene.plausibility import implausible
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError
 from tests.properties import mechanisms
 from tests.properties.mechanisms import frame, ground, joint, rigid
 from tests.stages.conftest import Command
@@ -95,7 +95,7 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, command: 
 @pytest.fixture(scope="module")
 def validators():
     jsonschema = pytest.importorskip("jsonschema")
-    from flexclear.pipeline.structure.fe.recipe import recipe_schema
+    from flexclear.structure.fe.recipe import recipe_schema
 
     found = [jsonschema.Draft202012Validator(schema) for schema in (scene_schema(), recipe_schema())]
     for one in found:

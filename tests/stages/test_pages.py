@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.post.pages import Part, downloads, media, page, prose, viewer
-from flexclear.pipeline.post.plotting.table import Table, as_html
-from flexclear.pipeline.post.render import film_speed, player
-from flexclear.pipeline.post.render.mechanism import mechanism
-from flexclear.pipeline.post.render.pictures import png
+from flexclear.post.pages import Part, downloads, media, page, prose, viewer
+from flexclear.post.plotting.table import Table, as_html
+from flexclear.post.render import film_speed, player
+from flexclear.post.render.mechanism import mechanism
+from flexclear.post.render.pictures import png
 from tests.browser import Browser, browser, needs_browser
 from tests.paper import synthetic
 

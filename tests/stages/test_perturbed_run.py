@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.artifacts.quantities import LASTING
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import SolverError, StoppedError
-from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.core.workflow import cores, stopping
-from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.horizon import horizon
-from flexclear.pipeline.dynamics.run.horizon.horizon import Pair, PerturbedRun
-from flexclear.pipeline.dynamics.run.run import engine_of, follow
-from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
+from flexclear import dynamics
+from flexclear.artifacts import quantities
+from flexclear.artifacts.quantities import LASTING
+from flexclear.dynamics.run import progress_rate, trajectory
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.horizon import horizon
+from flexclear.dynamics.run.horizon.horizon import Pair, PerturbedRun
+from flexclear.dynamics.run.run import engine_of, follow
+from flexclear.dynamics.run.trajectory import Followed, Stop
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError, StoppedError
+from flexclear.system.progress import Progress, silent
+from flexclear.workflow import cores, stopping
 from tests.analytic.mechanism_runs import TREE
 
 #: nobody waits longer for a thread that does what it should [s]

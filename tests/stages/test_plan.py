@@ -12,20 +12,20 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
+from flexclear.artifacts.effect_size import Influence
 from flexclear.commands import plan
 from flexclear.commands.new import write
-from flexclear.pipeline.core.artifacts.effect_size import Influence
-from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import uncoupled
-from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
-from flexclear.pipeline.dynamics.plan.elements import mesh
-from flexclear.pipeline.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
+from flexclear.dynamics.plan.budget import Chosen, Search
+from flexclear.dynamics.plan.elements import mesh
+from flexclear.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
+from flexclear.scene import variants
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.schema import Scene
+from flexclear.scene.variants import uncoupled
 from flexclear.stages import effect_plan
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, open_workplace
+from flexclear.system.errors import InputError
 from tests.properties.mechanisms import frame, joint, rigid
 from tests.stages.conftest import Command
 from tests.stages.plans import standing_leg

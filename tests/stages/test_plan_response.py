@@ -9,15 +9,15 @@ import pytest
 from scipy.optimize import brentq
 
 from flexclear.commands.new import write
-from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, opening_map
-from flexclear.pipeline.dynamics.linear.response import first_excited, vibration
-from flexclear.pipeline.dynamics.model.constraints import constraints
-from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.plan.search import summed
+from flexclear.dynamics.linear.clearance_response import SQUARED_RANK, opening_map
+from flexclear.dynamics.linear.response import first_excited, vibration
+from flexclear.dynamics.model.constraints import constraints
+from flexclear.dynamics.model.merge import Placement
+from flexclear.dynamics.plan.search import summed
+from flexclear.scene import variants
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import Quantity
+from flexclear.scene.schema import Scene
 from tests.properties.mechanisms import rigid
 from tests.stages.plans import DENSITY, GRAVITY, LENGTH, MODULUS, PLATFORM, RADIUS, START, Pilot, pilot, standing_leg
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from flexclear.pipeline.core.system.log import LOG, set_level, write_to
-from flexclear.pipeline.core.workflow.progress import Monitor, duration
+from flexclear.system.log import LOG, set_level, write_to
+from flexclear.workflow.progress import Monitor, duration
 
 
 class Screen(io.StringIO):

@@ -10,8 +10,8 @@ import xarray as xr
 
 import flexclear as fc
 from flexclear.commands.report import publish_page
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.overview.comparison import colors
+from flexclear.post.overview.comparison import colors
+from flexclear.scene.load import load_scene
 from flexclear.stages.graph import Graph
 from tests.stages.conftest import Command
 
@@ -67,7 +67,7 @@ def test_a_model_has_the_same_colour_in_every_figure():
         found = xr.Dataset(attrs={"parameters": json.dumps({"body": body})})
         return found.expand_dims(contact=["A"]) if contact else found
 
-    from flexclear.papers.wang_wang_2019 import models
+    from papers.wang_wang_2019 import models
 
     both = colors(
         {"ideal": run(0, None), "csj": run(1, None), "cb": run(0, "craig-bampton"), "free": run(1, "free-free")}

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.artifacts.store import Store
 from flexclear.commands import report
 from flexclear.commands.answers import Answers
 from flexclear.commands.new import write
-from flexclear.papers.wang_wang_2019.tasks import Scenes, figure_tasks
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError, SolverError
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages.workplace import Workplace
+from flexclear.system.errors import FlexclearError, InputError, ResourceError, SolverError
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.task import in_order
+from papers.wang_wang_2019.tasks import Scenes, figure_tasks
 from tests.stages.conftest import Command
 
 

@@ -18,7 +18,7 @@ print(*(done.records[task].digest for task in graph.bundle.values()))
 
 #: threads that BLAS has in a task: of a NumPy that this program loads, then where somebody has set another number
 AFTER = """
-from flexclear.pipeline.core.system import threads
+from flexclear.system import threads
 import numpy
 from threadpoolctl import threadpool_info, threadpool_limits
 count = lambda: {library["num_threads"] for library in threadpool_info()}
@@ -46,10 +46,10 @@ def test_a_task_has_one_thread_whoever_has_set_more() -> None:
 #: docstrings of a module, a class and a compiled kernel, which become references, titles and meanings of keys
 DOCSTRINGS = """
 from importlib import import_module
-from flexclear.pipeline.core.scene.citations import docstring
+from flexclear.scene.citations import docstring
 places = [("integrate.dop853", ""), ("contact.normal.hertz", ""), ("contact.law", "Hysteresis")]
 for module, name in places:
-    thing = import_module(f"flexclear.pipeline.dynamics.{module}")
+    thing = import_module(f"flexclear.dynamics.{module}")
     print(" ".join((docstring(getattr(thing, name) if name else thing) or "").split()))
 """
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import flexclear as fc
-from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.post.render import gl, surfaces
-from flexclear.pipeline.post.render.ruler import pixels_per_metre, project, round_length
-from flexclear.pipeline.post.render.start_view import AXIS, columns, heights, page_view
+from flexclear.post.render import gl, surfaces
+from flexclear.post.render.ruler import pixels_per_metre, project, round_length
+from flexclear.post.render.start_view import AXIS, columns, heights, page_view
+from flexclear.workflow.fingerprint import TREE
 from tests.processes import printed
 from tests.stages.conftest import Command
 
@@ -44,13 +44,16 @@ def test_nothing_that_compiles_is_imported(root: Path):
         "import sys, flexclear as fc; [fc.show(scene) for scene in sys.argv[1:]]; "
         "assert not {'numba', 'llvmlite'} & set(sys.modules), 'something that compiles was imported'"
     )
-    scenes = (str(root / name) for name in ("scenes/sps4/csj.toml", "stages/templates/slider_crank/slider_crank.toml"))
+    scenes = (
+        str(root / name)
+        for name in ("scenes/sps4/csj.toml", "pipeline/flexclear/stages/templates/slider_crank/slider_crank.toml")
+    )
     printed(program, *scenes)
 
 
 def test_a_loop_that_does_not_close_is_a_gap_of_its_length(root: Path):
     """A four-bar whose rocker's foot is moved away by twice what the links can reach over."""
-    path = root / "stages/templates/four_bar/four_bar.toml"
+    path = root / "pipeline/flexclear/stages/templates/four_bar/four_bar.toml"
     scene = fc.load_scene(path)
     low = np.array(scene.body["ground"].frames["D"].position)
     whole = fc.load_scene(path, override={"body.ground.frames.D.position": (low + np.array((0.3, 0.0, 0.0))).tolist()})
@@ -77,7 +80,7 @@ def test_the_command_writes_where_it_runs(
 
 def test_check_shows_what_it_refuses(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command):
     monkeypatch.chdir(tmp_path)
-    scene = (root / "stages/templates/four_bar/four_bar.toml").read_text(encoding="utf-8")
+    scene = (root / "pipeline/flexclear/stages/templates/four_bar/four_bar.toml").read_text(encoding="utf-8")
     moved = re.sub(r"(frames\.D = .*position = \[)[^,]+", r'\g<1>"900 mm"', scene)
     assert moved != scene
     Path("apart.toml").write_text(moved, encoding="utf-8")
@@ -104,7 +107,7 @@ def test_axes_lie_along_the_joints(root: Path):
 def test_the_bar_is_as_long_as_it_says(root: Path):
     """Two points across the line of sight, in the plane of the point that is looked at."""
     drawn = fc.show(root / "scenes/sps4/csj.toml").view.drawn
-    from flexclear.pipeline.post.render.view import eye
+    from flexclear.post.render.view import eye
 
     place, focus = eye(drawn.view, drawn.cloud, 1.6)
     right = np.cross(drawn.view.up, place - focus)

@@ -146,7 +146,7 @@ def test_an_outcome_depends_on_the_parts_of_its_scene_and_not_on_the_page():
     """Editing a friction law leaves a case without friction alone; what only shows outcomes leaves all alone."""
     rough, smooth = (atlas.modules(Case("friction", Parameters(friction=f))) for f in (0.1, 0.0))
     assert {name for name in rough - smooth if "friction" in name}
-    assert not {name for name in rough if name.startswith(("flexclear.pipeline.post", "benchmarks.families"))}
+    assert not {name for name in rough if name.startswith(("flexclear.post", "benchmarks.families"))}
 
 
 def recorded(case: Case, **outcome: Any) -> Record:

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.artifacts import disk, netcdf
+from flexclear.artifacts.disk import publish
+from flexclear.artifacts.labelled import of
+from flexclear.artifacts.store import Record, Store, write_dataset
 from flexclear.commands.new import write
-from flexclear.pipeline.core.artifacts import disk, netcdf
-from flexclear.pipeline.core.artifacts.disk import publish
-from flexclear.pipeline.core.artifacts.labelled import of
-from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
-from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.system.errors import ResourceError
 from tests.processes import printed
 from tests.stages.conftest import Command
 
@@ -206,7 +206,7 @@ def test_what_a_killed_process_left_is_swept_and_never_read(store: Store):
 
 def test_the_lock_holds_between_processes(store: Store):
     code = (
-        "import sys; from pathlib import Path; from flexclear.pipeline.core.artifacts.store import Store\n"
+        "import sys; from pathlib import Path; from flexclear.artifacts.store import Store\n"
         "with Store(Path(sys.argv[1])).lock('simulate', sys.argv[2], lambda: print('waiting', flush=True)):\n"
         "    print('mine', flush=True)"
     )

@@ -13,19 +13,19 @@ from scipy.special import ellipk
 import flexclear as fc
 from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
-from flexclear.pipeline.core.scene.design import design
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.sweep import read_sweep
-from flexclear.pipeline.core.scene.units import udunits
-from flexclear.pipeline.core.system.errors import InputError, ResourceError
-from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import STORE
-from flexclear.pipeline.dynamics import analyses
-from flexclear.pipeline.dynamics.run.evaluation import engine
-from flexclear.pipeline.post.overview.sweep_figures import figures
+from flexclear.dynamics import analyses
+from flexclear.dynamics.run.evaluation import engine
+from flexclear.post.overview.sweep_figures import figures
+from flexclear.scene.design import design
+from flexclear.scene.load import load_scene
+from flexclear.scene.sweep import read_sweep
+from flexclear.scene.units import udunits
 from flexclear.stages.simulation import modules
 from flexclear.stages.sweeps import sweep_plan
+from flexclear.system.errors import InputError, ResourceError
+from flexclear.system.progress import silent
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.task import STORE
 from tests.processes import printed
 from tests.properties.mechanisms import simulated
 
@@ -343,8 +343,8 @@ def test_the_example_of_a_sensitivity_has_shares_of_a_whole(root: Path, tmp_path
 LOADED = """
 import sys
 import numpy, xarray
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.sweep import read_sweep
+from flexclear.scene.load import load_scene
+from flexclear.scene.sweep import read_sweep
 from flexclear.stages.sweeps import sweep_plan
 from flexclear.stages.workplace import open_workplace
 table = {"scene": "x", "keep": ["pin.peak_force"], "vary": {"time.end": [1e-4]}}
@@ -353,7 +353,7 @@ import pickle
 (family,), (job,) = plan.families, plan.jobs
 before = set(sys.modules)
 for name in list(before):
-    if name.startswith("flexclear.pipeline.dynamics"):
+    if name.startswith("flexclear.dynamics"):
         del sys.modules[name]
 before = set(sys.modules)
 from flexclear.stages.sweeps.sweep_points import work

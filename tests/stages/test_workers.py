@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.artifacts.paths import TREE
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.system.errors import ResourceError
-from flexclear.pipeline.core.workflow import cores, stopping, workers
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.progress import Monitor
-from flexclear.pipeline.core.workflow.schedule import bring
-from flexclear.pipeline.core.workflow.task import Task
+from flexclear.artifacts.paths import TREE
+from flexclear.artifacts.store import Store
+from flexclear.system.errors import ResourceError
+from flexclear.workflow import cores, stopping, workers
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.progress import Monitor
+from flexclear.workflow.schedule import bring
+from flexclear.workflow.task import Task
 from tests.processes import python
 
 
@@ -80,12 +80,12 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
 UNGUARDED = """
 import sys
 from pathlib import Path
-from flexclear.pipeline.core.artifacts.paths import TREE
-from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.progress import Monitor
-from flexclear.pipeline.core.workflow.schedule import bring
-from flexclear.pipeline.core.workflow.task import Task
+from flexclear.artifacts.paths import TREE
+from flexclear.artifacts.store import Store
+from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.progress import Monitor
+from flexclear.workflow.schedule import bring
+from flexclear.workflow.task import Task
 print("once", flush=True)
 tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in "ab"]
 print(len(bring(tasks, Store(Path(sys.argv[1])), Sources(TREE), Monitor(), 2).failures))

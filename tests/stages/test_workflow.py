@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from flexclear.pipeline.core.artifacts.disk import _host
+from flexclear.artifacts.disk import _host
 from tests.stages.conftest import CONTACT, JOINT, PATIENCE, SCENE, Project
 
 
@@ -30,12 +30,12 @@ def test_why_says_what_changed_and_run_does_just_that(project: Project):
     assert never.split() == ["tiny/contact", "simulate", "never", "run", "post", "never", "run"]
     project.run("run", "tiny/contact")
     project.edit("scenes/tiny/contact.toml", "0.5 mm", "0.2 mm")
-    with (project.folder / "pipeline/dynamics/contact/normal/lankarani_nikravesh.py").open("a") as file:
+    with (project.folder / "pipeline/flexclear/dynamics/contact/normal/lankarani_nikravesh.py").open("a") as file:
         file.write("\nEDITED = 1\n")
     lines = [line.strip() for line in project.run("why", "tiny/contact").stdout.splitlines()]
     assert lines == [
         "tiny/contact",
-        "simulate         module flexclear.pipeline.dynamics.contact.normal.lankarani_nikravesh changed",
+        "simulate         module flexclear.dynamics.contact.normal.lankarani_nikravesh changed",
         "scene.joint.J.clearance: 0.0005 -> 0.0002",
         "post             its input run would be computed again",
     ]
@@ -43,7 +43,7 @@ def test_why_says_what_changed_and_run_does_just_that(project: Project):
     project.run("run", "tiny/contact")
     assert project.calls() == ["simulate tiny/contact", "post tiny/contact"]
     project.edit("scenes/tiny/contact.toml", "0.2 mm", "0.5 mm")
-    project.edit("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", "\nEDITED = 1\n", "")
+    project.edit("pipeline/flexclear/dynamics/contact/normal/lankarani_nikravesh.py", "\nEDITED = 1\n", "")
     project.run("run", "tiny/contact")
     assert project.calls() == []  # what was made before the edits is still in the cache
 
@@ -53,7 +53,7 @@ def test_equal_results_stop_the_chain(project: Project):
     project.run("run", "tiny/ideal")
     project.calls()
     first = "from __future__ import annotations\n"
-    project.edit("stages/simulation.py", first, first + "\nEDITED = 1\n")
+    project.edit("pipeline/flexclear/stages/simulation.py", first, first + "\nEDITED = 1\n")
     project.run("run", "tiny/ideal", "--to", "simulate")
     assert project.calls() == ["simulate tiny/ideal"]
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
@@ -217,7 +217,7 @@ def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_cur
     folder = project.results / "runs" / "tiny" / "ideal"
     project.run("run", "tiny/ideal")
     assert not (folder / "OUTDATED.txt").exists()
-    engine = "pipeline/dynamics/__init__.py"
+    engine = "pipeline/flexclear/dynamics/__init__.py"
     project.edit(engine, 'if "fails" in scene.name', 'if "ideal" in scene.name')
     assert project.run("run", "tiny/ideal").returncode == 3
     reported = (folder / "OUTDATED.txt").read_text()

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from math import pi
 
-from flexclear.pipeline.core.scene.laws import Cycloidal
-from flexclear.pipeline.core.scene.units import quantity
-from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
+from flexclear.dynamics.drives.pieces import Piece, Pieces
+from flexclear.scene.laws import Cycloidal
+from flexclear.scene.units import quantity
 
 
 def pieces(law: Cycloidal, dimension: str) -> Pieces:

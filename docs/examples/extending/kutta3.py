@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate import hermite
-from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
-from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate import hermite
+from flexclear.dynamics.integrate.method import Method, begin_afresh, keep_nothing
+from flexclear.dynamics.integrate.runge_kutta import make_stages
+from flexclear.scene.integrators import INTEGRATORS
 
 STAGES = 3
 A = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [-1.0, 2.0, 0.0]])

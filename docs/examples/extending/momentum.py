@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.dynamics.record.motion import Motions
 
 
 def record(motions: Motions, asked: tuple[str, ...]) -> tuple[dict, dict]:

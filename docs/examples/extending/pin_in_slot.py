@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z, rates_are_speeds
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, about_z
+from flexclear.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z, rates_are_speeds
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.vectors import ZERO, about_z
 
 
 @kernel

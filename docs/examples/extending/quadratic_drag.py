@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import QuadraticDrag
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import act, number
-from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import cross, dot, scale
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.loads.fields import act, number
+from flexclear.dynamics.loads.row import Row
+from flexclear.dynamics.vectors import cross, dot, scale
+from flexclear.scene.loads import QuadraticDrag
 
 
 @kernel

@@ -7,6 +7,6 @@ Source: Safaeifar & Farshidianfar (2020), Multibody System Dynamics 50, 233-257.
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics.contact.law import Hysteresis
+from flexclear.dynamics.contact.law import Hysteresis
 
 LAW = Hysteresis("safaeifar-farshidianfar", lambda c_r: 1.25 * (1.0 - c_r) / c_r, valid=(0.6, 1.0))

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.contact.friction.law import Friction, sliding
-from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.dynamics.contact.friction.law import Friction, sliding
+from flexclear.dynamics.kernels import kernel
 
 
 @kernel

@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.scene.registry import lookup
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Drawing
 
-    from flexclear.pipeline.core.system.progress import Progress
-    from flexclear.pipeline.post.plotting.table import Table
+    from flexclear.post.plotting.table import Table
+    from flexclear.system.progress import Progress
 
 KIND = "figure or table"
 NAMES = {
@@ -80,7 +80,7 @@ def figure(name: str) -> Figure:
 
 def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Stage: draw ``<name>.png`` and ``.svg`` of a figure, or ``.csv`` and ``.md`` of a table; inputs by reference."""
-    from flexclear.pipeline.post.plotting import style, table
+    from flexclear.post.plotting import style, table
 
     name = params["figure"]
     with style.style():

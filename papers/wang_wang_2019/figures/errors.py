@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019 import models as paper
-from flexclear.papers.wang_wang_2019.deviations import (
+from flexclear.post.plotting.table import Table
+from flexclear.post.single_run.series import parameters
+from papers.wang_wang_2019 import models as paper
+from papers.wang_wang_2019.deviations import (
     Deviation,
     ensemble_deviations,
     max_deviation,
     velocity_at_events,
 )
-from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, drawn
-from flexclear.papers.wang_wang_2019.published import TABLE7, TABLE8, TABLE9, MaximumError
-from flexclear.pipeline.post.plotting.table import Table
-from flexclear.pipeline.post.single_run.series import parameters
+from papers.wang_wang_2019.figures import ABSENT, Data, drawn
+from papers.wang_wang_2019.published import TABLE7, TABLE8, TABLE9, MaximumError
 
 #: row heads, attribute of Deviation, factor to the unit, attribute of MaximumError (None: not in the paper)
 ROWS: tuple[tuple[str, str, float, str | None], ...] = (

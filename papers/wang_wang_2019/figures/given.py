@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019 import published
-from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, Figure, drawn
-from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
-from flexclear.papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
-from flexclear.pipeline.post.plotting.table import Table
-from flexclear.pipeline.post.single_run.series import parameters
-from flexclear.pipeline.structure import closed_form
+from flexclear.post.plotting.table import Table
+from flexclear.post.single_run.series import parameters
+from flexclear.structure import closed_form
+from papers.wang_wang_2019 import published
+from papers.wang_wang_2019.figures import ABSENT, Data, Figure, drawn
+from papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
+from papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
 
 COLUMNS = (
     "mode",

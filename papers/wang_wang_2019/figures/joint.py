@@ -7,12 +7,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from flexclear.papers.wang_wang_2019.figures import Data, drawn
-from flexclear.papers.wang_wang_2019.figures.phase import at_times
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, comparable_until, references
-from flexclear.pipeline.dynamics.contact.friction import modified_coulomb
-from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.single_run.series import parameters
+from flexclear.dynamics.contact.friction import modified_coulomb
+from flexclear.post.plotting import style
+from flexclear.post.single_run.series import parameters
+from papers.wang_wang_2019.figures import Data, drawn
+from papers.wang_wang_2019.figures.phase import at_times
+from papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, comparable_until, references
 
 #: drawn radii of socket and ball, and the direction of the ball's eccentricity
 SOCKET, DRAWN_BALL, ANGLE = 1.0, 0.74, np.radians(-38.0)

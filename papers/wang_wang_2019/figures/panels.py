@@ -10,11 +10,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from flexclear.papers.wang_wang_2019 import models as paper
-from flexclear.papers.wang_wang_2019.figures import Data, Figure, drawn
-from flexclear.papers.wang_wang_2019.models import Quantity
-from flexclear.pipeline.core.artifacts.quantities import common_times
-from flexclear.pipeline.post.plotting import style
+from flexclear.artifacts.quantities import common_times
+from flexclear.post.plotting import style
+from papers.wang_wang_2019 import models as paper
+from papers.wang_wang_2019.figures import Data, Figure, drawn
+from papers.wang_wang_2019.models import Quantity
 
 #: alpha of a curve inside its horizon, of a curve that the paper lacks, and beyond the horizon
 FIRM, ADDED, PALE = 0.95, 0.4, 0.28

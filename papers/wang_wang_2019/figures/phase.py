@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure
-from flexclear.papers.wang_wang_2019.models import (
+from flexclear.post.plotting import style
+from papers.wang_wang_2019.figures import Data, Figure
+from papers.wang_wang_2019.models import (
     ACCELERATION,
     ANGLE,
     CSJ,
@@ -25,7 +26,6 @@ from flexclear.papers.wang_wang_2019.models import (
     motion,
     references,
 )
-from flexclear.pipeline.post.plotting import style
 
 MODELS = (IDEAL, CSJ, *FAR_CSJ)
 #: ticks of an axis that is logarithmic on both sides of zero

@@ -12,14 +12,14 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 from matplotlib.text import Text
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure, drawn
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CB, FAR_CSJ_CB, IDEAL, JOINT
-from flexclear.papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE5_NORMAL_MODE
-from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.plotting.drawing import View, shell, triad, tube, view
-from flexclear.pipeline.post.shapes.body_shape import rod_surface as surface
-from flexclear.pipeline.post.shapes.body_shape import scale_to
-from flexclear.pipeline.post.single_run.series import parameters
+from flexclear.post.plotting import style
+from flexclear.post.plotting.drawing import View, shell, triad, tube, view
+from flexclear.post.shapes.body_shape import rod_surface as surface
+from flexclear.post.shapes.body_shape import scale_to
+from flexclear.post.single_run.series import parameters
+from papers.wang_wang_2019.figures import Data, Figure, drawn
+from papers.wang_wang_2019.models import CSJ, FAR_CB, FAR_CSJ_CB, IDEAL, JOINT
+from papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE5_NORMAL_MODE
 
 LEGS = (1, 2, 3, 4)
 TOWARDS, UP = np.array([0.75, -1.35, 0.55]), np.array([0.0, 0.0, 1.0])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.figures import ABSENT, Data, drawn
-from flexclear.papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE6, TABLE10
-from flexclear.pipeline.post.overview.curves import rounded
-from flexclear.pipeline.post.plotting.table import Table
+from flexclear.post.overview.curves import rounded
+from flexclear.post.plotting.table import Table
+from papers.wang_wang_2019.figures import ABSENT, Data, drawn
+from papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE6, TABLE10
 
 REFERENCE = "sps4/ideal"
 #: settings as the timing calls them, and their names in column heads

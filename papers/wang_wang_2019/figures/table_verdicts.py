@@ -8,17 +8,17 @@ from functools import partial
 
 import numpy as np
 
-from flexclear.papers.wang_wang_2019 import deviations
-from flexclear.papers.wang_wang_2019 import models as paper
-from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
-from flexclear.papers.wang_wang_2019.figures import Data, drawn
-from flexclear.papers.wang_wang_2019.figures.errors import NOISE
-from flexclear.papers.wang_wang_2019.figures.table10 import ratios
-from flexclear.papers.wang_wang_2019.models import mode_set
-from flexclear.papers.wang_wang_2019.published import TABLE10
-from flexclear.pipeline.core.artifacts.paths import TREE
-from flexclear.pipeline.core.scene.output import rows
-from flexclear.pipeline.post.plotting.table import Table
+from flexclear.artifacts.paths import TREE
+from flexclear.post.plotting.table import Table
+from flexclear.scene.output import rows
+from papers.wang_wang_2019 import deviations
+from papers.wang_wang_2019 import models as paper
+from papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
+from papers.wang_wang_2019.figures import Data, drawn
+from papers.wang_wang_2019.figures.errors import NOISE
+from papers.wang_wang_2019.figures.table10 import ratios
+from papers.wang_wang_2019.models import mode_set
+from papers.wang_wang_2019.published import TABLE10
 
 #: verdicts on the repeated stroke, which take two hours and are stored in the repository (`make chaos`)
 SECTIONS = "docs/chaos/verdicts.csv"

@@ -1,1 +1,0 @@
-"""Scenes, artifacts and workflow, which all towers use. Imports nothing from the towers."""

@@ -1,0 +1,105 @@
+"""Deficits of a bundle, in words and as a table, from the bundle alone.
+
+The simulate stage calls `warnings` with the frames at which joints and drives act on the body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.artifacts.labelled import Labelled
+
+#: fraction of the static compliance below which a warning is given
+ENOUGH_COMPLIANCE = 0.9
+#: reference conditions whose shapes represent static loads at the interfaces exactly
+STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")
+WIDTH = 9
+
+
+def table(bundle: xr.Dataset) -> str:
+    """Return the deficits of a bundle (schema BUNDLE) as lines of text."""
+    a = bundle.attrs
+    resolved = float(a["resolved_frequency"])
+    first = float(a["first_free_frequency"])
+    lines = [
+        f"{a['title'] or 'flexible body'}: {a['reference']}, {a['count']} coordinates",
+        f"  rigid motion: {a['rigid_motion']}",
+        f"  frequencies of the free body within 1 %: up to {resolved:.6g} Hz"
+        if resolved
+        else f"  frequencies of the free body within 1 %: none; the first is at {first:.6g} Hz",
+        "  static compliance, per cent of the full model, axes of the frame",
+        _row("frame", "held", bundle["direction"].values.tolist()),
+    ]
+    names = [str(name) for name in bundle["frame"].values]
+    for name in names:
+        for held in [other for other in names if other != name] + [name]:
+            fraction = bundle["compliance_share"].sel(frame=name, frame_held=held).values
+            shown = [_percent(value) for value in fraction]
+            lines.append(_row(name, "nothing" if held == name else held, shown))
+    lines += ["  largest error of a frame's motion under a unit load on it, m/N and rad/(N m)"]
+    lines.append(_row("frame", "load, Hz", bundle["direction"].values.tolist()))
+    for name in names:
+        for hertz in bundle["bound_frequency"].values:
+            bound = bundle["error_bound"].sel(frame=name, bound_frequency=hertz).values
+            lines.append(_row(name, f"{hertz:.5g}", [f"{value:.2e}" for value in bound]))
+    total = bundle["effective_mass"].sum("mode").values
+    lines += ["  effective mass of all modes, kg and kg m2"]
+    lines.append(_row("", "", [f"{value:.3g}" for value in total]))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _row(frame: str, held: str, values: Sequence[object]) -> str:
+    return f"  {frame:<14} {held:<10}" + "".join(f"{value!s:>{WIDTH + 1}}" for value in values)
+
+
+def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body") -> list[str]:
+    """Return sentences about static compliance that the modes lack between the frames at which forces act.
+
+    frames_used: named frames of the bundle. A single frame is judged with nothing held.
+    """
+    used = list(dict.fromkeys(frames_used))
+    pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]] or [(i, i) for i in used]
+    messages, names = [], [str(name) for name in bundle["frame"].values]
+    directions = bundle["direction"].values
+    for name, held in pairs:
+        i, j = names.index(name), names.index(held)
+        fraction = np.minimum(bundle["compliance_share"].values[i, j], bundle["compliance_share"].values[j, i])
+        low = fraction < ENOUGH_COMPLIANCE
+        if not low.any():
+            continue
+        where = f"of '{name}'" if name == held else f"between '{held}' and '{name}'"
+        amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(directions[low], fraction[low], strict=True))
+        messages.append(
+            f"{body}: its {bundle.attrs['reference']} modes have too little of the static compliance {where} "
+            f"({amounts} of the full model's): the body is too stiff at joints of these frames. {_remedy(bundle, used)}"
+        )
+    return messages
+
+
+def _remedy(bundle: Labelled, used: Sequence[str]) -> str:
+    """Return the remedy for missing compliance: static shapes, static shapes of all frames used, or more modes."""
+    if bundle.attrs["reference"] not in STATIC:
+        return f'Add static shapes: modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
+    had = str(bundle.attrs.get("interfaces", "")).split()
+    without = [name for name in used if name not in had]
+    if without:
+        return (
+            f"The body has no static shapes for {_listed(without)}; name all the frames used: "
+            f"modes = {{ interfaces = {_listed(used)}, ... }}"
+        )
+    return f"The body has static shapes; retain more normal modes than now (count = {bundle.attrs['count']})"
+
+
+def _percent(fraction: float) -> str:
+    """Return a fraction in per cent with three digits; fractions of the size of rounding errors are 0."""
+    return f"{100.0 * fraction:.3g}" if fraction > 1e-9 else "0"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return "[" + ", ".join(f'"{name}"' for name in names) + "]"

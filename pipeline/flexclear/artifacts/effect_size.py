@@ -1,0 +1,304 @@
+r"""Effect size: how far two variants of a scene differ in a quantity, and the uncertainty of the difference.
+
+Variants with contacts are run from several starts that differ by a tiny offset. Where these members agree, their mean
+is the motion. Where they separate, beyond the predictability horizon, the mean is a statistic, and the difference of
+two means is known only to its standard error:
+
+.. math:: d(t) = \sqrt{\max(0, |\bar a - \bar b|^2 - (k\,s)^2)}, \quad s^2 = (s_a^2 + s_b^2)/n
+
+The number k of standard errors attributed to chance is Student's t for n members. s(t) is at least its root mean square
+over a twentieth of the series around t: a few separated members agree at some output by accident, and among hundreds of
+outputs a few would look like differences. Without spread d is the distance of the two motions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+from scipy.special import stdtrit
+
+from flexclear.artifacts.points import Point, unpacked
+from flexclear.numerics.rotations import rotation_between
+from flexclear.scene.quantity import CONTACT_REDUCTIONS, Quantity, Recorded
+
+#: probability of a difference of means by chance below which it counts: 1 in 10 that one of 100 comparisons shows one
+RARE = 1e-3
+#: the same probability for two ways of integration: rejecting a good way costs evaluations only
+LIKELY = 0.05
+#: fraction of a series over which the spread of members is pooled
+POOLED = 0.05
+#: recorded reductions of quantities that are not of contacts: the series, and the largest value, which an impact may
+#: cause between outputs
+OTHERS = ("series", "largest")
+#: changes of a vector's component below this fraction of the vector's largest magnitude are rounding
+ROUNDING = 1e-12
+#: a difference is real when it is at least so many times its uncertainty by chance or by errors of the runs
+REAL = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Influence:
+    """Difference of two variants in the quantity's SI unit, and its uncertainty by chance.
+
+    difference: infinite when one variant lacks the quantity, or the numbers of impacts differ.
+    """
+
+    difference: float
+    uncertainty: float = 0.0
+
+    @property
+    def most(self) -> float:
+        """Largest difference that is not excluded."""
+        return self.difference + self.uncertainty
+
+    @property
+    def real(self) -> bool:
+        """True when the difference exceeds its uncertainty by the factor REAL, whatever its size."""
+        return self.difference >= REAL * self.uncertainty
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Error of a planned run against the full one at the decisive output, and the error allowed there [SI].
+
+    allowed: the requested accuracy; beyond the horizon, where two runs of the full scene from indistinguishable starts
+    differ by more, that difference as a root mean square. horizon: fraction of the run up to which such runs agree
+    within the requested accuracy; 1 where they agree throughout, 0 where a number without time differs.
+    """
+
+    error: float
+    chance: float
+    allowed: float
+    horizon: float = 1.0
+
+    @property
+    def fraction(self) -> float:
+        """Sum of error and chance as a fraction of the allowed error."""
+        most = self.error + self.chance
+        return most / self.allowed if self.allowed > 0.0 else np.inf if most > 0.0 else 0.0
+
+    @property
+    def met(self) -> bool:
+        """True when error and chance together are within the allowed error."""
+        return self.error + self.chance <= self.allowed
+
+    @property
+    def missed(self) -> bool:
+        """True when the error exceeds the allowed error by more than chance."""
+        return self.error - self.chance > self.allowed
+
+    def enough(self, members: int) -> float:
+        """Return how many members would decide if the difference stays as it is; infinity where no number would.
+
+        members: number of members behind this agreement.
+        """
+        room = self.allowed - self.error if self.error < self.allowed else self.error - self.allowed
+        return members * (self.chance / room) ** 2 if room > 0.0 else np.inf
+
+
+def chance(members: int) -> float:
+    """Return Student's t for a difference of two means over `members` runs each, exceeded by chance with RARE."""
+    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
+
+
+def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
+    """Return the recorded values by which runs are compared, without quantities that their scene does not have.
+
+    owners: names of the scene's components, by kind.
+    """
+    there = [q for q in chosen if q.is_there(owners)]
+    every = [*(one for q in there for one in _compared(q)), *(_whole(q) for q in there if q.component)]
+    return list({one.name: one for one in every}.values())
+
+
+def _whole(quantity: Quantity) -> Recorded:
+    """Return the largest magnitude of the vector of which a quantity is a component."""
+    return Recorded(replace(quantity, component="", text=""), "largest")
+
+
+def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
+    """Return the point in an artifact of `stages.watched_quantities`."""
+    return unpacked(stored, recorded(owners, chosen))["point"]
+
+
+def _compared(quantity: Quantity) -> list[Recorded]:
+    reductions = ("series",) if quantity.of_place else CONTACT_REDUCTIONS.get(quantity.kind, OTHERS)
+    return [Recorded(quantity, reduction) for reduction in reductions]
+
+
+def _turns(what: Recorded) -> bool:
+    """Return True for a quaternion, which changes by half the angle."""
+    return what.quantity.kind == "orientation"
+
+
+def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
+    """Return the difference of two variants in a quantity; zero where it is rounding.
+
+    members: number of starts run of each; a point without deviations counts as exactly known.
+    """
+    if quantity.kind == "impact_times":
+        return _impact_times(a, b, quantity.name)
+    differences, uncertainties = [], []
+    for what in _compared(quantity):
+        distance, error = _along(a, b, what, members)
+        uncertainty = chance(members) * error
+        differences.append(float(_beyond(distance, uncertainty).max(initial=0.0)))
+        uncertainties.append(float(uncertainty.max(initial=0.0)))
+    result = Influence(max(differences), max(uncertainties))
+    return Influence(0.0) if result.most <= max(rounding(a, quantity), rounding(b, quantity)) else result
+
+
+def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance of two means at each output and its standard error; infinite where a quantity is missing.
+
+    Points with equal values and deviations are the same members: their distance is zero, without error.
+    """
+    if what.name not in a.values or what.name not in b.values:
+        return np.array([np.inf]), np.zeros(1)
+    one, two = (_rows(p.values[what.name]) for p in (a, b))
+    deviations = [_deviations(p, what) for p in (a, b)]
+    if np.array_equal(one, two) and np.array_equal(deviations[0], deviations[1]):
+        return np.zeros(len(one)), np.zeros(len(one))
+    error = _pooled(np.hypot(*deviations) / np.sqrt(max(members, 1)))
+    if _turns(what):
+        return rotation_between(*(q / np.linalg.norm(q, axis=1, keepdims=True) for q in (one, two))), error
+    return np.linalg.norm(one - two, axis=1), error
+
+
+def _beyond(distance: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
+    """Return the part of distances that exceeds chance."""
+    squares: np.ndarray = np.maximum(0.0, distance**2 - uncertainty**2)
+    return np.sqrt(squares)
+
+
+def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Influence:
+    """Return the difference of two ways to integrate one scene from the same two or more starts, in the SI unit.
+
+    While runs of b agree within the requested accuracy, the error is the mean of the differences over the starts, less
+    LIKELY chance by Student's paired t. The rest of that mean is uncertain. Beyond, only the excess over LIKELY chance
+    of a difference of means that scatter as b does counts, as a fraction of the error allowed there
+    (`Agreement.allowed`): a larger scatter of a is no excuse.
+    """
+    if quantity.kind == "impact_times":
+        return _impact_times(a, b, quantity.name)
+    n, error, most = len(b.members), 0.0, 0.0
+    for what in _compared(quantity):
+        distance, _ = _along(a, b, what, n)
+        if np.isinf(distance).any():
+            return Influence(np.inf)
+        of_pairs, allowed = _of_pairs(a, b, what), _allowed(b, what, requested)
+        alike = allowed <= requested
+        uncertainty = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
+        error = max(error, float((_beyond(distance, uncertainty) * requested / allowed).max(initial=0.0)))
+        most = max(most, error, float(distance[alike].max(initial=0.0)))
+    return Influence(error, most - error)
+
+
+def _of_pairs(a: Point, b: Point, what: Recorded) -> np.ndarray:
+    """Return the standard error of the mean difference of two ways to run a scene, by pairs of equal starts."""
+    pairs = zip(a.members, b.members, strict=True)
+    spread = np.std([_rows(one[what.name]) - _rows(two[what.name]) for one, two in pairs], axis=0, ddof=1)
+    return _pooled(np.linalg.norm(spread, axis=1) * (2.0 if _turns(what) else 1.0)) / np.sqrt(len(b.members))
+
+
+def _allowed(full: Point, what: Recorded, requested: float) -> np.ndarray:
+    """Return the allowed error at each output: the requested accuracy, or the difference of two runs of the scene."""
+    scattered: np.ndarray = np.sqrt(2.0) * _pooled(_deviations(full, what))
+    return np.maximum(requested, scattered)
+
+
+def _deviations(point: Point, what: Recorded) -> np.ndarray:
+    """Return the standard deviation of one member at each output."""
+    rows = _rows(point.deviation.get(what.name, np.zeros(len(_rows(point.values[what.name])))))
+    return np.linalg.norm(rows, axis=1) * (2.0 if _turns(what) else 1.0)
+
+
+def agreement(planned: Point, full: Point, quantity: Quantity, members: int, requested: float) -> Agreement:
+    """Return how well a planned run agrees with the full one in a quantity, at the decisive output.
+
+    members: number of starts of each. Where both points hold their members, the differences per start bound chance if
+    that bound is below the one of two independent means. requested: accuracy [SI].
+    """
+    if quantity.kind == "impact_times":
+        return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
+    results = []
+    for what in _compared(quantity):
+        distance, uncertainty = _along(planned, full, what, members)
+        if np.isinf(distance).any():
+            return Agreement(np.inf, 0.0, requested)
+        uncertainty = chance(members) * uncertainty
+        if min(len(planned.members), len(full.members)) > 1:
+            of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, what)
+            uncertainty = np.minimum(uncertainty, of_pairs)
+        error, allowed = _beyond(distance, uncertainty), _allowed(full, what, requested)
+        floor = np.maximum(allowed, np.finfo(float).tiny)  # the allowed error of a constant quantity is zero
+        worst = int(np.argmax((error - uncertainty) / floor))
+        if error[worst] - uncertainty[worst] <= allowed[worst]:
+            worst = int(np.argmax((error + uncertainty) / floor))
+        beyond = allowed > requested
+        horizon = float(np.argmax(beyond)) / len(beyond) if beyond.any() else 1.0
+        results.append(Agreement(float(error[worst]), float(uncertainty[worst]), float(allowed[worst]), horizon))
+    missed = [one for one in results if one.missed]
+    worst_of = max(missed or results, key=lambda one: one.fraction)
+    same = all(one.error == one.chance == 0.0 for one in results)
+    return replace(worst_of, horizon=1.0 if same else results[0].horizon)  # the first result is the series, if any
+
+
+def scatter(point: Point, quantity: Quantity) -> float:
+    """Return one member's standard deviation from the mean of all members [SI]; the largest over the series.
+
+    The quantity of a single run beyond the horizon is known no better.
+    """
+    if quantity.kind == "impact_times":
+        return 0.0
+    spreads = [_pooled(_deviations(point, what)) for what in _compared(quantity) if what.name in point.deviation]
+    return max((float(spread.max(initial=0.0)) for spread in spreads), default=0.0)
+
+
+def _pooled(error: np.ndarray) -> np.ndarray:
+    """Return the errors of a series, none below the root mean square of its neighbours."""
+    width = max(1, round(POOLED * len(error)))
+    around = np.convolve(
+        np.pad(error**2, (width // 2, (width - 1) // 2), mode="edge"), np.full(width, 1.0 / width), "valid"
+    )
+    return np.maximum(error, np.sqrt(around))
+
+
+def _impact_times(a: Point, b: Point, name: str) -> Influence:
+    if f"{name}.count" not in a.values or f"{name}.count" not in b.values:
+        return Influence(np.inf)
+    counts = {float(p.values[f"{name}.count"]) for p in (a, b)}
+    scattered = any(float(p.deviation.get(f"{name}.count", 0.0)) > 0.0 for p in (a, b))
+    if len(counts) > 1 or scattered:
+        return Influence(np.inf)
+    if counts == {0.0}:
+        return Influence(0.0)
+    return Influence(max(abs(float(a.values[f"{name}.{r}"] - b.values[f"{name}.{r}"])) for r in ("first", "last")))
+
+
+def size(point: Point, quantity: Quantity) -> float:
+    """Return the reference of relative accuracies: largest change from the start, or value of forces and rates."""
+    name = quantity.name
+    if quantity.kind == "impact_times":
+        return float(np.nan_to_num(point.values[f"{name}.last"]))
+    if quantity.kind in ("peak_force", "impulse"):
+        return float(np.abs(point.values[_compared(quantity)[0].name]))
+    values = _rows(point.values[f"{name}.series"])
+    if quantity.kind == "orientation":
+        return float(rotation_between(values[:1], values).max())
+    if quantity.of_place:
+        return float(np.linalg.norm(values - values[:1], axis=1).max())
+    return float(np.abs(point.values[f"{name}.largest"]))
+
+
+def rounding(point: Point, quantity: Quantity) -> float:
+    """Return the value below which a vector's component is rounding, such as motion across a plane; 0 for others."""
+    return ROUNDING * float(point.values.get(_whole(quantity).name, 0.0)) if quantity.component else 0.0
+
+
+def _rows(values: np.ndarray) -> np.ndarray:
+    values = np.asarray(values, dtype=float)
+    return values.reshape(len(values), -1) if values.ndim else values.reshape(1, 1)

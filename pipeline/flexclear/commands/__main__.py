@@ -1,0 +1,141 @@
+"""The command ``flexclear``.
+
+Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machine, of time or of `[limits]`;
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import atexit
+import gc
+import os
+import signal
+import sys
+from collections.abc import Collection
+from importlib import import_module
+from types import FrameType
+from typing import NoReturn
+
+from flexclear.scene.registry import suggestion
+from flexclear.system.errors import INTERRUPTED, FlexclearError, InputError, ResourceError, shown
+from flexclear.system.platforms import plain_output, reader_has_gone
+from flexclear.system.version import version
+from flexclear.workflow import workers
+
+CLOSED_PIPE = 141
+#: new objects before Python's garbage collector runs: a short command makes hardly any garbage, and spent a tenth of
+#: its time on collections
+GARBAGE = 200_000
+#: verb -> its help. The module of the same name has `arguments(parser)` and `command(options)`
+COMMANDS = {
+    "new": "write a commented scene to start from",
+    "show": "draw the start pose with all names, in seconds, without a simulation",
+    "check": "report all errors of scenes, recipes and sweeps, without a simulation",
+    "run": "simulate scenes, unless their results are up to date",
+    "why": "say for each stage whether it is up to date, or why it would run again",
+    "sweep": "vary parameters of a scene, with one dataset and a figure of all points",
+    "cost": "study error against cost, and the causes of errors",
+    "render": "make pictures, films and interactive pages of scenes",
+    "compare": "compare scenes with each other or with their ideal mechanisms",
+    "plan": "select the effects, modes and tolerance that the requested accuracy needs",
+    "effects": "measure how each part changes each quantity, alone and in pairs",
+    "sections": "classify a repeated motion as periodic, quasi-periodic or chaotic",
+    "frequencies": "compute an equilibrium and its natural frequencies",
+    "report": "write the page of scenes; without scenes, all figures and tables of the paper",
+    "schema": "print a JSON schema of scenes, recipes or sweeps",
+    "cite": "list the sources of the methods and data that a scene uses",
+    "completion": "print the completion script for bash or zsh",
+    "cache": "manage stored results: size, check, explain, prune",
+    "doctor": "check the installation by a run with a known answer; write one file that repeats a failure",
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command and return its exit code; errors of the user's input are reported without a traceback."""
+    plain_output()
+    own = arguments is None  # True when this process is the command's own
+    if own:
+        signal.signal(signal.SIGTERM, _as_interrupt)
+        gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
+        # at exit Python collects garbage several times over all objects: a sixth of the time of a short command, half a
+        # second where something was compiled. Nobody gains by that, since the system takes all memory back
+        atexit.register(gc.freeze)
+    # pydantic would search all installed packages for plugins of its own
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    try:
+        options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
+        if own:  # imported objects stay: they are garbage neither now nor at the end
+            gc.freeze()
+        with workers.reused():
+            return int(options.command(options) or 0)
+    except FlexclearError as error:
+        print(f"flexclear: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        if not reader_has_gone():
+            print(f"flexclear: {workers.LOST}", file=sys.stderr)
+            return ResourceError.exit_code
+        # the reader (`| head`) has closed the pipe; keep the interpreter from reporting that at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED_PIPE
+    except (OSError, MemoryError) as error:  # errors of the machine that no other code described better
+        print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
+        return ResourceError.exit_code
+
+
+def _as_interrupt(number: int, frame: FrameType | None) -> None:
+    """Stop as Ctrl-C does: schedulers of clusters and services send SIGTERM, and workers must end in good order."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler):  # Ctrl-C is ignored by a command in the background
+        raise KeyboardInterrupt
+    handler(number, frame)
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser that answers a misspelt command or option with the nearest one."""
+
+    options: Collection[str] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Raise InputError with the nearest option for an unknown one; exit code 2 for every error."""
+        unknown = message.removeprefix("unrecognized arguments: ").split()
+        if unknown[0].startswith("-") and message.startswith("unrecognized"):
+            name = unknown[0].partition("=")[0]
+            raise InputError(name, "unknown option", suggestion(name, sorted(self.options)))
+        super().error(message)
+
+
+def require_command(name: str) -> None:
+    """Raise InputError for a word that is not a command."""
+    if name in COMMANDS or name.startswith("-"):
+        return
+    if name.endswith(".toml"):
+        raise InputError(name, "is not a command", f"a command comes first, as in: flexclear check {name}")
+    raise InputError(name, "unknown command", suggestion(name, COMMANDS))
+
+
+def parser(arguments: list[str]) -> argparse.ArgumentParser:
+    """Return the parser of the command line: one sub-command per verb; only the requested verb's module is imported."""
+    if arguments:
+        require_command(arguments[0])
+    top = Parser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
+    top.add_argument("--version", action="version", version=f"flexclear {version()}", help="print the version")
+    verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    asked = [verb for verb in COMMANDS if verb in arguments[:1]]
+    for verb in asked or COMMANDS:  # all verbs only where their list is printed
+        text = COMMANDS[verb]
+        below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        if asked:
+            module = import_module(f"flexclear.commands.{verb}")
+            module.arguments(below)
+            below.set_defaults(command=module.command)
+            top.options = [option for action in below._actions for option in action.option_strings]
+    return top
+
+
+if __name__ == "__main__":
+    sys.exit(main())

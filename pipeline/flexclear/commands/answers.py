@@ -1,0 +1,289 @@
+"""Three answers about a scene: what accuracy costs, whether its run is stable, which effects matter.
+
+Runs within a budget of processor time give the answers, half for the costs of accuracy, half for the effects. Stability
+is judged from the scene's run and from the runs that measured the costs of accuracy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from flexclear.commands import cost, scenes
+from flexclear.post.pages import prose
+from flexclear.scene import variants
+from flexclear.scene.integrators import DEFAULT, VIBRATING
+from flexclear.scene.load import edited
+from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
+from flexclear.stages import effect_study, kernels, watched_quantities
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
+from flexclear.system.errors import InputError, SolverError
+from flexclear.workflow.task import Task
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.artifacts.points import Point
+    from flexclear.scene.quantity import Quantity
+    from flexclear.scene.schema import Scene
+
+#: default budget: so many times the processor time of the scene's own run, and at least so long [s]
+TIMES, LEAST = 3.0, 30.0
+#: number of variants that are run and compiled concurrently; time to compile one with the scene's steps compiled [s]
+AT_ONCE, COMPILING = 2.0, 4.0
+#: number of ideal variants (without a clearance or a flexible body) whose kernels are compiled during the scene's run
+AHEAD = 2
+#: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance
+MEANS = 1e-7
+#: numbers of members with which effects are compared; they rise until the difference is decided or the budget is used
+MEMBERS = (4, 8, 16, 32)
+#: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.effect_ranking`
+IDEAL = "clearance and flexibility"
+
+
+@dataclass(frozen=True)
+class ShownAnswer:
+    """An answer as a page shows it: heading, text, file name of its picture with a caption, and a table as HTML."""
+
+    heading: str
+    text: str
+    picture: str
+    caption: str
+    table: str = ""
+
+
+def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
+    """Return heading, text, picture and table of the answer called accuracy, stability or effects."""
+    from flexclear.post.answers import effect_ranking
+    from flexclear.post.cost.answer import sentences
+
+    data = answer.dataset()
+    if name == "accuracy":
+        caption = "Error against processor time; the star is this scene"
+        return ShownAnswer("Accuracy against cost", sentences(data), "accuracy.png", caption)
+    if name == "stability":
+        columns = ("value", "limit", "verdict", "remedy")
+        rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
+        caption = "Errors of energy and loops over time, and their limits"
+        table = prose(("check", *columns), rows)
+        return ShownAnswer("Is the integration stable", data.attrs["answer"], "stability.png", caption, table)
+    asked = scene.accuracy.quantities if scene.accuracy is not None else {}
+    requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
+    caption = "Change of each quantity without the effect; thin lines: part that may be due to chance"
+    text, table = effect_ranking.sentence(data, requested), scenes.tables(answer, "effect_ranking.md")
+    return ShownAnswer("Which effects matter", text, "effect_ranking.png", caption, table)
+
+
+def dataset(name: str, scene: Scene, budget: str | float | None, *, models: bool = False) -> xr.Dataset:
+    """Return one of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
+
+    budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study. Raises InputError
+    for a scene without effects or watched quantities.
+    """
+    from flexclear.post.answers.answered import answered
+
+    # in this process: a worker would run a caller's script again from its top
+    workplace, given = replace(open_workplace(), jobs=1), None if budget is None else seconds(budget, "budget")
+    if name == "cost":
+        name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET, models=models)
+    else:
+        answer = getattr(Answers(scene, workplace, given, questions=1), name)
+    if answer is None:
+        raise InputError(str(scene.path or scene.name), "has no effect that can be removed, or [view] watch is empty")
+    words = shown_answer(name, answer, scene)
+    picture = answer.read(words.picture) if words.picture in answer.record.files else None
+    return answered(answer.dataset(), words.text, picture, words.table)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The three answers about a scene, each computed at its first use.
+
+    seconds: processor time of the runs; by default TIMES that of the scene's own run, and at least LEAST. questions:
+    number of answers that divide it, the costs of accuracy and the effects; 0: only stability is judged.
+    """
+
+    scene: Scene
+    workplace: Workplace
+    seconds: float | None = None
+    questions: int = 2
+
+    @cached_property
+    def kernels(self) -> dict[tuple[str, ...], Task]:
+        """Return tasks that compile kernels of the effects' variants while the scene's own run leaves a processor idle;
+        by what runs on them (`kernels.shared`)."""
+        effects, tasks = variants.effects(self.scene), dict[tuple[str, ...], Task]()
+        ideal = [effect for effect in effects if effect.kind in (CLEARANCE, FLEXIBILITY)]
+        for effect in ideal if len(ideal) > 1 else ():  # without the only one: the ideal scene, which is run
+            gone = [other for other in effects if effect.name in (other.name, other.within)]
+            variant = watched_quantities.plain(variants.without(self.scene, gone))
+            variant = edited(variant, {"solver.integrator": DEFAULT}) if self.scene.by_need() else variant
+            tasks[kernels.shared(variant)] = kernels.task(variant, Graph(variant, shown=False).bodies())
+        return dict(list(tasks.items())[:AHEAD])
+
+    @cached_property
+    def _started(self) -> cost.Study:
+        """Return the study with the scene's own run measured, and with the budget that follows from that run."""
+        study = cost.Study(self.scene, self.workplace, (self.seconds or LEAST) / self.questions)
+        study.begin()
+        if self.seconds is None:
+            study.seconds = max(LEAST, TIMES * study.own * study.seconds_each) / self.questions
+        return study
+
+    @cached_property
+    def _study(self) -> cost.Study:
+        """Return the study with the points in the neighbourhood of the scene's own setting."""
+        study = self._started
+        study.first()
+        study.neighbourhood()
+        return study
+
+    @cached_property
+    def accuracy(self) -> Made:
+        """Return what accuracy costs (`stages.cost_study`); raise SolverError where no run succeeds."""
+        return self.workplace.made(self._study.task())[0]
+
+    @cached_property
+    def stability(self) -> Made:
+        """Return the verdict on stability (`stages.evaluation`), which also uses the runs of the costs of accuracy."""
+        try:
+            study = {"study": self._study.task()} if self.questions else {}
+        except SolverError:
+            study = {}
+        graph = Graph(self.scene, shown=False)
+        members = {"post": graph.post} if graph.ensemble else {}
+        task = Task(
+            stage="stability",
+            scene=self.scene.name,
+            run="flexclear.stages.evaluation:stability",
+            params={"by_need": self.scene.by_need()},
+            inputs={"run": graph.simulate, **study, **members},
+            folder=f"stability/{self.scene.name.replace('/', '_')}",
+            names={"nc": "stability.nc"},
+        )
+        return self.workplace.made(task)[0]
+
+    @cached_property
+    def effects(self) -> Made | None:
+        """Return which effects matter (`stages.effect_study`); None for a scene without effects or watches."""
+        effects, chosen = variants.effects(self.scene), self.scene.watched()
+        if not effects or not chosen:
+            return None
+        self.workplace.bring(list(self.kernels.values()))
+        self._started.compiled |= self.kernels
+        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._started).task())[0]
+
+
+@dataclass
+class _Comparison:
+    """Comparison of the scene with the scene without each effect; more members run where a change is undecided."""
+
+    scene: Scene
+    workplace: Workplace
+    effects: Sequence[Effect]
+    chosen: Sequence[Quantity]
+    study: cost.Study
+    #: tasks by missing effect and number of members
+    tasks: dict[tuple[str, int], Task] = field(default_factory=dict)
+    points: dict[tuple[str, int], Point] = field(default_factory=dict)
+    spent: float = 0.0
+    #: True when members run at the scene's own tolerance, since the looser one for means was refused
+    tight: bool = False
+    #: processor time of a run of each variant [s]
+    cpu_seconds: dict[str, float] = field(default_factory=dict)
+
+    def task(self) -> Task:
+        """Run the points that the budget allows and return the task of the answer."""
+        from flexclear.post.answers.effect_ranking import Pair, undecided
+
+        levels = MEMBERS if self._has_contacts("") else (0,)
+        waiting = names = self._affordable(list(self._removed), levels[0])
+        pairs = dict.fromkeys(names, 0)
+        for members in levels:
+            if members != levels[0]:
+                waiting = self._affordable(waiting, members)
+            if not waiting:
+                break
+            self._bring(["", *waiting], members)
+            if not self.tight and any(self.points[name, members].refused for name in ("", *waiting)):
+                self.tight = True
+                self._bring(["", *waiting], members)
+            pairs |= dict.fromkeys(waiting, members)
+            full = self.points["", members]
+            waiting = [n for n in waiting if undecided(Pair(full, self.points[n, members], members), self.chosen)]
+        repeated = IDEAL in self._removed and self._repeats(IDEAL, [name for name in self._removed if name != IDEAL])
+        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if repeated else IDEAL}
+        without = {name: self._variant(name) for name in ("", *names)}
+        left = [words[name] for name in self._removed if name not in names and words[name]]
+        return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left)
+
+    @cached_property
+    def _compiled(self) -> set[tuple[str, ...]]:
+        """Return the kinds of compiled kernels: those of the study, and those of the run of the ideal scene."""
+        run = [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
+        return {*self.study.compiled, *(kernels.shared(scene) for scene in run)}
+
+    @cached_property
+    def _removed(self) -> Mapping[str, frozenset[str]]:
+        """Return the effects that go with each one: first all clearances and flexible bodies, then single effects."""
+        single = {e.name: self._closed({e.name}) for e in self.effects}
+        ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
+        both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
+        order = sorted(self.effects, key=lambda effect: effect.kind not in (CLEARANCE, FLEXIBILITY))
+        return both | {effect.name: single[effect.name] for effect in order}
+
+    def _closed(self, names: set[str]) -> frozenset[str]:
+        """Return the names of effects, and those of effects that exist only within them."""
+        return frozenset(names | {e.name for e in self.effects if e.within in names})
+
+    def _variant(self, name: str) -> Scene:
+        gone = self._removed[name] if name else frozenset()
+        variant, setting = variants.without(self.scene, [e for e in self.effects if e.name in gone]), self.study.setting
+        if setting.step is not None:
+            return variant
+        rigid = setting.integrator == VIBRATING and not variant.flexible()
+        means = (variant.contacts() or variant.stop) and not self.tight
+        rtol = max(setting.rtol, MEANS) if means else setting.rtol
+        return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})
+
+    def _has_contacts(self, name: str) -> bool:
+        scene = self._variant(name)
+        return bool(scene.contacts() or scene.stop)
+
+    def _seconds(self, name: str, members: int) -> float:
+        """Predict the wall time of members of a variant [s]: from its last round, else from the scene's own run."""
+        runs = members if self._has_contacts(name) else 1
+        return (runs * self.cpu_seconds.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
+
+    def _affordable(self, names: Sequence[str], members: int) -> list[str]:
+        """Return the first names that the rest of the budget allows, in the order in which the summary needs them; at
+        least one while no point exists."""
+        fitting, total = list[str](), self.spent + self._seconds("", members)
+        for name in names:
+            kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
+            seconds = self._seconds(name, members) + (0.0 if kinds in self._compiled else COMPILING / AT_ONCE)
+            again = self._repeats(name, fitting)
+            if again or total + seconds <= self.study.seconds or not (fitting or self.points):
+                fitting.append(name)
+                total += 0.0 if again else seconds
+                self._compiled.add(kinds)
+        return fitting
+
+    def _repeats(self, name: str, others: Sequence[str]) -> bool:
+        """Return True when another effect's variant has the same runs: a single effect may be all of them."""
+        return any(self._removed.get(name) == self._removed.get(other) for other in others)
+
+    def _bring(self, names: Sequence[str], members: int) -> None:
+        from flexclear.artifacts.effect_size import watched
+
+        tasks = [watched_quantities.task(self._variant(name), self.chosen, members) for name in names]
+        for k, (name, made) in enumerate(zip(names, self.workplace.made(*tasks), strict=True)):
+            stored = made.dataset()
+            self.tasks[name, members] = made.task
+            self.points[name, members] = watched(stored, self._variant(name).owners(), self.chosen)
+            self.cpu_seconds[name] = float(stored.attrs["cpu_seconds"]) / (members if self._has_contacts(name) else 1)
+            if not self._repeats(name, names[:k]):
+                self.spent += self._seconds(name, members) + float(stored.attrs["compile_seconds"]) / AT_ONCE

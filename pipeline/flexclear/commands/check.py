@@ -1,0 +1,370 @@
+"""``flexclear check``: all errors of scenes, recipes and sweeps at once, with file and line; nothing is run.
+
+The checks take seconds, without modes and without compilation: meshes, the start, free motions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.commands import scenes, show
+from flexclear.scene import lines
+from flexclear.scene.limits import Limits
+from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
+from flexclear.scene.references import dangling
+from flexclear.scene.variants import ideal, loose
+from flexclear.stages import meshing, simulation
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import add_options
+from flexclear.system.errors import FlexclearError, InputError, InputErrors, ResourceError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.dynamics.model.mechanism import Mechanism
+    from flexclear.scene.parts import FlexibleBody
+    from flexclear.scene.schema import Scene
+    from flexclear.structure.fe.model import Model
+
+#: errors about a file: it is wrong, or asks for too much
+MISTAKES = (InputError, ResourceError)
+#: larger mesh files, and meshes with more unknowns, are checked by the run only [bytes, unknowns]
+LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
+#: extents of a mesh from a file outside of which its unit of length is doubted [m]
+SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
+#: parts without which a mechanism fits together as well
+ACTING = ("[load.", "[gear.", "[stop.")
+#: number of unused frames that are listed
+LISTED_FRAMES = 3
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments to its parser."""
+    parser.add_argument(
+        "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
+    )
+    parser.add_argument(
+        "--show", action="store_true", help="also draw the start pose of each scene, with gaps where joints do not fit"
+    )
+    add_options(parser, "set", "json", "said")
+
+
+def command(options: argparse.Namespace) -> int:
+    """Print all errors of all files; exit code 2 for errors, 4 where a file only asks for too much.
+
+    Implausible values are warnings, which leave the exit code 0.
+    """
+    errors: dict[str, FlexclearError] = {}
+    warnings: dict[str, InputError] = {}
+    for name in options.scenes:
+        findings = examined(name, options.set)
+        if options.show:
+            refused = _show(name, options.set, quiet=options.json)
+            findings.errors += [refused] if refused is not None and not findings.errors else []
+        errors |= {str(mistake): mistake for mistake in findings.errors}
+        warnings |= {str(warning): warning for warning in findings.warnings}
+        if not findings.errors and not options.json and not options.quiet:
+            print(f"{scenes.find_scene(name)}: {'; '.join(findings.notes)}; no error")
+    if options.json:
+        records = [_record(mistake, "error") for mistake in errors.values()]
+        print(json.dumps([*records, *(_record(warning, "warning") for warning in warnings.values())], indent=2))
+    else:
+        for warning in warnings.values():
+            print(f"flexclear: warning: {lines.located(warning)}", file=sys.stderr)
+        for mistake in errors.values():
+            text = lines.located(mistake) if isinstance(mistake, InputError) else mistake
+            print(f"flexclear: {text}", file=sys.stderr)
+        if len(errors) > 1:
+            print(f"flexclear: {len(errors)} errors", file=sys.stderr)
+    return min((mistake.exit_code for mistake in errors.values()), default=0)
+
+
+def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | None:
+    """Write the start pose of a scene if it can be drawn; return the error that refuses it, or None."""
+    try:
+        if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
+            scene = scenes.loaded(name, settings)
+            scenes.require_names(scene)
+            return show.shown(scene, quiet=quiet)[1]
+    except MISTAKES:  # listed with all others
+        pass
+    return None
+
+
+@dataclass
+class Findings:
+    """errors: refusals.  warnings: doubtful values.  notes: kind and facts of the file, in words."""
+
+    errors: list[FlexclearError] = field(default_factory=list)
+    warnings: list[InputError] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def attempt(self, check: Callable[[], Any], path: Path | None = None) -> bool:
+        """Run a check and collect its errors, located in a file.  Returns True when the check passes."""
+        try:
+            with scenes.in_file(path):
+                check()
+        except MISTAKES as error:
+            self.errors += error.errors if isinstance(error, InputErrors) else [error]
+            return False
+        return True
+
+
+def examined(name: str, settings: Sequence[str] = ()) -> Findings:
+    """Return all errors and warnings of a scene, sweep or recipe, and a description where it can be read.
+
+    settings: changes of the scene, ``KEY=VALUE`` as of `--set`.
+    """
+    findings = Findings()
+    findings.attempt(partial(_examine, name, settings, findings))
+    return findings
+
+
+def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
+    path = scenes.find_scene(name)
+    {SCENE: _scene, SWEEP: _sweep, RECIPE: _recipe}[kind_of_file(read_toml(path))](path, settings, findings)
+
+
+def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
+    findings.errors += dangling(compose(path), scenes.recipe_frames, str(path))
+    loaded: list[Scene] = []
+    findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
+    # bodies may share a recipe, which is meshed once
+    mesh_of = cache(partial(meshed, limits=loaded[0].limits if loaded else Limits()))
+    bodies = compose(path).get("body", {}).values()
+    for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
+        findings.errors += mesh_of(Path(mesh))[1].errors
+    for scene in loaded:
+        findings.attempt(partial(Graph(scene).up_to, "post"), path)
+        for check in _laws(scene):
+            findings.attempt(check, path)
+        findings.warnings += scenes.implausibilities(scene, settings)
+        findings.notes.append(scene.summary())
+        if not findings.errors:
+            compute(scene, mesh_of, findings)
+
+
+def _sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:
+    """Check a sweep file and its scene."""
+    from flexclear.commands import sweep
+    from flexclear.stages.sweeps import sweep_plan
+
+    requested, scene = sweep.read(path)
+    _examine(str(scene.path), (), findings)
+    if not findings.errors:
+        findings.attempt(lambda: sweep_plan.plan(requested, scene, str(path)))
+    findings.notes = [f"a sweep over {', '.join(requested.vary)} of {scene.name}: {'; '.join(findings.notes)}"]
+
+
+def _recipe(path: Path, settings: Sequence[str], findings: Findings) -> None:
+    """Check a recipe as a scene would use it, with the default limits of a scene."""
+    body, of_mesh = meshed(path)
+    findings.errors += of_mesh.errors
+    if findings.errors:
+        return
+    table = meshing.params(path)["recipe"]
+    mass = f", mass {float(body.rigid.mass):.6g} kg" if body is not None else ""
+    frames = ", ".join(table.get("frames", {})) or "none"
+    findings.warnings += of_mesh.warnings
+    findings.notes.append(f"a mesh recipe, {table['shape']['type']}, frames: {frames}{mass}")
+
+
+def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
+    """Yield a check for each prescribed coordinate: it must exist, and its values must fit."""
+    from flexclear.dynamics.model.driving import prescribed
+    from flexclear.dynamics.model.laws import checked_law
+
+    for name, drive in scene.drive.items():
+        if getattr(drive, "joint", None) in (None, *scene.joint):
+            one_drive = scene.model_copy(update={"drive": {name: drive}})
+
+            def check(one_drive: Scene = one_drive) -> None:
+                for one in prescribed(one_drive):
+                    checked_law(one_drive, one.law, one.dimension, one.place)
+
+            yield check
+
+
+def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
+    record = {"severity": severity, "file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
+    if not isinstance(mistake, InputError):
+        return record
+    location = lines.where(mistake)
+    file, line = (str(location[0]), location[1]) if location else (None, None)
+    place = {"file": file, "line": line, "place": mistake.place}
+    return {**record, **place, "problem": mistake.problem, "remedy": mistake.remedy}
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh without its modes.  rigid: mass, inertia and frames (schema RIGID).  interfaces: those of the recipe."""
+
+    model: Model
+    rigid: xr.Dataset
+    interfaces: tuple[str, ...]
+
+
+#: type of `meshed` as a function of a recipe's path
+MeshOf = Callable[[Path], tuple[Body | None, Findings]]
+
+
+def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
+    """Check meshes and requested modes of a scene whose recipes can be read, then the mechanism that they form."""
+    bodies: dict[str, Body] = {}
+    for name, path in whole.recipes().items():
+        body, of_mesh = mesh_of(Path(path))
+        findings.errors += of_mesh.errors
+        findings.warnings += of_mesh.warnings
+        bodies |= {name: body} if body is not None else {}
+    for name, part in whole.flexible().items():
+        if name in bodies:
+            findings.attempt(partial(_modes, bodies[name], name, part), whole.path)
+    if findings.errors or set(bodies) != set(whole.recipes()):
+        return
+    rigid = {name: body.rigid for name, body in bodies.items()}
+    if findings.attempt(partial(_assembled, whole, rigid, findings), whole.path):
+        _free_motions(whole, rigid, findings)
+
+
+def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findings]:
+    """Return the body of a recipe if its mesh is allowed and takes seconds (else None), with errors and warnings."""
+    findings = Findings()
+    made: list[Body] = []
+    if findings.attempt(partial(meshing.check_size, path, limits or Limits())):
+        findings.attempt(lambda: made.extend(_meshed(path, findings)))
+    return (made[0] if made else None), findings
+
+
+def _meshed(path: Path, findings: Findings) -> Iterator[Body]:
+    from flexclear.structure.fe.recipe import parse
+    from flexclear.structure.kinds import kind
+    from flexclear.structure.modes import bundle
+
+    table = meshing.params(path)["recipe"]
+    parse(table, str(path))
+    opened = meshing.files(table, path.parent).values()
+    if any(is_file(file) and file.stat().st_size > LARGEST_FILE for file in opened):
+        return
+    try:
+        mesh = kind.build(table, path.parent)
+    except InputError as error:
+        raise meshing.in_recipe(error, path) from None
+    findings.warnings += _unit(mesh, table, path)
+    if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
+        return
+    model = kind.of_mesh(mesh).assemble(mesh)
+    yield Body(model, bundle.rigid_of(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
+
+
+def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:
+    """Yield a warning for a mesh from a file whose size suggests another unit of length; files do not state theirs."""
+    import numpy as np
+
+    shape = table["shape"]
+    if not isinstance(shape, dict) or shape.get("type") != "mesh-file":
+        return
+    size, unit = float(np.ptp(mesh["node_position"].values, axis=0).max()), shape.get("length_unit")
+    if not SMALLEST_MESH_SIZE <= size <= LARGEST_MESH_SIZE:
+        other = "mm" if size > LARGEST_MESH_SIZE else "m"
+        yield InputError(
+            f"{path} [shape.length_unit]",
+            f"with lengths in {unit} the mesh is {size:.4g} m long",
+            f'write length_unit = "{other}" if the mesh is in {other}',
+        )
+
+
+def _modes(body: Body, name: str, part: FlexibleBody) -> None:
+    from flexclear.structure.modes.solution import require_possible
+
+    try:
+        require_possible(body.model, part.modes, body.interfaces)
+    except InputError as error:
+        raise InputError(f"[body.{name}.{error.place}]", error.problem, error.remedy) from None
+
+
+def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
+    """Assemble the mechanism at its start, which checks poses, axes, loads and loose joints against each other.
+
+    Flexible bodies are undeformed; of rigid mechanisms rank and drives are checked, too.
+    """
+    from flexclear.dynamics.model.mobility import analyse
+    from flexclear.dynamics.model.model import tabulate
+    from flexclear.dynamics.model.plausibility import (
+        missing_joints,
+        refuse_missed,
+        refuse_overlap,
+        unused_frames,
+    )
+
+    mechanism = _mechanism(whole, rigid)
+    if mechanism.all_rigid:
+        model = tabulate(mechanism)
+        mechanism = model.mechanism
+        analyse(model)
+        refuse_missed(mechanism)
+        refuse_overlap(mechanism)
+    else:
+        from flexclear.dynamics.model.assembly import assembled
+
+        mechanism = assembled(mechanism)
+        refuse_missed(mechanism)
+    if not _starts_ideal(whole):
+        _note_choice(whole, mechanism, findings)
+    for body, text, remedy in missing_joints(mechanism):
+        findings.warnings.append(scenes.placed(InputError(f"[body.{body}]", text, remedy), whole.path))
+    unused = unused_frames(mechanism)
+    if unused:
+        more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
+        findings.notes.append(f"unused frames: {', '.join(unused[:LISTED_FRAMES])}{more}")
+
+
+def _starts_ideal(whole: Scene) -> bool:
+    """Return True for a scene that starts as its ideal mechanism does."""
+    return whole.start is not None and whole.start.at == "ideal"
+
+
+def _note_choice(whole: Scene, mechanism: Mechanism, findings: Findings) -> None:
+    """Warn of a start that the scene does not choose; frames moved within their tolerance are no choice."""
+    if "[start.joint." in mechanism.choice:
+        findings.warnings.append(scenes.placed(InputError("[start]", mechanism.choice), whole.path))
+
+
+def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
+    from flexclear.dynamics.model.mechanism import build
+    from flexclear.dynamics.run.run import placed
+
+    meshed = {f"{simulation.RIGID}{name}": rigid[name] for name in whole.meshed()}
+    if meshed:
+        table = whole.model_dump(mode="python", exclude_none=True)
+        table["body"] = simulation.filled(table["body"], meshed)
+        whole = type(whole).model_validate(table)
+    return build(placed(whole), {name: rigid[name] for name in whole.flexible()})
+
+
+def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
+    """Note the free motions besides the drives, with rigid bodies and loose joints closed, where these fit.
+
+    Loads, gears and stops are read as well: an error in one of them is an error of the scene itself.
+    """
+    from flexclear.dynamics.model.mobility import analyse
+    from flexclear.dynamics.model.model import tabulate
+
+    idealised = bool(loose(whole) or whole.flexible())
+    try:
+        model = tabulate(_mechanism(ideal(whole) if idealised else whole, rigid))
+        free = analyse(model).mobility
+    except InputError as error:  # other errors: the mechanism moves only with flexible bodies or with clearance
+        if error.place.startswith(ACTING):
+            findings.errors.append(scenes.placed(error, whole.path))
+        return
+    if _starts_ideal(whole):
+        _note_choice(whole, model.mechanism, findings)
+    closed = " with loose joints closed" if loose(whole) else ""
+    findings.notes.append(f"free motions in addition to the drives{closed}: {free}")

@@ -1,0 +1,81 @@
+"""The multibody tower: computes a run dataset from a scene and its bundles; `analyses` has other results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.artifacts.labelled import Labelled, LabelledArrays
+    from flexclear.dynamics.run.progress_rate import Judges
+    from flexclear.scene.schema import Scene
+    from flexclear.system.progress import Progress
+
+
+def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
+    """Return the dataset of `simulated`; a stopped run carries its partial dataset."""
+    from flexclear.system.errors import StoppedError
+
+    try:
+        return simulated(scene, bundles, progress).to_xarray()
+    except StoppedError as stopped:
+        if stopped.partial is not None:
+            stopped.partial = stopped.partial.to_xarray()
+        raise
+
+
+def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> LabelledArrays:
+    """Run a scene once and return its dataset (schema RUN).
+
+    bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called regularly.
+    A scene with `[accuracy]` is run until the estimated error of its time integration is below the request; where it
+    names no integrator, the cheapest is chosen.  With neither `[accuracy]` nor method or tolerance in `[solver]` it is
+    run at the default tolerance, or, where that is expensive, by `accuracy.by_default`.
+    Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError, with the
+    partial run marked as incomplete, when it is stopped.
+    """
+    from flexclear.artifacts.labelled import of
+    from flexclear.artifacts.schema import incomplete
+    from flexclear.dynamics.effects import way
+    from flexclear.dynamics.record.dataset import recorded, warnings
+    from flexclear.dynamics.run.progress_rate import DearError, affordable
+    from flexclear.dynamics.run.run import Run, integrate
+    from flexclear.system.errors import StoppedError
+
+    def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
+        if edited.event:
+            from flexclear.dynamics.effects import EVENTS
+            from flexclear.scene.registry import lookup
+
+            phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
+            return phased
+        try:
+            done = integrate(edited, bundles, progress, judges)
+        except StoppedError as stopped:
+            partial = stopped.partial
+            # the partial result of another run, such as that of the start, is not part of this run
+            stopped.partial = incomplete(recorded(partial), str(stopped)) if isinstance(partial, Run) else None
+            raise
+        for sentence in warnings(done):
+            progress(None, f"warning: {sentence}")
+        return recorded(done)
+
+    requested = scene.accuracy is not None and scene.accuracy.quantities
+    if not requested:
+        try:
+            return once(scene, affordable(scene))
+        except DearError as dear:
+            progress(None, str(dear))
+    accuracy = way(scene, "accuracy")
+
+    def compared(edited: Scene, judges: Judges | None = None) -> xr.Dataset:
+        return once(edited, judges).to_xarray()
+
+    if not scene.by_need():
+        return of(accuracy.deliver(scene, compared, progress))
+    method_costs = way(scene, "method selection")
+    if requested:
+        return of(accuracy.deliver(scene, compared, progress, method_costs(scene, bundles)))
+    return of(accuracy.by_default(scene, compared, progress, lambda edited: method_costs(edited, bundles)))

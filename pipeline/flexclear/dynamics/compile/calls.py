@@ -1,0 +1,114 @@
+"""Calls between separately compiled functions through addresses in the header of h.
+
+A right-hand side composed into its integrator is optimised again in every function between the two, and every mechanism
+needs an integrator of its own. Called by its address it is compiled once, and so is the integrator, for all mechanisms.
+A call costs some nanoseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import carray, cfunc, types
+from numba.extending import intrinsic
+
+import flexclear.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile.files import SIGNATURES, compiles, interpreted
+from flexclear.dynamics.fields import data
+from flexclear.dynamics.kernels import INTERPRETED, kernel, lowering
+
+#: Numba's types of the arguments in `files.SIGNATURES`
+TYPES = {"I": types.CPointer(types.int64), "F": types.CPointer(types.float64), "i": types.int64, "f": types.float64}
+
+
+@intrinsic
+def call(typingctx: Any, address: Any, arguments: Any) -> Any:
+    """Return the integer that the C function at `address` returns for a tuple; arrays are passed by address."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        where, arrays = values
+        given = []
+        for k, kind in enumerate(arguments.types):
+            value = builder.extract_value(arrays, k)
+            if isinstance(kind, types.Array):
+                value = context.make_array(kind)(context, builder, value=value).data
+            given.append(value)
+        function = ir.FunctionType(ir.IntType(64), [value.type for value in given])
+        return builder.call(builder.inttoptr(where, function.as_pointer()), given)
+
+    return types.int64(address, arguments), generate
+
+
+def exported(name: str) -> Callable[[Callable], int]:
+    """Return the decorator that compiles a C function and returns its address."""
+    options: dict[str, Any] = {"error_model": "numpy"}
+    if not INTERPRETED and lowering():
+        options["pipeline_class"] = lowering().WholeCompiler
+    arguments = (TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
+    return compiles(cfunc(types.int64(*arguments), **options))
+
+
+if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for addresses
+
+    def call(address, arguments):
+        """Return the result of the Python function with this number."""
+        return interpreted[int(address)](*arguments)
+
+    def carray(array, shape):
+        """Return the array."""
+        return array
+
+
+@kernel
+def evaluate(h, f, w, n, t, y, dy):
+    """Evaluate the right-hand side: `equations.right_hand_side`."""
+    call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
+
+
+@kernel
+def laws(h, f, w, n, t):
+    """Evaluate the laws of time: `equations.prescribed_motion`."""
+    call(h[m.PRESCRIBE], (h, f, w, n, float(t)))
+
+
+@kernel
+def describe(h, f, w, n):
+    """Evaluate the recorded quantities: `equations.observation`."""
+    call(h[m.DESCRIBE], (h, f, w, n))
+
+
+@kernel
+def rates(d, t, y, dy):
+    """Evaluate the right-hand side for steps, which need only the rates."""
+    call(d.h[m.RATES], (d.h, d.f, d.w, d.n, float(t), y, dy))
+
+
+@kernel
+def awaited(h, f, w, n):
+    """Evaluate the rates that an attempt waits for: `integrate.method.await_rates`."""
+    d = data(h, f, w, n)
+    rates(d, d.awaited_time, d.awaited, d.rates_in)
+
+
+@kernel
+def project(h, f, w, n, t, y, dy, tolerance):
+    """Project a state onto the closures: `equations.projection`."""
+    return call(h[m.PROJECT], (h, f, w, n, float(t), y, dy, tolerance))
+
+
+@kernel
+def retract(d, y, retractment, out, total):
+    """Store the positions after a retractment: `equations.retraction`."""
+    call(d.h[m.RETRACT], (d.h, d.f, d.w, d.n, y, retractment, out, total))
+
+
+@kernel
+def resolve(d, step, t_new, rows, events):
+    """Locate the events of a step: `integrate.stepper.make_resolution`."""
+    (count, width), (event_count, event_width) = rows.shape, events.shape
+    record = (rows, count, width, events, event_count, event_width)
+    happened = call(d.h[m.RESOLVE], (d.h, d.f, d.w, d.n, float(step), float(t_new), *record))
+    return happened, d.extended == 1, d.resolved_end, d.resolved_step

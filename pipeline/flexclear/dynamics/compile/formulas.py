@@ -1,0 +1,71 @@
+"""Kernels of expressions (`core.scene.formulas`): one line per operation, without numbers in the code."""
+
+from __future__ import annotations
+
+from flexclear.scene.expression import BENT, fold
+from flexclear.scene.formulas import VECTORS, operands
+
+#: code of operations on numbers
+FORMS = {"+": "{} + {}", "-": "{} - {}", "*": "{} * {}", "/": "{} / {}", "^": "{} ** {}", "minus": "-{}"}
+FORMS |= {name: f"looks.np.{name}({{}})" for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")}
+#: kernel of `loads.looks` that reads a leaf of this letter
+READERS = {"c": "constant", "p": "position", "v": "velocity", "o": "omega", "q": "coordinate", "r": "coordinate_rate"}
+#: code of leaves without an index
+UNINDEXED = {"t": "looks.law(d, k, 0)", "l": "looks.line(d, k)[0]", "s": "looks.line(d, k)[1]"}
+
+
+class Lines:
+    """Lines of a kernel, each of which assigns a value to a name; equal values have one name."""
+
+    def __init__(self) -> None:
+        self.lines: dict[str, str] = {}
+        self.bends = 0
+
+    def name(self, text: str) -> str:
+        """Return the name of a value."""
+        return self.lines.setdefault(text, f"x{len(self.lines)}")
+
+    def leaf(self, token: str) -> tuple[str, bool]:
+        """Return the name of a leaf's value, and True for a vector."""
+        if token in UNINDEXED:
+            return self.name(UNINDEXED[token]), False
+        read, _, component = token.partition(".")
+        one = self.name(f"looks.{READERS[read[0]]}(d, k, {read[1:]})")
+        return (self.name(f"{one}[{'xyz'.index(component)}]"), False) if component else (one, read[0] in VECTORS)
+
+    def apply(self, token: str, values: list[tuple[str, bool]]) -> tuple[str, bool]:
+        """Return the name of an operation's result, and True for a vector."""
+        names, vectors = [name for name, _ in values], [vector for _, vector in values]
+        if token == "norm":
+            return self.name(
+                f"looks.np.sqrt(looks.dot({names[0]}, {names[0]}))" if vectors[0] else f"abs({names[0]})"
+            ), (False)
+        if any(vectors):
+            return self.name(_vector(token, names, vectors)), True
+        if token in BENT:
+            watched = self.name(FORMS["-"].format(*names)) if len(names) == 2 else names[0]
+            self.name(f"looks.note(d, k, {self.bends}, {watched})")
+            self.bends += 1
+            return self.name(f"{token}({', '.join(names)})"), False
+        if token[0] == "^" and len(token) > 1:
+            product = " * ".join(names * abs(int(token[1:])))
+            return self.name(product if int(token[1:]) > 0 else f"1.0 / ({product})"), False
+        return self.name(FORMS[token].format(*names)), False
+
+
+def _vector(token: str, names: list[str], vectors: list[bool]) -> str:
+    first, last = names[0], names[-1]
+    if token in "+-":
+        return f"looks.{'add' if token == '+' else 'sub'}({first}, {last})"
+    if token == "*":
+        return f"looks.scale({last}, {first})" if vectors[0] else f"looks.scale({first}, {last})"
+    return f"looks.scale({'-1.0' if token == 'minus' else f'1.0 / {last}'}, {first})"
+
+
+def source(name: str, code: str) -> str:
+    """Return the source of the kernel name(d, k): the number, or the vector of three, that load k computes."""
+    lines = Lines()
+    values = [fold(part.split(), lines.leaf, lines.apply, operands)[0] for part in code.split(" ; ")]
+    result = values[0] if len(values) == 1 else f"({', '.join(values)})"
+    body = "".join(f"    {name} = {text}\n" for text, name in lines.lines.items())
+    return f"@kernel\ndef {name}(d, k):\n{body}    return {result}\n"

@@ -1,0 +1,153 @@
+"""Compiled functions of a mechanism, cached on disk across processes.
+
+Each is a generated file (`sources`) whose name is a digest of the sources of all kernels that it can reach and of the
+compiler's versions. The functions call each other by address (`calls`), so that mechanisms share them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from flexclear.artifacts.disk import disk_limits, publish
+from flexclear.artifacts.paths import kernel_root
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile import reach, sources
+from flexclear.dynamics.compile.compiler_process import second_process
+from flexclear.dynamics.compile.files import SIGNATURES, compiled, interpreted, load_files, loaded
+from flexclear.dynamics.compile.folder import prune, writable
+from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.effects import DEEP, METHOD, Parts, Scheme
+from flexclear.dynamics.kernels import INTERPRETED
+from flexclear.workflow.encounters import meet
+from flexclear.workflow.fingerprint import library_version
+
+#: of each function: description for progress, and the header's index of its address if others call it (specialised code
+#: has one per selection of closure rows). This process compiles in this order, the second one in the opposite order;
+#: the generic kernels that replace specialised code have most code in common, which each process compiles once
+FUNCTIONS: dict[str, tuple[str, int | None]] = {
+    "advance": ("integrator", None),
+    "prescribe": ("laws of time", m.PRESCRIBE),
+    "project": ("projection onto loop closures", m.PROJECT),
+    "retract": ("retraction of positions", m.RETRACT),
+    "observe": ("outputs", None),
+    "evaluate": ("equations of motion", m.EVALUATE),
+    "describe": ("outputs", m.DESCRIBE),
+    DESCRIBED: ("specialised outputs", None),
+    WHOLE: ("specialised equations of motion", None),
+    SPECIALISED: ("specialised equations of motion", None),
+    "resolve": ("location of events", m.RESOLVE),
+}
+_TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
+
+
+@cache
+def function(name: str, address: int) -> Callable:
+    """Return the compiled function at an address for calls from Python; calls let other threads run."""
+    if INTERPRETED:
+        return interpreted[address]
+    types = (_TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
+    made: Callable = ctypes.CFUNCTYPE(ctypes.c_int64, *types)(address)
+    return made
+
+
+def place(array: np.ndarray, kind: type = np.float64) -> Any:
+    """Return the address of an array's entries for C functions; raise TypeError for another type or memory layout."""
+    if array.dtype != kind or not array.flags.c_contiguous:
+        raise TypeError(f"an array of {array.dtype}, {array.strides} bytes apart, instead of {kind.__name__} in a row")
+    return array if INTERPRETED else array.ctypes.data
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Compiled functions of a mechanism, by their addresses, which `connect` must have written into h."""
+
+    addresses: Mapping[str, int]
+
+    def connect(self, h: np.ndarray) -> None:
+        """Write into the header the addresses of the functions that other compiled functions call."""
+        for name, (_, where) in FUNCTIONS.items():
+            if where is not None:
+                h[where] = self.addresses.get(name, 0)
+
+
+def entry(
+    parts: Parts, scheme: Scheme, report: Callable[[str], None], equations: Mapping[str, str] = MappingProxyType({})
+) -> Entry:
+    """Return the compiled functions for these parts; `report` receives a message for each function to compile.
+
+    equations: sources by name of specialised code, or of generic kernels, which are compiled where the former has none.
+    """
+    meet(METHOD.format(scheme.integrator))
+    if parts.articulated:
+        meet(DEEP)
+    folder, began = writable(kernel_root(), report), time.monotonic()
+    texts = {**sources.sources(parts, scheme), **equations}
+    files = {name: _file(folder, name, source) for name, source in texts.items()}
+    _load(folder, files, report, began)
+    if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
+        kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
+        _load(folder, kernels, report, began)
+        files |= kernels
+    return Entry({name: loaded[path.stem].address for name, path in files.items()})
+
+
+def specialised(name: str, source: str, report: Callable[[str], None]) -> int:
+    """Return the address of specialised code for one topology; name and source: of `sources`; 0 when LLVM yields none.
+
+    Raises UnsuitedError when code for several lanes, or with tangents, is impossible.
+    """
+    folder, began = writable(kernel_root(), report), time.monotonic()
+    path = _file(folder, name, source)
+    _load(folder, {name: path}, report, began)
+    return loaded[path.stem].address
+
+
+def _load(folder: Path, files: Mapping[str, Path], report: Callable[[str], None], began: float) -> None:
+    """Load the functions of files, from disk or after compiling them; files: by function name."""
+    names = {path: name for name, path in files.items() if path.stem not in loaded}
+    requested = sorted(names, key=lambda path: [*FUNCTIONS].index(names[path]))
+    with disk_limits(folder):
+        missing = [path for path in requested if not compiled(path)]
+        with second_process(missing[::-1]):
+            load_files(requested, lambda path: _announce(report, FUNCTIONS[names[path]][0], began))
+        if missing:
+            prune(folder)
+
+
+def _announce(report: Callable[[str], None], what: str, began: float) -> None:
+    seconds = time.monotonic() - began
+    so_far = f", {seconds:.0f} s so far" if seconds >= 1.0 else ""
+    report(f"compiling {what} (first run of a mechanism of this kind only){so_far}")
+
+
+def _file(folder: Path, name: str, source: str) -> Path:
+    """Return the path of the generated file, written unless it exists with exactly this text."""
+    path = folder / f"flexclear_{name}_{digest(source)}.py"
+    try:
+        same = path.read_bytes() == source.encode()
+    except OSError:
+        same = False
+    if not same:
+        publish(path, source.encode())
+    return path
+
+
+@cache
+def digest(source: str) -> str:
+    """Return the digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
+    total = hashlib.sha256(source.encode())
+    total.update(f"{library_version('numba')} {library_version('llvmlite')} {sys.version_info[:2]}".encode())
+    for name, source_digest in sorted(reach.reached(source).items()):
+        total.update(f"{name} {source_digest}".encode())
+    return total.hexdigest()[:20]

@@ -1,0 +1,397 @@
+"""Sources of the compiled functions of a mechanism, a file each, composed of lists of parts.
+
+A file composes exactly the kernels of the kinds present: kernels that a scene does not use are neither imported nor
+compiled. A file depends on no more than it needs, so that mechanisms share files: steps depend on the integrator and on
+the presence of closures and contacts, not on joints or bodies.
+
+Effects declare what they add to a file (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
+right-hand side) and "observe" (recorded quantities).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from flexclear.dynamics.effects import (
+    FORMS,
+    FRICTION_LAWS,
+    INTEGRATORS,
+    JOINTS,
+    LOADS,
+    RUNS,
+    SURFACES,
+    Parts,
+    Scheme,
+)
+from flexclear.dynamics.effects.effect import PACKAGE, Effect
+from flexclear.scene import integrators
+from flexclear.scene.registry import listed, lookup
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.specialise.topology import Topology
+
+DYNAMICS = "flexclear.dynamics"
+#: modules of calls by address, and of functions assembled from LLVM code
+CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
+#: specialised code: right-hand side as steps call it, right-hand side with all its side results, recorded quantities
+SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
+PRESCRIBED, RIGHT_HAND_SIDE = f"{DYNAMICS}.equations.prescribed_motion", f"{DYNAMICS}.equations.right_hand_side"
+
+
+@dataclass
+class Composition:
+    """A generated file under construction for a mechanism's parts.
+
+    what: description.  kernel: name of its kernel.  maker: module and name of the function that builds the kernel.
+    given: arguments of the maker, by name.  imports: (module, name) each.
+    """
+
+    parts: Parts
+    what: str
+    kernel: str
+    maker: tuple[str, str]
+    given: dict[str, str] = field(default_factory=dict)
+    imports: list[tuple[str, str]] = field(default_factory=list)
+
+    def take(self, module: str, name: str) -> str:
+        """Import a name and return it."""
+        others = {known for package, known in self.imports if package != module}
+        assert name not in others, f"two parts of one mechanism have the name {name}"
+        self.imports.append((module, name))
+        return name
+
+    def part(self, package: str, name: str) -> str:
+        """Return the expression for a family's part: a module, or an attribute of one, which is imported."""
+        module, attribute = listed(package, name, where="parts")
+        below, _, own = module.rpartition(".")
+        return f"{self.take(below, own)}.{attribute}".rstrip(".")
+
+    def family(self, package: str, names: Iterable[str]) -> str:
+        """Return the expression for a tuple of a family's parts."""
+        return "(" + "".join(f"{self.part(package, name)}, " for name in names) + ")"
+
+    @property
+    def tree(self) -> str:
+        """Name of the module that factors the mass matrix."""
+        return self.take(f"{DYNAMICS}.equations", "articulated" if self.parts.articulated else "composite")
+
+    @property
+    def forms(self) -> str:
+        """Expression for the forms of normal forces."""
+        return self.family(FORMS, self.parts.forms)
+
+    @property
+    def harmonics(self) -> str:
+        """Name of the kernel of harmonic laws; empty without harmonics."""
+        return self.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if self.parts.harmonics else ""
+
+    @property
+    def flexible(self) -> str:
+        """Expression for the kernels of the flexible bodies, unless an effect replaces them."""
+        return f"{self.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
+
+    @property
+    def projection(self) -> str:
+        """Expression for the kernel that projects states onto the closures."""
+        return (
+            "calls.project" if self.parts.closures else self.take(f"{DYNAMICS}.equations.projection", "no_projection")
+        )
+
+    def add_effects(self, point: str) -> None:
+        """Add the arguments that the present effects declare for a point."""
+        for effect in self.parts.present:
+            self.given |= {name: self._of(effect, text) for name, text in effect.compose.get(point, {}).items()}
+
+    def _of(self, effect: Effect, text: str) -> str:
+        """Return the expression of an argument that an effect declares, after importing its names."""
+        kinds, own = self.parts.kinds(effect.name), f"{PACKAGE}.{effect.name}"
+        text = re.sub(r"<(?:(\w+)\.)?(\w+)>", lambda m: self.take(f"{own}.{m[1]}" if m[1] else own, m[2]), text)
+        chosen = self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds and "{kinds}" in text else ""
+        return text.format(file=self, kinds=chosen)
+
+    def add_closures(self) -> None:
+        """Add the kernels of the closures: those of joints, unless an effect replaces them."""
+        self.add_effects("closures")
+        if "closures" not in self.given:
+            self.given["closures"] = f"{self.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({self.tree})"
+
+    def text(self, function: str, formulas: str = "", using: tuple[str, str] = CALLS) -> str:
+        """Return the source; function: code to compile; formulas: expressions' kernels; using: import of `function`."""
+        maker = self.take(*self.maker)
+        lines = sorted(
+            {f"from {module} import {name}" for module, name in [*([using] if function else []), *self.imports]}
+        )
+        arguments = [f"    {key}={value}," for key, value in self.given.items()]
+        made = [f"{self.kernel} = {maker}(", *arguments, ")", "", "", function]
+        return "\n".join([f'"""Generated: {self.what}."""', *lines, "", formulas, *made])
+
+    def calling(self, name: str, arguments: str = "", formulas: str = "") -> str:
+        """Return the source of a function that others call by its address, for a kernel that returns nothing."""
+        given = ", ".join(["h, f, w, n", *([arguments] if arguments else [])])
+        function = f'@calls.exported("{name}")\ndef {name}({given}):\n    {self.kernel}({given})\n    return 0\n'
+        return self.text(function, formulas)
+
+
+def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
+    """Return the sources by function name, without the right-hand side, in an order where callees come first."""
+    laws = Composition(parts, "laws of time", "laws", (PRESCRIBED, "make_laws"))
+    if parts.harmonics:
+        laws.given["harmonics"] = laws.harmonics
+    by_name = {"prescribe": laws.calling("prescribe", "t")}
+    if parts.closures:
+        by_name["project"] = _project(parts)
+    if integrators.INTEGRATORS[scheme.integrator].retracts:
+        maker = (f"{DYNAMICS}.equations.retraction", "make_retraction")
+        retraction = _joints(parts, "retraction of", "retraction", maker)
+        by_name["retract"] = retraction.calling("retract", "y, displacement, out, total")
+    events = _steps(parts, scheme, f"events in steps of {scheme}", "resolution", "make_resolution")
+    if "events" in events.given:
+        events.take(f"{DYNAMICS}.fields", "data")
+        by_name["resolve"] = events.text(RESOLVE)
+    return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
+
+
+def kernels(parts: Parts) -> dict[str, str]:
+    """Return the sources of generic right-hand side and recorded quantities, for a topology without own code."""
+    file = _equations(parts)
+    file.kernel, file.maker = "right_hand_side", (RIGHT_HAND_SIDE, "make_right_hand_side")
+    file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({file.harmonics})"
+    formulas = _formulas(parts)
+    described = _description(parts).calling("describe", formulas=formulas)
+    return {"evaluate": file.calling("evaluate", "t, y, dy", formulas), "describe": described}
+
+
+def specialised(parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False) -> str:
+    """Return the source of specialised code for one topology.
+
+    name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
+    exact: True for the same bits as in each of several lanes.
+    """
+    file = _description(parts) if name == DESCRIBED else _equations(parts)
+    for taken in ("llvm_text", "NAME"):
+        file.take(f"{DYNAMICS}.specialise.program", taken)
+    options = {SPECIALISED: f"exact={exact}", WHOLE: "whole=True", DESCRIBED: "describes=True"}[name]
+    level = 3 if name == SPECIALISED else 0
+    return _of_topology(file, topology, ONE_TOPOLOGY, FILES, kernel=file.kernel, options=options, level=level)
+
+
+def batched(parts: Parts, topology: Topology, lanes: int) -> str:
+    """Return the source of the function that advances several steppers of one topology (`compile.lanes`)."""
+    file = _equations(parts)
+    file.take(f"{DYNAMICS}.specialise", "batched")
+    file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
+    return _of_topology(file, topology, LANES, lanes=lanes)
+
+
+def tangent(parts: Parts, topology: Topology) -> str:
+    """Return the source of the right-hand side for one topology with its tangents."""
+    file = _equations(parts)
+    file.take(f"{DYNAMICS}.specialise", "batched")
+    file.take(f"{DYNAMICS}.fields", "data")
+    change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
+    return _of_topology(file, topology, CHANGES, law_changes=f"{file.take(PRESCRIBED, 'make_law_changes')}({change})")
+
+
+def _of_topology(
+    file: Composition, topology: Topology, template: str, using: tuple[str, str] = CALLS, **values: object
+) -> str:
+    file.what += ", for one topology"
+    function = template.format(topology="".join(f"    {row},\n" for row in topology), **values)
+    return file.text(function, _formulas(file.parts), using)
+
+
+def rates(parts: Parts) -> str:
+    """Return the source of the kernel `rates` for Python (`specialise.dual`), without friction of ideal joints."""
+    return _equations(parts, whole=False).text("", _formulas(parts))
+
+
+def _equations(parts: Parts, *, whole: bool = True) -> Composition:
+    """Return a file for the right-hand side; whole: with friction of ideal joints."""
+    file = _forces(parts, "right-hand side of", "rates", (RIGHT_HAND_SIDE, "make_rates"))
+    file.given["tree"] = file.tree
+    if parts.closures:
+        file.add_closures()
+    if whole:
+        file.add_effects("evaluate")
+    return file
+
+
+def _project(parts: Parts) -> str:
+    projection = f"{DYNAMICS}.equations.projection"
+    file = _joints(parts, "projection with", "projection", (projection, "make_projection"))
+    file.given["evaluate"] = "calls.evaluate"
+    file.add_closures()
+    if parts.flexible:
+        stiffen = file.take(projection, "make_stiffen")
+        file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {file.flexible})"
+        file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
+    return file.text(PROJECT)
+
+
+def _description(parts: Parts) -> Composition:
+    """Return a file for the recorded quantities of an evaluation."""
+    maker = (f"{DYNAMICS}.equations.observation", "make_description")
+    file = _forces(parts, "what is recorded of", "description", maker)
+    file.add_effects("observe")
+    if parts.closures:
+        file.add_effects("observe closures")
+    return file
+
+
+def _observe(parts: Parts) -> str:
+    file = Composition(parts, "record", "observation", (f"{DYNAMICS}.equations.observation", "make_observation"))
+    file.given = {"evaluate": "calls.evaluate", "laws": "calls.laws", "describe": "calls.describe"}
+    file.given["project"] = file.projection
+    return file.text(OBSERVE)
+
+
+def _advance(parts: Parts, scheme: Scheme) -> str:
+    file = _steps(parts, scheme, f"steps of {scheme}", "steps", "make_advance")
+    file.given["stepping"] = file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive")
+    if "events" in file.given:
+        file.given["resolve"] = "calls.resolve"
+    file.take(DYNAMICS, "memory as m")
+    return file.text(ADVANCE)
+
+
+def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> Composition:
+    """Return a file for steps, or for the events in them."""
+    module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
+    file = Composition(parts, what, kernel, (f"{INTEGRATORS}.stepper", maker))
+    file.given = {
+        "evaluate": "calls.rates",
+        "project": file.projection,
+        "retract": "calls.retract",
+        "method": file.take(module, method),
+    }
+    if integrators.INTEGRATORS[scheme.integrator].reads_all:
+        file.given["complete"] = f"(calls.evaluate, {file.tree})"
+    events = _events(file, scheme)
+    if events:
+        file.given["events"] = events
+    if parts.closures:
+        file.given["poses"] = file.take(INTEGRATORS, "singular_step")
+    return file
+
+
+def _events(file: Composition, scheme: Scheme) -> str:
+    """Return the expression for the events that the stepper locates in each step; empty for the default: none."""
+    parts, chosen = file.parts, not scheme.fixed
+    touching = parts.surfaces or any(effect.touches for effect in parts.present)
+    if touching and not scheme.located:
+        return file.take(f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+    guarded = chosen and (parts.frictions or parts.load_kinks or any(effect.guards for effect in parts.present))
+    if touching:
+        located = file.take(f"{INTEGRATORS}.contact_events", "located")
+        given = [file.take(f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
+        if guarded:
+            given.append(file.take(f"{INTEGRATORS}.guards", "AMONG_CONTACTS"))
+        return f"{located}({', '.join(given)})"
+    return file.take(f"{INTEGRATORS}.guards", "GUARDS") if guarded else ""
+
+
+def _joints(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
+    """Return a file that depends on the joints."""
+    file = Composition(parts, f"{what} {', '.join(parts.joints)}", kernel, maker)
+    file.given["joints"] = file.family(JOINTS, parts.joints)
+    return file
+
+
+def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
+    """Return a file with the forces of a mechanism: joints, flexible bodies, contacts, loads."""
+    file = _joints(parts, what, kernel, maker)
+    if parts.flexible:
+        file.given["flexible"] = file.flexible
+    if parts.surfaces:
+        surfaces, frictions = file.family(SURFACES, parts.surfaces), file.family(FRICTION_LAWS, parts.frictions)
+        contacts = file.take(f"{DYNAMICS}.contact.forces", "make_contacts")
+        file.given["contacts"] = f"{contacts}(surfaces={surfaces}, forms={file.forms}, frictions={frictions})"
+    if parts.loads:
+        kinds = "".join(f"{_load(file, n, *kind.split(maxsplit=1))}, " for n, kind in enumerate(parts.loads))
+        file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
+    file.add_effects("forces")
+    return file
+
+
+def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
+    """Return the expression for the kernel of a kind of loads, which may call that of an expression (`_formulas`)."""
+    module = file.part(LOADS, name)
+    if not formula:
+        return f"{module}.apply"
+    file.take(f"{DYNAMICS}.kernels", "kernel")
+    file.take(LOADS, "looks")
+    return f"{module}.applying(formula{number})"
+
+
+def _formulas(parts: Parts) -> str:
+    """Return the kernels of the expressions of loads."""
+    written = [(n, kind.split(maxsplit=1)) for n, kind in enumerate(parts.loads)]
+    texts = [(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1]
+    if not texts:
+        return ""
+    formulas = lookup(RUNS, "expressions", where="parts")  # `effects.ways` lists it for scenes with such loads
+    return "\n\n".join(formulas.source(*text) for text in texts)
+
+
+# laws of time are not specialised: their pieces change with time, and their number with the scene's numbers
+ONE_TOPOLOGY = """TOPOLOGY = (
+{topology})
+files.assembles(__name__, NAME, lambda: llvm_text({kernel}, TOPOLOGY, {options}), {level})
+"""
+CHANGES = """TOPOLOGY = (
+{topology})
+law_changes, differentiated = {law_changes}, batched.differentiated(rates, TOPOLOGY)
+
+
+@calls.exported("evaluate")
+def specialised(h, f, w, n, t, y, dy):
+    calls.laws(h, f, w, n, t)
+    d = data(h, f, w, n)
+    size = d.nq + d.nv + d.n_ledger
+    for k in range(1, d.n_changes + 1):
+        law_changes(d, t, k)
+        differentiated(h, f, w, n, y, dy, k * d.f_change, k * d.w_change, y + k * size, dy + k * size)
+    return 0
+"""
+LANES = """TOPOLOGY = (
+{topology})
+run = make_lanes(*batched.batched(rates, TOPOLOGY, {lanes}), {lanes})
+
+
+@calls.exported("lanes")
+def lanes(table, places, numbers):
+    run(table, places, numbers)
+    return 0
+"""
+PROJECT = """@calls.exported("project")
+def project(h, f, w, n, t, y, dy, tolerance):
+    return projection(h, f, w, n, t, y, dy, tolerance)
+"""
+OBSERVE = """@calls.exported("observe")
+def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out, length):
+    rows, out = calls.carray(rows, (count, width)), calls.carray(out, (length,))
+    observation(h, f, w, n, rows, calls.carray(pieces, (lines, laws)), tolerance, out)
+    return 0
+"""
+RESOLVE = """@calls.exported("resolve")
+def resolve(h, f, w, n, step, t_new, rows, count, width, events, event_count, event_width):
+    rows, events = calls.carray(rows, (count, width)), calls.carray(events, (event_count, event_width))
+    return resolution(data(h, f, w, n), step, t_new, rows, events)
+"""
+# one function for both tasks: each function is an object of its own to load
+ADVANCE = """@calls.exported("advance")
+def advance(h, f, w, n, t, repeat, outputs, times, rows, count, width, events, event_count, event_width):
+    if repeat < 0:
+        rows, events = calls.carray(rows, (count, width)), calls.carray(events, (event_count, event_width))
+        outputs = calls.carray(outputs, (times,))
+        while True:  # one call, whoever evaluates: a second one might be compiled to other bits
+            if not steps(h, f, w, n, outputs, rows, events) or n[m.TOGETHER]:
+                break
+            calls.awaited(h, f, w, n)
+    for _ in range(repeat):
+        calls.evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
+    return 0
+"""

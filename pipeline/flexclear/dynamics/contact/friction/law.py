@@ -1,0 +1,51 @@
+"""Structure of a friction law; kernels of laws that depend on the present sliding speed alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.vectors import dot, scale
+
+#: speed [m/s] below which the coefficient rises linearly: at rest there is no force, but a slope
+SLOWEST = 1e-290
+
+
+@dataclass(frozen=True)
+class Friction:
+    """A friction law; the functions take its parameters in a scene.
+
+    traction: kernel (z, slip, f_n, p) -> (force, loss, stored, z_rate): force [N] on the ball against the sliding
+    velocity `slip` [m/s] (vector in the tangent plane), lost power [W] >= 0, stored energy [J], and the rate of the
+    bristle deflection z [m] in the axes of slip (zeros for a law without memory).
+    constants: its numbers in p, six at most.
+    stick_speed: sliding speed below which the law sticks [m/s], 0 for laws without sticking.
+    kinks: two sliding speeds [m/s] at which slope or curvature of the coefficient jumps, 0 for none; steps end there.
+    bristle: the size of z [m], or None for a law without memory.
+    """
+
+    traction: Callable
+    constants: Callable[[Any], tuple[float, ...]]
+    stick_speed: Callable[[Any], float] = lambda law: 0.0
+    kinks: Callable[[Any], tuple[float, float]] = lambda law: (0.0, 0.0)
+    bristle: Callable[[Any], float | None] = lambda law: None
+
+    def parameters(self, law: Any) -> tuple[float, ...]:
+        """Return the six numbers p."""
+        return (*self.constants(law), *(0.0,) * 6)[:6]
+
+
+def sliding(coefficient: Callable) -> Callable:
+    """Build `traction` of a law whose force is the normal force times coefficient(speed, p) >= 0."""
+
+    @kernel
+    def traction(z, slip, f_n, p):
+        speed = max(np.sqrt(dot(slip, slip)), SLOWEST)
+        f_t = f_n * coefficient(speed, p)
+        return scale(-f_t / speed, slip), f_t * speed, 0.0, (0.0, 0.0, 0.0)
+
+    return traction

@@ -1,0 +1,112 @@
+"""Normal laws with their numbers, and the family of laws with hysteretic damping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import NamedTuple
+
+from flexclear.dynamics.contact import restitution as closed_form
+from flexclear.scene.clearance import NormalLaw
+
+#: largest deviation of the delivered from the requested restitution within a law's range
+RESTITUTION_ERROR = 0.05
+
+
+class Numbers(NamedTuple):
+    """Numbers of a normal law for its form; CONTACT_NUMBERS has the same fields.
+
+    stiffness: K [N/m^n].  damping: C [N s/m], or the hysteresis factor; 0 for a law without loss.
+    """
+
+    stiffness: float
+    exponent: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """A normal law, resolved: form and numbers for the kernels, and the restitution of a free impact.
+
+    parameter: the law's own coefficient of restitution, or None.  delivered: the rebound over the
+    approach speed of a free impact.  warning: in words, when the law is used outside its range.
+    """
+
+    form: str
+    numbers: Numbers
+    parameter: float | None
+    delivered: float
+    warning: str | None = None
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """A law F = K d^n (1 + a d'/d'0); `factor` gives a for the requested coefficient of restitution.
+
+    valid: range of restitutions that the law delivers within RESTITUTION_ERROR.
+    exponent: default exponent n.
+    """
+
+    name: str
+    factor: Callable[[float], float]
+    valid: tuple[float, float]
+    exponent: float = 1.5
+
+    def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+        """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
+        refuse_linear(self.name, law)
+        exponent = self.exponent if law.exponent is None else law.exponent
+        if law.delivered_restitution is not None:
+            delivered = law.delivered_restitution
+            a = closed_form.factor(delivered)
+            parameter = self._parameter(a)
+        elif law.restitution is not None:
+            parameter = law.restitution
+            a = self._factor(parameter)
+            delivered = closed_form.delivered(a)
+        else:
+            raise ValueError(f"the law '{self.name}' needs a restitution, or a delivered_restitution")
+        numbers = Numbers(stiffness, exponent, a)
+        return Resolved("hysteretic", numbers, parameter, delivered, self._warning(law, delivered))
+
+    def _factor(self, parameter: float) -> float:
+        a = self._at(parameter)
+        if not isfinite(a):
+            raise ValueError(f"the law '{self.name}' has no finite damping for a restitution of 0; request 0.01 or so")
+        return a
+
+    def _at(self, parameter: float) -> float:
+        try:
+            return self.factor(parameter)
+        except ZeroDivisionError:
+            return inf
+
+    def _parameter(self, a: float) -> float:
+        """Return the parameter whose factor is a; the factors of all these laws decrease with the parameter."""
+        if a == 0.0:
+            return 1.0
+        least = 0.0 if isfinite(self._at(0.0)) else 1e-300
+        if self.factor(least) < a:
+            lowest = closed_form.delivered(self.factor(least))
+            raise ValueError(
+                f"the law '{self.name}' delivers no restitution below {lowest:.4g}; request more, or choose "
+                "'gonthier', 'hu-guo' or 'flores', which cover all restitutions"
+            )
+        return closed_form.root(lambda c: self.factor(c) - a, least, 1.0)
+
+    def _warning(self, law: NormalLaw, delivered: float) -> str | None:
+        if law.restitution is None or abs(delivered - law.restitution) <= RESTITUTION_ERROR:
+            return None
+        low, high = self.valid
+        return (
+            f"'{self.name}' with restitution = {law.restitution:g} delivers {delivered:.4g} "
+            f"(meant for {low:g} to {high:g}); delivered_restitution = {law.restitution:g} gives the rebound itself"
+        )
+
+
+def refuse_linear(name: str, law: NormalLaw) -> None:
+    """Raise ValueError when a scene gives a law numbers that only linear laws take."""
+    for key in ("damping", "effective_mass"):
+        if getattr(law, key) is not None:
+            raise ValueError(f"the law '{name}' takes no {key}; 'kelvin-voigt' does")

@@ -1,0 +1,43 @@
+"""Pin in a journal with clearance: a circle in a circle, in the plane normal to the journal's axis.
+
+Axial motion and tilt are constrained as by a planar joint (`joints.HELD`), with a force along the
+axis and moments across it at the pin's frame. The contact (`contact.forces`) acts in the middle of
+the bearing, where the two frames are; over-long bearings, which tilting pins touch at both rims, are
+not modelled.
+
+Exponent 1.5: K [N/m^1.5] of two spheres of these radii, as is usual for revolute joints with
+clearance (Flores et al. 2008, sec. 3.1, after Lankarani & Nikravesh); the length does not enter.
+Exponent 1: two parallel cylinders; the radii do not enter. Both hold while the contact's
+half-width is small against the pin's radius (below about 0.3 of it).
+Source: Wang & Wang (2019), eq. (26), of spheres; Popov (2017), Contact Mechanics and Friction, sec. 5.3, of
+cylinders.
+"""
+
+from __future__ import annotations
+
+from flexclear.dynamics.contact.hertz import (
+    cylinder_stiffness,
+    half_width,
+    published,
+    relative_radius,
+    sphere_stiffness,
+)
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
+from flexclear.scene.clearance import ClearanceRevolute
+
+
+@kernel
+def separation(axes, numbers, p, v):
+    """Return the same as `clearance_spherical.separation`, for the components of p and v across the journal's axis."""
+    z = axis(axes, 2)
+    distance, rate, normal, turning = radial(sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z)))
+    return numbers.clearance - distance, rate, normal, turning, p
+
+
+stiffness = published({1.0: cylinder_stiffness, 1.5: sphere_stiffness})
+
+
+def contact_size(joint: ClearanceRevolute, depth: float, force: float) -> float:
+    """Return the half-width of the contact [m] under a force [N]."""
+    return half_width(joint, relative_radius(joint), depth, force)

@@ -1,0 +1,94 @@
+"""Warnings and errors of a run whose contacts left the validity range of their laws."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexclear.scene.registry import lookup
+from flexclear.system.errors import SolverError
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.contact.law import Resolved
+
+#: contact size, as a fraction of the inner radius, above which Hertz's theory no longer holds
+SMALL_CONTACT = 0.3
+#: penetration, as a fraction of the inner radius, above which no contact law holds
+SHALLOW = 0.1
+
+
+def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -> list[str]:
+    """Return warnings about a contact that was used outside the range of its law; empty for none.
+
+    name: of the contact, in words.  depth, force: largest penetration [m] and normal force [N] of the run.
+    """
+    found = [] if law.warning is None else [f"{name}: {law.warning}"]
+    if not joint.radius:
+        return found  # the end of a coordinate has no surfaces
+    surfaces = lookup("flexclear.dynamics.contact.surfaces", joint.type, where=name)
+    size = surfaces.contact_size(joint, depth, force)
+    if joint.normal.stiffness is None and size > SMALL_CONTACT * joint.radius:
+        found.append(
+            f"{name}: the contact radius reaches {size:.3g} m, {size / joint.radius:.2g} of the inner "
+            f"surface's radius; the stiffness from radii and materials (Hertz) holds below {SMALL_CONTACT:g}"
+        )
+    if depth > SHALLOW * joint.radius:
+        found.append(
+            f"{name}: the penetration reaches {depth:.3g} m, {depth / joint.radius:.2g} of the "
+            f"inner surface's radius; contact laws hold below {SHALLOW:g}: "
+            "choose a stiffer contact, a slower impact or smaller loads"
+        )
+    return found
+
+
+def deepest(events: np.ndarray, touch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest penetration [m] and normal force [N] of every contact, over its events and the observed rows.
+
+    events: named fields of EVENT, (events,).  touch: named fields of TOUCH, (rows, contacts).
+    """
+    depths = np.fmax.reduce(-touch["gap"], axis=0, initial=0.0)
+    forces = np.fmax.reduce(touch["normal_force"], axis=0, initial=0.0)
+    for c in range(touch.shape[1]):
+        own = events[events["contact"] == c]
+        depths[c] = np.fmax.reduce(own["peak_depth"], initial=depths[c])
+        forces[c] = np.fmax.reduce(own["peak_force"], initial=forces[c])
+    return depths, forces
+
+
+def refuse_deep(name: str, joint: Any, depth: float) -> None:
+    """Raise SolverError when the inner centre has passed through the outer surface: penetration [m] above the radius.
+
+    name: of the contact, in words.
+    """
+    if problem := pressed_through(name, joint, depth):
+        raise SolverError(f"{problem}: choose a stiffer contact, a slower impact or smaller loads")
+
+
+def pressed_through(name: str, joint: Any, depth: float) -> str:
+    """Return the error text for a contact that `refuse_deep` refuses; empty for others."""
+    if not depth > joint.radius > 0.0:
+        return ""
+    return (
+        f"{name}: the penetration reached {depth:.3g} m, more than the inner surface's radius "
+        f"({joint.radius:.3g} m), so that the inner surface's centre passed the "
+        "outer surface, where no contact law holds"
+    )
+
+
+def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resolved]) -> str:
+    """Return the resolved law of every contact as JSON, for the dataset's attributes."""
+    found = {
+        name: {
+            "law": joint.normal.law,
+            "exponent": law.numbers.exponent,
+            "stiffness": law.numbers.stiffness,
+            "restitution_parameter": law.parameter,
+            "delivered_restitution": law.delivered,
+            "friction": None if joint.friction is None else joint.friction.law,
+        }
+        for (name, joint, _, _), law in zip(contacts, resolved, strict=True)
+    }
+    return json.dumps(found, sort_keys=True)

@@ -1,0 +1,71 @@
+r"""PID controller: a force along a joint coordinate from the error of a measured one, with limits and anti-windup.
+
+.. math:: u = K_p e + z + K_d\dot e, \quad F = \min(\max(u, F_-), F_+), \quad \dot z = K_i e + (F - u)/T_t
+
+The integral part z is an internal state. While the force is at a limit z follows it with the tracking time T_t
+(back-calculation), so that the right-hand side stays continuous.
+Source: Astrom & Hagglund (1995), PID Controllers: Theory, Design, and Tuning, 2nd ed., sec. 3.5.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flexclear.dynamics.gauge import counted, internal_rate
+from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.loads.fields import act, law, law_rate, measure, number
+from flexclear.dynamics.loads.row import Row
+from flexclear.dynamics.vectors import scale
+from flexclear.scene.loads import Pid
+from flexclear.scene.units import quantity
+
+#: represents a missing limit
+UNLIMITED = 1e300
+#: dimensions of proportional, integral and derivative gain, by (True when the force is a torque, True when the measured
+#: coordinate is an angle)
+GAINS = {
+    (False, False): ("stiffness", "stiffness per time", "damping"),
+    (True, True): ("torsional stiffness", "torsional stiffness per time", "torsional damping"),
+    (False, True): ("force per angle", "force per angle and time", "force per angular velocity"),
+    (True, False): ("force", "force per time", "impulse"),
+}
+
+
+@kernel
+def apply(d, k):
+    """Apply the force of load k."""
+    value, rate, _, _ = counted(d, d.loads[k].measured)
+    _, speed, moment, force = measure(d, k)
+    state = d.loads[k].internal0
+    error, error_rate = law(d, k, 0) - value, law_rate(d, k, 0) - rate
+    asked = number(d, k, 0) * error + d.internal[state] + number(d, k, 2) * error_rate
+    size = min(max(asked, number(d, k, 3)), number(d, k, 4))
+    d.ledger_rate[internal_rate(d, state)] = number(d, k, 1) * error + number(d, k, 5) * (size - asked)
+    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
+
+
+def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[float, ...]:
+    """Return three gains, least and largest force, 1/tracking time [SI]; raise ValueError, in words, for bad values."""
+    names = ("proportional", "integral", "derivative")
+    dimensions = GAINS[coordinate.turning, measured.turning]
+    gains = [quantity(getattr(load, name), dimension) for name, dimension in zip(names, dimensions, strict=True)]
+    if not any(gains):
+        raise ValueError("a controller needs a gain: give proportional, integral or derivative; all are 0")
+    low, high = (-UNLIMITED, UNLIMITED)
+    if load.limits is not None:
+        low, high = (quantity(limit, coordinate.force) for limit in load.limits)
+        if not low < high:
+            raise ValueError(f"limits are the smallest and the largest force; {low:.6g} is not below {high:.6g}")
+    tracking = load.tracking_time
+    if tracking is None and load.limits is not None and gains[1]:
+        if not gains[0] / gains[1] > 0.0:
+            raise ValueError("proportional/integral is not a positive time: give a tracking_time of the integral")
+        tracking = gains[0] / gains[1]
+    return (*gains, low, high, 0.0 if tracking is None else 1.0 / tracking)
+
+
+def row(load: Pid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
+    """Return the load's row: six numbers (`numbers`), the reference, and the integral part as state."""
+    reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
+    return Row(joint=load.joint, laws=(reference,), numbers=numbers(load, coordinate, measured), states=1)

@@ -1,0 +1,117 @@
+"""Gears and racks as couplings of two joint coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.model.driving import measured, named_coordinate
+from flexclear.dynamics.model.merge import Placement
+from flexclear.system.errors import InputError
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.model.filling import Filling
+    from flexclear.dynamics.model.mechanism import Mechanism, Site
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of the two coordinates of a coupling: its joint, and the sites of the joint's first and second frame."""
+
+    joint: str
+    coordinate: Coordinate
+    a: Site
+    b: Site
+
+    def value(self, poses: Sequence[Placement]) -> float:
+        """Return the coordinate [rad in (-pi, pi], or m] at poses of the links."""
+        F, G = (poses[site.link].of(site.placement) for site in (self.a, self.b))
+        if self.coordinate.turning:
+            R = F.R.T @ G.R
+            return atan2(R[self.coordinate.sine], R[self.coordinate.cosine])
+        return float(self.along(poses) @ (G.p - F.p))
+
+    def along(self, poses: Sequence[Placement]) -> np.ndarray:
+        """Return the axis of the coordinate, shape (3,)."""
+        site = self.b if self.coordinate.side else self.a
+        axis: np.ndarray = poses[site.link].of(site.placement).R[:, self.coordinate.axis]
+        return axis
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A gear of the scene: second = ratio * first + offset; the offset is that of the start pose."""
+
+    gear: str
+    ratio: float
+    second: Side
+    first: Side
+
+    @property
+    def name(self) -> str:
+        """Name of the coupling among the joints that close loops."""
+        return f"gear {self.gear}"
+
+    @property
+    def ends(self) -> list[tuple[Site, Site]]:
+        """Pairs of sites on which the coupling acts: those of its second joint, then of its first one."""
+        return [(side.a, side.b) for side, _ in self.parts]
+
+    @property
+    def rows(self) -> list[tuple[int, int, int]]:
+        """Row of the coupling in table CLOSURE_ROWS; only its kind counts."""
+        return [(int(self.second.coordinate.turning), 0, 0)]
+
+    @property
+    def parts(self) -> tuple[tuple[Side, float], tuple[Side, float]]:
+        """Both sides with their factors in the constraint: second - ratio * first."""
+        return (self.second, 1.0), (self.first, -self.ratio)
+
+    def offset(self, poses: Sequence[Placement]) -> float:
+        """Return the offset of the constraint at poses of the links."""
+        return sum(factor * side.value(poses) for side, factor in self.parts)
+
+
+def couplings(mechanism: Mechanism) -> list[Coupling]:
+    """Return the couplings of all gears of a scene; raise InputError for impossible ones."""
+    return [_coupling(mechanism, name) for name in mechanism.scene.gear]
+
+
+def _coupling(mechanism: Mechanism, name: str) -> Coupling:
+    gear, path = mechanism.scene.gear[name], f"[gear.{name}]"
+    first, second = (_side(mechanism, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second"))
+    dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}
+    kinds = (first.coordinate.turning, second.coordinate.turning)
+    ratio = measured(gear.ratio, dimensions.get(kinds, "angle per length"), f"[gear.{name}.ratio]")
+    if ratio == 0.0:
+        raise InputError(path, "its ratio is 0, which would hold the second coordinate", "give a ratio, or drive it")
+    return Coupling(name, ratio, second, first)
+
+
+def _side(mechanism: Mechanism, text: str, path: str) -> Side:
+    scene = mechanism.scene
+    joint, coordinate = named_coordinate(scene, text, path)
+    frames = scene.joint[joint].between
+    sites = [mechanism.site(frame) for frame in frames]
+    if sites[0].link == sites[1].link:
+        raise InputError(path, f"the bodies of joint '{joint}' move as one", "name another joint")
+    return Side(joint, coordinate, *sites)
+
+
+def fill(filling: Filling) -> dict[str, Any]:
+    """Tabulate the couplings; their offsets are those of the start pose."""
+    numbering, mechanism = filling.numbering, filling.numbering.mechanism
+    coupled, poses = couplings(mechanism), [link.start for link in mechanism.links]
+
+    def gauge(side: Side) -> int:
+        return filling.gauges.add(numbering.site(side.a), numbering.site(side.b), side.coordinate, counts=True)
+
+    return {
+        "couplings": [(gauge(one.first), gauge(one.second)) for one in coupled],
+        "coupling_numbers": [(one.ratio, one.offset(poses)) for one in coupled],
+    }

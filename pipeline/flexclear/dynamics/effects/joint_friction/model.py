@@ -1,0 +1,138 @@
+"""Tables of ideal joints with friction: bearings, coordinates that move them, and terms of their reactions."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.effects.joint_friction.bearings import BEARINGS, SLIDER
+from flexclear.dynamics.model.components import Floors, Group
+from flexclear.dynamics.model.contacts import bristle, friction_law
+from flexclear.dynamics.model.filling import Filling
+from flexclear.dynamics.model.guards import Guard, speeds
+from flexclear.dynamics.model.index_tables import closure_route, uncommon
+from flexclear.dynamics.model.mechanism import Mechanism
+from flexclear.dynamics.model.numbering import Numbering
+from flexclear.scene.parts import IdealJoint
+
+Rows = list[tuple[int, ...]]
+BENDS = m.NAMED["bends"]
+#: load components of a bearing, by its field of BENDS, with the number of their components
+PRESSES = {"along": 1, "about": 1, "one_end": 2, "other_end": 2}
+
+
+def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Group]:
+    """Return the ledger groups: first the loss of each joint [J], then the bristles [m] of each bearing."""
+    losses, bristles = list[Group](), list[Group]()
+    for name, joint in mechanism.scene.rubbing().items():
+        part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), bristle(name, joint)
+        losses.append((energies[part], 1, part))
+        bristles += [] if size is None else [(size, 3, part)] * len(BEARINGS[joint.type])
+    return losses + bristles
+
+
+def guards(mechanism: Mechanism) -> Iterator[Guard]:
+    """Yield the guards of each bearing: speeds, reversals of sliding for laws with bristles, reversals of loads."""
+    bearing = 0
+    for name, joint in mechanism.scene.rubbing().items():
+        law = friction_law(name, joint)
+        assert joint.friction is not None
+        for _ in BEARINGS[joint.type]:
+            row = bearing * BENDS.size
+            yield from speeds(BENDS, row + BENDS.sliding, 3, law.kinks(joint.friction))
+            if law.bristle(joint.friction) is not None:
+                yield (BENDS.at, row + BENDS.sliding, 3, -1, -1), 0.0, law.stick_speed(joint.friction)
+            for pressing, count in PRESSES.items():
+                yield (BENDS.at, row + getattr(BENDS, pressing), count, -1, bearing), 0.0, 0.0
+            bearing += 1
+
+
+def fill(filling: Filling) -> dict[str, Any]:
+    """Tabulate the joints with friction and their bearings.
+
+    Articulated inertias give the wrench of a joint without terms of reactions.
+    """
+    numbering, closures, articulated = filling.numbering, filling.closures, filling.parts.articulated
+    mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
+    pairs = [(c, part, *both) for c, one in enumerate(closures) for part, both in enumerate(one.ends)]
+    ends = [(c, part, numbering.site(a), numbering.site(b)) for c, part, a, b in pairs]
+    slot = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
+    tables: dict[str, list[Any]] = defaultdict(list)
+    for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
+        a, b = (mechanism.site(frame) for frame in joint.between)
+        sites = numbering.site(a), numbering.site(b)
+        link, reverse = _link(mechanism, name)
+        closure = next((c for c, one in enumerate(closures) if one.name == name), -1)
+        entries = uncommon(closure_route(numbering, *sites))
+        momenta, columns, loops = _reaction(numbering, link, ends, articulated) if link >= 0 else ([], [], [])
+        ranges = (
+            *_added(tables["rubbing_entries"], entries),
+            *_added(tables["reaction_terms"], momenta),
+            *_added(tables["reaction_terms"], columns),
+            *_added(tables["reaction_loops"], loops),
+        )
+        where = len(tables["bearings"]), len(BEARINGS[joint.type])
+        tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges, *where))
+        for kind, side, axis in BEARINGS[joint.type]:
+            size = bristle(name, joint)
+            law = laws.index(joint.friction.law) if joint.friction is not None else -1
+            tables["bearings"].append((number, kind, law, side, axis, slot if size is not None else -1))
+            tables["bearing_numbers"].append(_numbers(name, joint, kind))
+            slot += 3 if size is not None else 0
+    return tables
+
+
+def _added(table: Rows, rows: Sequence[tuple[int, ...]]) -> tuple[int, int]:
+    """Append rows to a table; return the index of the first one and their number."""
+    table += rows
+    return len(table) - len(rows), len(rows)
+
+
+def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
+    """Return a row of the table BEARING_NUMBERS."""
+    friction = joint.friction
+    assert friction is not None
+    radius = friction.radius or 0.0
+    axial = (friction.axial_radius or radius) / radius if joint.type == "revolute" else 0.0
+    torsion = 1.0 / radius if kind == SLIDER and radius else 0.0
+    lever = 1.0 / friction.length if friction.length else 0.0
+    return [radius, lever, axial, torsion, friction.preload, *friction_law(name, joint).parameters(friction)]
+
+
+def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
+    """Return the link whose inboard joint this is (last of a chain), and True if it is on the first frame's side."""
+    bearings = [
+        (i, link.branch.reverse)
+        for i, link in enumerate(mechanism.links)
+        if link.branch.edge is not None and link.branch.edge.name == name
+    ]
+    return bearings[-1] if bearings else (-1, False)
+
+
+def _reaction(
+    numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool
+) -> tuple[Rows, Rows, Rows]:
+    """Return the terms of the reaction of a link's joint: momenta, columns, and closures beyond the joint.
+
+    ends: (closure, part, first site, second site) of all closures; a coupling has two parts.
+    """
+    mechanism = numbering.mechanism
+    beyond = {link}
+    for i in range(link + 1, len(mechanism.links)):
+        if mechanism.links[i].branch.parent in beyond:
+            beyond.add(i)
+    momenta: Rows = [
+        (c, c)
+        for i in sorted(beyond)
+        for c in (*numbering.coordinates[i], *numbering.modal_coordinates.get(i, ()))
+        if c < numbering.nv and not articulated
+    ]
+    columns: Rows = [(c, col) for c, col in numbering.route(link - 1) if c < numbering.nv and not articulated]
+    loops: Rows = []
+    for c, part, a, b in ends:
+        sign = int(numbering.sites[b].link in beyond) - int(numbering.sites[a].link in beyond)
+        if sign:
+            loops.append((c, sign, part))
+    return momenta, columns, loops

@@ -1,0 +1,19 @@
+"""Declaration of wear.
+
+Sliding distance and load path are part of the state: steps and impacts are as exact for them as for the motion.
+"""
+
+from __future__ import annotations
+
+from flexclear.dynamics.effects.effect import Effect
+
+WEAR = Effect(
+    "wear",
+    lambda scene: () if scene.worn() else None,
+    topology={"worn": "contact"},  # contacts with wear
+    compose={"forces": {"contacts": "<contact.wearing>({file.given[contacts]})"}},
+    changeable=("joint.wear",),
+    fill="model:fill",
+    ledger="model:ledger",
+    records={("wear_",): "record:wear_series"},
+)

@@ -1,0 +1,159 @@
+"""Projection of positions and speeds onto the closures, by the least change in the metric of the mass.
+
+Flexible bodies deform as under slow loads: in the metric of the mass alone, their light modes would take up most of a
+gap, and vibrate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.choice import nothing
+from flexclear.dynamics.equations.retraction import make_position_rates
+from flexclear.dynamics.fields import data
+from flexclear.dynamics.kernels import kernel
+
+PROJECTIONS = 8
+#: pivot ratio of the closures below which residuals are not corrected: a residual r needs a change r / sqrt(ratio)
+BLIND = 1e-8
+#: rounding may stop the residuals this far above a very tight tolerance
+ROUNDING_FACTOR = 1e3
+#: redundant rows may have residuals of this fraction of the mechanism's size: rows of joints whose axes miss each other
+#: by less than `model.rates.ZERO_SINGULAR_VALUE` are redundant, and open by that, times some turns, during the motion
+OPEN_REDUNDANT = 1e-6
+#: time over which a gap is closed [s]: modes with shorter periods respond by their stiffness, not by their mass
+CLOSING_TIME = 0.1
+
+
+@kernel
+def largest(values, count):
+    """Return the largest magnitude of the first `count` entries of a section; NaN counts as infinite."""
+    result = 0.0
+    for k in range(count):
+        if not abs(values[k]) <= result:
+            result = abs(values[k]) if values[k] == values[k] else 1e300
+    return result
+
+
+@kernel
+def widest(d, values, solved):
+    """Return the largest of the closure rows' values, angles times the mechanism's size [m, or m/s].
+
+    solved: whether only selected rows count.  Lengths of an independent mechanism are scaled up by the ratio of the
+    whole scene's size to its own.
+    """
+    result, arm = 0.0, d.length
+    for c in range(d.n_closures):
+        closure, weight = d.closures[c], d.closure_numbers[c].weight
+        for k in range(closure.row0, closure.row0 + (closure.n_kept if solved else closure.n_rows)):
+            size = abs(values[k]) * (weight if d.closure_rows[k].kind == 0 else arm)
+            if not size <= result:
+                result = size if size == size else 1e300
+    return result
+
+
+@kernel
+def open_by(d):
+    """Return the largest residual of the loops, or its rate, at the state evaluated last [m, or m/s]."""
+    return max(widest(d, d.residual, True), widest(d, d.residual_rate, True))
+
+
+@kernel
+def no_projection(h, f, w, n, t, y, dy, tolerance):
+    """Do nothing: a tree has no closures."""
+    return 0
+
+
+@kernel
+def keep_scales(d):
+    """Store the sizes of the closure rows at an accepted step, since rejected steps may be far away."""
+    for r in range(d.n_kept_rows):
+        d.row_scale[r] = max(d.row_scale[r], d.row_scale[d.n_closure_rows + r])
+
+
+def make_stiffen(closures: Any, tree: Any, flexible: Any) -> Callable:
+    """Build the kernel stiffen(d): the factors of an evaluation, with the modal stiffness added to the mass.
+
+    closures: kernels of all closures.  tree, flexible: as of `make_rates`.
+    """
+    complete, (unfactor, refactor) = closures.complete, tree.make_again(flexible(tree))
+
+    @kernel
+    def stiffen(d):
+        unfactor(d)
+        for k in range(d.n_flex):
+            body = d.flexes[k]
+            n, c0 = body.n_modes, body.c0
+            stiffness = body.interface0 + (3 + n) * n
+            for i in range(n):
+                row = d.envelope[c0 + i].origin + c0
+                # without held shapes, shapes are eigenmodes
+                for j in range(0 if i >= body.n_held > 0 else i, i + 1):
+                    d.mass[row + j] += CLOSING_TIME**2 * d.interface_data[stiffness + n * i + j].value
+        refactor(d)
+        complete(d)
+
+    return stiffen
+
+
+def make_projection(
+    evaluate: Callable,
+    joints: tuple[Any, ...],
+    closures: Any,
+    stiffen: Callable = nothing,
+    to_modes: Callable = nothing,
+) -> Callable:
+    """Build the kernel project(h, f, w, n, t, y, dy, tolerance).
+
+    evaluate: the right-hand side.  joints: modules of the joint types.  closures: kernels of all closures.
+    stiffen, to_modes: of `make_stiffen` and of `bodies.interface`, for flexible bodies.
+    """
+    position_rates, correction = make_position_rates(joints), closures.correction
+
+    @kernel
+    def move(d, y, step):
+        """Add a small displacement of the coordinates to the positions of y."""
+        for k in range(d.nv):
+            d.u[k] = d.w[step + k]
+        position_rates(d)
+        for k in range(d.nq):
+            d.w[y + k] += d.position_rate[k]
+
+    @kernel
+    def project(h, f, w, n, t, y, dy, tolerance):
+        """Correct y until residuals [m] and their rates [m/s] of the selected rows are below `tolerance`.
+
+        It needs the work array of evaluate(t, y), and leaves it, and dy, up to date.  It returns the number of
+        evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says little about
+        the error of the state, nothing changes.
+        """
+        d = data(h, f, w, n)
+        step, used, redundant = d.at_correction, 0, OPEN_REDUNDANT * d.length
+        if d.last_pivot < BLIND:
+            return 0
+        for _ in range(PROJECTIONS):
+            if open_by(d) <= tolerance:
+                return used if widest(d, d.residual, False) <= max(redundant, tolerance) else -1
+            if d.abridged:
+                evaluate(h, f, w, n, t, y, dy)  # for its factors
+            stiffen(d)
+            if d.evaluation != m.OK:
+                return -1
+            correction(d, d.at_residual_rate, step)
+            to_modes(d, step)
+            for k in range(d.nv):
+                w[y + d.nq + k] += w[step + k]
+            correction(d, d.at_residual, step)
+            to_modes(d, step)
+            move(d, y, step)
+            evaluate(h, f, w, n, t, y, dy)
+            used += 1
+            if d.evaluation != m.OK:
+                return -1
+        if not widest(d, d.residual, True) <= ROUNDING_FACTOR * tolerance:
+            return -1
+        return used if widest(d, d.residual, False) <= max(redundant, ROUNDING_FACTOR * tolerance) else -1
+
+    return project

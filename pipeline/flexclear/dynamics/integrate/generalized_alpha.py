@@ -1,0 +1,368 @@
+r"""Generalized-alpha: implicit structural integrator of second order that damps what it does not resolve.
+
+.. math:: (1-\alpha_m)a_{n+1} + \alpha_m a_n = (1-\alpha_f)\dot u_{n+1} + \alpha_f\dot u_n,\quad
+          q_{n+1} = q_n \circ (h u_n + h^2[(\tfrac12-\beta)a_n + \beta a_{n+1}]),\quad
+          u_{n+1} = u_n + h[(1-\gamma)a_n + \gamma a_{n+1}]
+
+with u' from the equations of motion, closures included: after index reduction no multiplier is an unknown; projection
+removes the drift, as for every integrator. Rotations are composed (`retract`), not added. a belongs to the time
+t_n + (alpha_m - alpha_f) h, so it is initialised there and rescaled when the step changes. First-order variables z,
+which follow the speeds in the state (energy ledger, internal states of friction), obey the trapezoidal rule, coupled.
+
+The unknowns are the *rates* at the end of the step: a, then z'. Newton's matrix has rows (1 - alpha_m) -
+(1 - alpha_f) D for a and 1 - D / 2 for z', with D = gamma h d/du + beta h^2 d/dq for columns of u, and h d/dz for those
+of z. A simplified iteration uses the last Jacobian, then a new one; with fixed steps a damped iteration
+follows with a new Jacobian at every iterate, for friction that saturates within the step.
+
+The error estimate compares the step with the integral of the parabola through the last three slopes; its rates are
+passed through Newton's matrix, as otherwise damped modes would dictate the step.
+
+Source: Chung & Hulbert (1993), *J. Appl. Mech.* 60, 371-375 (coefficients, eqs. 17, 20, 25); Arnold & Bruels (2007),
+*Multibody Syst. Dyn.* 18, 185-202 (constrained systems); Bruels, Cardona & Arnold (2012), *Mech. Mach. Theory* 48,
+121-137 (rotations).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate import hermite
+from flexclear.dynamics.integrate.method import Method, matrix, slope, vector
+from flexclear.dynamics.integrate.newton import COLUMN_STEP, converged, limit, lu_factor, lu_solve
+from flexclear.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
+from flexclear.dynamics.kernels import kernel
+from flexclear.scene.integrators import INTEGRATORS
+
+# rows of SLOPES: start of the step, Newton's iterate, end of the step, error estimates, search for events
+ITERATE, LAST, ESTIMATE, ROWS = 1, 2, 3, 5
+#: simplified iterations at most, and the number from which on the next step computes a new Jacobian
+MOST_ITERATIONS, SLOW_FROM = 10, 4
+#: damped iterations at most, and halvings of one correction
+MOST_CORRECTIONS, MOST_HALVINGS = 30, 12
+
+# Memory between steps ------------------------------------------------------------------------------------------------
+# floats: step to which the stored accelerations belong, step of the factors, whether the Jacobian still holds, step
+# before
+A_STEP, FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(5)
+#: vectors of rates: accelerations at the start as stored, rates at the end, accelerations at the start for this step's
+#: length, displacement, residual, Newton's correction, row exchanges of the factors; then storage for positions, and
+#: the slope at the start of the previous step
+OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, CORRECTION, PIVOTS, POSITIONS, SLOPE_BEFORE, VECTORS = range(10)
+#: matrices: derivatives of the rates by speeds and z, by positions, and Newton's matrix
+BY_STATE, BY_POSITION, NEWTON, MATRICES = range(4)
+
+
+@kernel
+def n_rates(d):
+    """Return the number of unknowns."""
+    return d.ny - d.nq
+
+
+# Coefficients and linear system --------------------------------------------------------------------------------------
+def parameter(solver: Any) -> float:
+    """Return the spectral radius at infinite frequency."""
+    return float(solver.rho_inf)
+
+
+@kernel
+def coefficients(d):
+    """Return alpha_m, alpha_f, beta and gamma for the spectral radius at infinity."""
+    r = d.parameter
+    alpha_m, alpha_f = (2.0 * r - 1.0) / (r + 1.0), r / (r + 1.0)
+    gamma = 0.5 - alpha_m + alpha_f
+    return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
+
+
+@kernel
+def own_weight(d, i):
+    """Return the weight of unknown i in its own equation."""
+    return 1.0 - coefficients(d)[0] if i < d.nv else 1.0
+
+
+@kernel
+def gain(d, step, i):
+    """Return the derivative of speed or variable i at the end of the step by its rate there."""
+    return coefficients(d)[3] * step if i < d.nv else step
+
+
+@kernel
+def factorise(d, step):
+    """Factorise Newton's matrix for a step; return False when it is singular."""
+    _, alpha_f, beta, _ = coefficients(d)
+    size, nv = n_rates(d), d.nv
+    S, by_state, by_position = matrix(d, NEWTON), matrix(d, BY_STATE), matrix(d, BY_POSITION)
+    for i in range(size):
+        weight = 1.0 - alpha_f if i < nv else 0.5
+        for k in range(size):
+            change = gain(d, step, k) * d.w[by_state + size * i + k]
+            if k < nv:
+                change += beta * step * step * d.w[by_position + size * i + k]
+            d.w[S + size * i + k] = -weight * change
+        d.w[S + (size + 1) * i] += own_weight(d, i)
+    d.memory[FACTORED_STEP] = step
+    return lu_factor(d.w, S, vector(d, PIVOTS), size)
+
+
+@kernel
+def solve(d, b):
+    """Solve Newton's system in place for the right-hand side at index b."""
+    lu_solve(d.w, matrix(d, NEWTON), vector(d, PIVOTS), n_rates(d), b)
+
+
+@kernel
+def rates_norm(d, step, a):
+    """Return the norm of the state's change by the rates at index a, in units of the tolerance."""
+    total, count = 0.0, n_rates(d)
+    for i in range(count):
+        total += (gain(d, step, i) * d.w[a + i] / error_scale(d, d.nq + i)) ** 2
+    return np.sqrt(total / count)
+
+
+# From step to step ---------------------------------------------------------------------------------------------------
+@kernel
+def predict(d, step):
+    """Rescale the accelerations at the start to this step, and guess the rates at its end."""
+    nq = d.nq
+    share, on = step / d.memory[A_STEP], step / d.memory[LAST_STEP]
+    for k in range(d.nv):
+        now = d.slopes[nq + k]
+        a = now + share * (d.w[vector(d, OLD) + k] - now)
+        d.w[vector(d, RESCALED) + k] = a
+        d.w[vector(d, NEW) + k] = a + on * (now - d.w[vector(d, SLOPE_BEFORE) + nq + k])
+    for k in range(d.nv, n_rates(d)):
+        d.w[vector(d, NEW) + k] = d.slopes[nq + k]
+
+
+@kernel
+def keep(d, step):
+    """Make the end of an accepted step the start of the next."""
+    for k in range(d.nv):
+        d.w[vector(d, OLD) + k] = d.w[vector(d, NEW) + k]
+    for c in range(d.ny):
+        d.w[vector(d, SLOPE_BEFORE) + c] = d.slopes[c]
+    d.memory[A_STEP] = d.memory[LAST_STEP] = step
+
+
+@kernel
+def error(d, step):
+    """Return the norm of the local error, 1 at the tolerance."""
+    size, start, end, before = d.ny, slope(d, 0), slope(d, ITERATE), vector(d, SLOPE_BEFORE)
+    out, length = slope(d, ESTIMATE), d.memory[LAST_STEP]
+    for c in range(size):
+        f0, f1 = d.w[start + c], d.w[end + c]
+        bend = ((f1 - f0) / step - (f0 - d.w[before + c]) / length) / (step + length)
+        integral = 0.5 * step * (f0 + f1) - step**3 / 6.0 * bend
+        d.w[out + c] = d.y_new[c] - d.y[c] - integral
+    for k in range(n_rates(d)):
+        d.w[out + d.nq + k] *= own_weight(d, k)
+    solve(d, out + d.nq)
+    return scaled_norm(d, out)
+
+
+def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+    """Build the method's kernels."""
+    place_end, solve_step = make_newton(evaluate, retract)
+
+    @kernel
+    def begin(d):
+        """Initialise the accelerations at their own time, from an evaluation a little ahead along the tangent."""
+        alpha_m, alpha_f, _, _ = coefficients(d)
+        size, first, step = d.ny, slope(d, 0), d.step
+        ahead = slope(d, ITERATE)
+        for c in range(size):
+            d.y_stage[c] = d.y[c] + step * d.w[first + c]
+        evaluate(d, d.time + step, d.at_y_stage, ahead)
+        d.evaluations += 1
+        seen = d.evaluation == m.OK and finite(d, ahead)
+        for c in range(size):
+            change = d.w[ahead + c] - d.w[first + c] if seen else 0.0
+            d.w[vector(d, SLOPE_BEFORE) + c] = d.w[first + c] - change
+            if d.nq <= c < d.nq + d.nv:
+                d.w[vector(d, OLD) + c - d.nq] = d.w[first + c] + (alpha_m - alpha_f) * change
+        d.memory[A_STEP] = d.memory[LAST_STEP] = step
+        d.memory[JACOBIAN_HOLDS] = 0.0
+        d.evaluation = m.OK
+
+    @kernel
+    def attempt(d, step):
+        """Step from Y to Y_NEW; return False when no iteration converges."""
+        set_error_scales(d, d.at_y)
+        if not solve_step(d, step):
+            return False
+        place_end(d, step, d.at_y_new)
+        return True
+
+    return begin, attempt, error, hermite.make_extend(LAST), keep
+
+
+def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callable]:
+    """Build the kernels place_end(d, step, out) and solve_step(d, step)."""
+    jacobian = make_jacobian(evaluate, retract)
+
+    @kernel
+    def place_end(d, step, out):
+        """Store the state at the end of the step for the rates in NEW."""
+        _, _, beta, gamma = coefficients(d)
+        nq, nv, old, new, shift = d.nq, d.nv, vector(d, RESCALED), vector(d, NEW), vector(d, DISPLACEMENT)
+        for k in range(nv):
+            a, b, u = d.w[old + k], d.w[new + k], d.y[nq + k]
+            d.w[shift + k] = step * (u + step * ((0.5 - beta) * a + beta * b))
+            d.w[out + nq + k] = u + step * ((1.0 - gamma) * a + gamma * b)
+        for k in range(nv, n_rates(d)):
+            d.w[out + nq + k] = d.y[nq + k] + step * d.w[new + k]
+        retract(d, d.at_y, shift, out, vector(d, POSITIONS))
+
+    @kernel
+    def residual(d, step):
+        """Store the residual of the method's equations at the rates NEW; False when the right-hand side fails."""
+        alpha_m, alpha_f, _, _ = coefficients(d)
+        nq, old, start, end = d.nq, vector(d, RESCALED), slope(d, 0), slope(d, ITERATE)
+        place_end(d, step, d.at_y_new)
+        evaluate(d, d.time + step, d.at_y_new, end)
+        d.evaluations += 1
+        for i in range(n_rates(d)):
+            first, last = d.w[start + nq + i], d.w[end + nq + i]
+            if i < d.nv:
+                due = (1.0 - alpha_f) * last + alpha_f * first - alpha_m * d.w[old + i]
+            else:
+                due = 0.5 * (first + last)
+            d.w[vector(d, RESIDUAL) + i] = due - own_weight(d, i) * d.w[vector(d, NEW) + i]
+        return d.evaluation == m.OK
+
+    @kernel
+    def iterate(d, step):
+        """Iterate with the present Newton matrix; return the number of iterations, 0 when they do not converge."""
+        left, last_norm = vector(d, RESIDUAL), 0.0
+        for k in range(MOST_ITERATIONS):
+            if not residual(d, step):
+                return 0
+            solve(d, left)
+            for i in range(n_rates(d)):
+                d.w[vector(d, NEW) + i] += d.w[left + i]
+            norm = rates_norm(d, step, left)
+            verdict = converged(k, norm, last_norm, d.rtol)
+            if verdict != 0:
+                return k + 1 if verdict > 0 else 0
+            last_norm = norm
+        return 0
+
+    @kernel
+    def line_search(d, step, norm):
+        """Apply the fraction of the correction that reduces the residual; return the residual's norm, or -1."""
+        correction, new = vector(d, CORRECTION), vector(d, NEW)
+        share, there = 1.0, 0.0
+        for _ in range(MOST_HALVINGS):
+            for i in range(n_rates(d)):
+                d.w[new + i] += (share - there) * d.w[correction + i]
+            if residual(d, step):
+                left = rates_norm(d, step, vector(d, RESIDUAL))
+                if left < (1.0 - 0.1 * share) * norm:
+                    return left
+            there = share
+            share *= 0.5
+        return -1.0
+
+    @kernel
+    def iterate_damped(d, step):
+        """Iterate damped with a new Newton matrix each time: for friction that saturates within a step."""
+        t, enough = d.time + step, limit(d.rtol)
+        correction = vector(d, CORRECTION)
+        if not residual(d, step):
+            return False
+        left = rates_norm(d, step, vector(d, RESIDUAL))
+        for _ in range(MOST_CORRECTIONS):
+            if not jacobian(d, t, d.at_y_new, slope(d, ITERATE)) or not factorise(d, step):
+                return False
+            for i in range(n_rates(d)):
+                d.w[correction + i] = d.w[vector(d, RESIDUAL) + i]
+            solve(d, correction)
+            norm = rates_norm(d, step, correction)
+            left = line_search(d, step, left)
+            if norm <= enough or left == 0.0:
+                return True
+            if left < 0.0:
+                return False
+        return False
+
+    @kernel
+    def solve_step(d, step):
+        """Solve for the rates NEW at the end of the step; return False when no iteration converges.
+
+        With adaptive steps a shorter step is the better remedy, with fixed steps further iterations are.
+        """
+        for _ in range(2):
+            fresh = d.memory[JACOBIAN_HOLDS] == 0.0
+            if fresh and not jacobian(d, d.time, d.at_y, slope(d, 0)):
+                return False
+            if d.memory[FACTORED_STEP] != step and not factorise(d, step):
+                return False
+            predict(d, step)
+            count = iterate(d, step)
+            if count > 0:
+                d.memory[JACOBIAN_HOLDS] = 1.0 if count <= SLOW_FROM else 0.0
+                return True
+            d.memory[JACOBIAN_HOLDS] = 0.0
+            if fresh:
+                break
+        if d.fixed > 0.0:
+            predict(d, step)
+            return iterate_damped(d, step)
+        return False
+
+    return place_end, solve_step
+
+
+def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
+    """Build the kernel jacobian(d, t, y, slope_there)."""
+
+    @kernel
+    def column(d, t, slope_there, k, change, target):
+        """Store column k of a Jacobian of the rates, from the changed state in Y_STAGE."""
+        size, nq, near = n_rates(d), d.nq, slope(d, ESTIMATE)
+        evaluate(d, t, d.at_y_stage, near)
+        d.evaluations += 1
+        for i in range(size):
+            d.w[target + size * i + k] = (d.w[near + nq + i] - d.w[slope_there + nq + i]) / change
+        return d.evaluation == m.OK
+
+    @kernel
+    def jacobian(d, t, y, slope_there):
+        """Store the derivatives of the rates by speeds and z, and by displacements, at state y; False on failure."""
+        nv, nq, shift = d.nv, d.nq, vector(d, DISPLACEMENT)
+        for c in range(d.ny):
+            d.y_stage[c] = d.w[y + c]
+        for k in range(n_rates(d)):
+            floor, value = d.floors[d.groups[nq + k].group].natural, d.w[y + nq + k]
+            changed = value + COLUMN_STEP * (floor + abs(value))
+            d.y_stage[nq + k] = changed
+            if not column(d, t, slope_there, k, changed - value, matrix(d, BY_STATE)):
+                return False
+            d.y_stage[nq + k] = value
+        for k in range(nv):
+            change = COLUMN_STEP * d.floors[d.groups[nq + k].group].natural
+            for j in range(nv):
+                d.w[shift + j] = change if j == k else 0.0
+            retract(d, y, shift, d.at_y_stage, vector(d, POSITIONS))
+            if not column(d, t, slope_there, k, change, matrix(d, BY_POSITION)):
+                return False
+        d.jacobians += 1
+        d.memory[JACOBIAN_HOLDS], d.memory[FACTORED_STEP] = 1.0, 0.0
+        return True
+
+    return jacobian
+
+
+METHOD = Method(
+    traits=INTEGRATORS["generalized-alpha"],
+    room=m.Room(ROWS, hermite.ROWS, FLOATS, VECTORS, MATRICES),
+    last=LAST,
+    make_kernels=make_kernels,
+    interpolate=hermite.interpolate,
+    error_order=2,
+    steady=1.2,
+    parameter=parameter,
+)

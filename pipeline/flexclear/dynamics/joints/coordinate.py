@@ -1,0 +1,81 @@
+"""Joint coordinates: the single free motions of a joint, as drives, loads and records name them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexclear.dynamics.kernels import kernel
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One freedom of a joint between the frames F and G.
+
+    axis: 0, 1, 2 for x, y, z of F (side 0) or of G (side 1), along or about which the coordinate moves.
+    sine, cosine: entries of R_FG that are the sine and cosine of an angle.
+    """
+
+    name: str
+    turning: bool
+    axis: int = 2
+    side: int = 0
+    sine: tuple[int, int] = (1, 0)
+    cosine: tuple[int, int] = (0, 0)
+
+    @property
+    def dimension(self) -> str:
+        """Dimension of the coordinate's values in scenes."""
+        return "angle" if self.turning else "length"
+
+    @property
+    def unit(self) -> str:
+        """Unit of the coordinate's values in results."""
+        return "rad" if self.turning else "m"
+
+    @property
+    def force(self) -> str:
+        """Dimension of a force along the coordinate."""
+        return "torque" if self.turning else "force"
+
+    @property
+    def part(self) -> str:
+        """Joint type with this freedom alone, about or along its z axis."""
+        return "revolute" if self.turning else "prismatic"
+
+    def along(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Return the coordinate's axis, shape (..., 3), at frames F and G: named fields of SITE_FRAMES, shape (...)."""
+        axis: np.ndarray = (b if self.side else a)["axes"][..., :, self.axis]
+        return axis
+
+    def wrench(self, a: np.ndarray, b: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return moment about the kernels' origin and force on G for a force `size` along the coordinate, (..., 3)."""
+        push = size[..., None] * self.along(a, b)
+        return (push, np.zeros_like(push)) if self.turning else (np.cross(b["origin"], push), push)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Axes of a frame whose z is this coordinate's axis, as columns in F, shape (3, 3)."""
+        return np.roll(np.eye(3), self.axis + 1, axis=0)
+
+
+ROTATION = Coordinate("rotation", True)
+TRANSLATION = Coordinate("translation", False)
+
+
+def angle_about_z(R: np.ndarray) -> float:
+    """Return the angle [rad] in (-pi, pi] of the rotation about z that equals R or is nearest to R."""
+    return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
+
+
+def rates_are_speeds(count: int) -> Callable:
+    """Build `position_rate` for a joint of `count` speeds, each of which is the rate of a position."""
+
+    @kernel
+    def position_rate(w, x, u, rate):
+        for k in range(count):
+            w[rate + k] = w[u + k]
+
+    return position_rate

@@ -1,0 +1,174 @@
+r"""Free motions under the closure constraints, and forces along them.
+
+With :math:`Z` such that :math:`JZ = 0` and :math:`Z^TMZ = 1`, small motions are :math:`Z z`, and the loops' multipliers
+do no work on them. The stiffness is the derivative of :math:`Z^T(\mathrm{bias} - J^T\lambda)` at fixed
+:math:`\lambda`: forces in the loops stiffen or weaken a mechanism as the tension of a string does.
+
+Changes of forces are exact: the kernels of the right-hand side run on dual numbers. Forces of one
+mechanism change over lengths from a millimetre (gravity, springs) to a nanometre (a contact that is just closed). No
+step width would fit all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile import sources
+from flexclear.dynamics.effects import Parts
+from flexclear.dynamics.linear.bench import (
+    Bench,
+    acting,
+    balance,
+    balancing,
+    displacement_map,
+    set_drives,
+    state,
+)
+from flexclear.dynamics.model import selection
+from flexclear.dynamics.model.interface_basis import modes_of
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.evaluation.tree_factor import bias
+from flexclear.dynamics.specialise import dual
+from flexclear.system.errors import SolverError
+
+#: relative singular values of the closure rows below which rows are redundant
+REDUNDANT_ROW = 1e-9
+#: rounding of a sum of some dozens of terms
+EPSILON = 1e-15
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """A pose of a mechanism and the free motions about it.
+
+    q: positions.  Z: speeds per free motion, shape (nv, mobility).  moves: positions per coordinate, (nq, nv).
+    bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.
+    forces: size of the balancing forces (`bench.balancing`).
+    """
+
+    q: np.ndarray
+    Z: np.ndarray
+    moves: np.ndarray
+    bias: np.ndarray
+    mass: np.ndarray
+    multipliers: np.ndarray
+    redundant: int
+    forces: float
+
+    @property
+    def unbalanced(self) -> np.ndarray:
+        """Negative unbalanced forces along the free motions, shape (mobility,)."""
+        return self.Z.T @ self.bias
+
+
+def tangent(bench: Bench, q: np.ndarray) -> Tangent:
+    """Return the free motions at closed positions q; raise SolverError at deformations beyond any real pose."""
+    b, forces = balance(bench, q), balancing(bench)
+    try:
+        Z, lower, spread = free_motions(b.mass, b.jacobian)
+    except np.linalg.LinAlgError:
+        raise SolverError(
+            f"at t = {bench.time:.6g} s: the bodies deform so much that the mass matrix is not positive definite"
+        ) from None
+    load = scipy.linalg.solve_triangular(lower, b.bias, lower=True)
+    multipliers = np.linalg.lstsq(spread.T, load, rcond=REDUNDANT_ROW)[0] if len(spread) else np.zeros(0)
+    moves = displacement_map(bench, q)
+    redundant = len(b.jacobian) - (len(b.bias) - Z.shape[1]) + bench.engine.mobility.redundant
+    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, redundant, forces)
+
+
+def free_motions(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return Z, shape (nv, mobility); the Cholesky factor L of the mass, and J L^-T.
+
+    Raises LinAlgError for a mass that is not positive definite.
+    """
+    lower = np.linalg.cholesky(mass)
+    spread = scipy.linalg.solve_triangular(lower, jacobian.T, lower=True).T
+    scale = np.linalg.norm(spread, axis=1)
+    rows = spread[scale > 0.0] / scale[scale > 0.0, None]
+    free = np.eye(len(mass))
+    if len(rows):
+        _, values, axes = np.linalg.svd(rows)
+        free = axes[int(np.sum(values > REDUNDANT_ROW * values[0])) :].T
+    return scipy.linalg.solve_triangular(lower.T, free), lower, spread
+
+
+def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces per displacement along motions (columns), shape (n, n) [1/s^2], and rounding errors of columns."""
+    directions = np.zeros((motions.shape[1], bench.model.ny))
+    directions[:, : len(at.q)] = (at.moves @ motions).T
+    changes = force_changes(bench, at.q, directions, at.multipliers)
+    return motions.T @ changes.T, _rounding(bench, motions, changes, at.forces)
+
+
+def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces per speed along motions, with gyroscopic ones, shape (n, n) [1/s], and rounding errors likewise."""
+    directions = np.zeros((motions.shape[1], bench.model.ny))
+    directions[:, bench.model.speeds] = motions.T
+    changes = force_changes(bench, at.q, directions, np.zeros_like(at.multipliers))
+    return motions.T @ changes.T, _rounding(bench, motions, changes, _by_turning(bench, at))
+
+
+def _by_turning(bench: Bench, at: Tangent) -> float:
+    """Return the contribution of the drives' motion to the balancing forces, per speed of the fastest; 0 at rest."""
+    if not bench.fastest:
+        return 0.0
+    moving, drives = acting(bench), bench.drives
+    try:
+        set_drives(bench, drives * [1.0, 0.0])
+        balance(bench, at.q)
+        resting = acting(bench)
+    finally:
+        set_drives(bench, drives)
+    balance(bench, at.q)  # later code reads the moving state
+    return float(np.max(np.abs(moving - resting), initial=0.0)) / bench.fastest
+
+
+def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: float) -> np.ndarray:
+    """Return the rounding error of changes of forces along motions, by the size of all summands, shape (n,).
+
+    forces: balancing forces, as moments, per displacement or speed: their sum may itself be rounding.
+    """
+    reach = np.max(np.abs(motions) / bench.model.speed_scales[:, None], axis=0, initial=0.0)
+    terms = np.linalg.norm(np.abs(motions).T @ np.abs(changes).T, axis=0)
+    return EPSILON * np.asarray(terms + forces * reach * np.linalg.norm(reach))
+
+
+def magnitude(motions: np.ndarray, bias: np.ndarray) -> float:
+    """Return the size of the summands of the forces along motions."""
+    return float(np.linalg.norm(np.abs(motions).T @ np.abs(bias)))
+
+
+def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    """Return changes of bias - J^T multipliers at rest in positions q, along directions; shape (directions, nv).
+
+    directions: changes of the state, (directions, NY).  multipliers: constant, (rows,).  Raises SolverError where the
+    equations are singular.
+    """
+    engine, model, count = bench.engine, bench.model, len(directions)
+    y = state(bench, q)
+    # stores the laws of time, and all work arrays, in the work space
+    closure_rows.evaluate(engine, y, bench.time)
+    h, w = engine.h.tolist(), list(engine.w)
+    w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
+    with np.errstate(all="ignore"):  # as in compiled code, unused values may be infinite
+        _rates(model.parts)(h, list(model.arrays.f), w, engine.n.tolist(), h[m.Y], h[m.SLOPES])
+
+    o = h[m.JACOBIAN]
+    rows = selection.dense(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
+    forces = dual.changes(bias(engine, np.array(w, dtype=object)), count)
+    return (forces - multipliers @ rows) @ modes_of(model.arrays).T
+
+
+@cache
+def _rates(parts: Parts) -> Callable:
+    scope: dict[str, Any] = {}
+    exec(sources.rates(parts), scope)
+    return dual.plain(scope["rates"])

@@ -1,0 +1,52 @@
+"""Friction along a joint coordinate: viscous, and Coulomb friction of given strength, regularised as in contacts.
+
+The strength does not depend on the joint's reaction.  Source: Wang & Wang (2019), eqs. (27)-(29), for the
+regularised coefficient.
+"""
+
+from __future__ import annotations
+
+from flexclear.dynamics.contact.friction.modified_coulomb import coefficient
+from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.loads.fields import act, measure, number
+from flexclear.dynamics.loads.row import Row
+from flexclear.dynamics.vectors import scale
+from flexclear.scene.loads import JointFriction
+from flexclear.scene.units import quantity
+
+
+@kernel
+def apply(d, k):
+    """Apply the force of load k."""
+    value, rate, moment, force = measure(d, k)
+    bend, speed = d.load_bends[d.loads[k].bend0], abs(rate)
+    bend.now = rate
+    p = (number(d, k, 1), number(d, k, 2), number(d, k, 3), number(d, k, 4))
+    dry = coefficient(speed, p)
+    size = -number(d, k, 0) * rate - (dry if rate >= 0.0 else -dry)
+    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, 0.0, -size * rate)
+
+
+def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:
+    """Return the load's row: viscous coefficient [N s/m or N m s/rad], dry friction [N or N m] and its speeds."""
+    viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
+    if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
+        raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
+    dry, kinks = (0.0, 0.0, 1.0, 2.0), (0.0, 0.0)
+    if load.coulomb is not None:
+        speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
+        forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
+        kinks = (quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
+        dry = (*forces, *kinks)
+        if not 0.0 <= dry[1] <= dry[0]:
+            raise ValueError(
+                "coulomb: dynamic must not be negative, nor exceed static; "
+                f"dynamic = {dry[1]:.6g}, static = {dry[0]:.6g}"
+            )
+        if not 0.0 < dry[2] < dry[3]:
+            raise ValueError(
+                "coulomb: v_static must be positive and below v_dynamic; "
+                f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
+            )
+    return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks if load.coulomb else (),))

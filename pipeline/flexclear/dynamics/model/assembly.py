@@ -1,0 +1,192 @@
+"""Assembly: from the poses that a scene gives to poses that all joints allow, or a refusal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flexclear.dynamics.drives.pieces import Pieces
+from flexclear.dynamics.effects import way
+from flexclear.dynamics.model import given_start
+from flexclear.dynamics.model.chain import path_positions
+from flexclear.dynamics.model.closing import CLOSED_EXACTLY, close, ill_fitting, misfit, opposite
+from flexclear.dynamics.model.constraints import Constraint, constraints
+from flexclear.dynamics.model.driving import joint_type
+from flexclear.dynamics.model.flexible_bodies import start_place
+from flexclear.dynamics.model.laws import NO_LAWS
+from flexclear.dynamics.model.mechanism import Link, Mechanism, build
+from flexclear.dynamics.model.merge import Placement
+from flexclear.dynamics.model.placing import ambiguity, assemblies, guess, targets
+from flexclear.dynamics.model.start_table import Given, given_coordinates
+from flexclear.numerics.rotations import rotation_vector_to_matrix
+from flexclear.system.errors import InputError
+
+#: residuals of joints below this fraction of the mechanism's size come from rounded input
+MEANT_TO_FIT = 1e-4
+
+
+def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS) -> Mechanism:
+    """Return the mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
+
+    Mechanisms with flexible bodies or paths are only checked: the engine closes them, with deformation and prescribed
+    poses.
+    given: laws that replace the scene's.
+    Raises InputError for joints whose frames start at a large distance or with opposite axes, for given poses that
+    contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.
+    """
+    starts = given_coordinates(mechanism.scene)
+    given_start.refuse_driven(mechanism, starts, given)
+    joints, poses = constraints(mechanism, given, starts), [link.start for link in mechanism.links]
+    placed = given_start.given_links(mechanism)
+    between = [joint for joint in joints if {joint.link_a, joint.link_b} <= placed]
+    free = len(placed) + sum(link.massless for link in mechanism.links[1:]) < len(mechanism.links)
+    wrong = ill_fitting(mechanism, joints, poses) or opposite(joints, poses)
+    search = free and not mechanism.has_paths and (wrong is not None or bool(starts))
+    judged = between if search else joints
+    wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
+    if wrong is not None:
+        raise wrong
+    contradicted = given_start.contradictions(mechanism, joints, poses, given)
+    given_start.refuse_far(mechanism, contradicted)
+    residual = max([*residuals(judged, poses).values(), *(one.size for one in contradicted)], default=0.0)
+    mechanism = replace(mechanism, start_residual=residual, placed=tuple(poses))
+    if search:
+        return _searched(mechanism, joints, placed, starts)
+    asked = bool(starts or mechanism.deformation)
+    if mechanism.has_paths or not (mechanism.all_rigid or asked):
+        return with_starts(mechanism, poses)
+    closed = close(mechanism, joints, poses)
+    fitting = way(mechanism.scene, "frames to a tolerance") if closed is None else None
+    if fitting is not None and (scene := fitting.fitted(mechanism, joints, poses)) is not None:
+        fits = assembled(build(scene, {}), given)
+        return replace(fits, choice=" ".join([fitting.changed(mechanism.scene, scene), fits.choice]).strip())
+    if closed is None and mechanism.all_rigid:
+        _refuse_drives(mechanism, joints, poses)
+        raise _impossible(mechanism, joints, poses)
+    return with_starts(mechanism, closed or poses)
+
+
+def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> Mechanism:
+    """Return the mechanism with links without poses put where the joints allow; raise InputError where none fits."""
+    candidates = assemblies(mechanism, joints, placed, starts)
+    if not candidates:
+        _refuse_starts(mechanism, joints, placed, starts)
+        driven = any(joint.values for joint in joints)
+        if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
+            raise _out_of_reach(mechanism, joints)
+        raise _impossible(mechanism, joints, guess(mechanism, joints, placed, targets(joints, starts)[1]))
+    return replace(with_starts(mechanism, candidates[0].poses), choice=ambiguity(mechanism, joints, candidates, starts))
+
+
+def with_starts(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
+    """Return the mechanism with these start poses; massless links of joints follow from the joints' coordinates."""
+    links, settled_poses = [], list(poses)
+    for i, link in enumerate(mechanism.links):
+        if link.massless and i:
+            settled_poses[i] = _between(mechanism, link, poses, settled_poses)
+        links.append(replace(link, start=settled_poses[i]))
+    return replace(mechanism, links=links)
+
+
+def _between(
+    mechanism: Mechanism, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]
+) -> Placement:
+    """Return the pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
+    assert link.inboard is not None
+    F = settled_poses[link.inboard.link].of(start_place(mechanism, link.inboard))
+    if not link.joint.positions:
+        return F
+    value = float(chain_positions(mechanism, link, poses)[0])
+    if link.kind == "revolute":
+        return F.of(Placement(R=rotation_vector_to_matrix(np.array([0.0, 0.0, value]))))
+    return F.of(Placement(np.array([0.0, 0.0, value])))
+
+
+def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]) -> np.ndarray:
+    """Return the positions of a chain or path that belong to one link, in the tree's sense.
+
+    poses: of the links that have mass.
+    """
+    edge, joint = link.branch.edge, link.joint
+    assert edge is not None
+
+    def at(frame: str) -> Placement:
+        site = mechanism.site(frame)
+        return poses[site.link].of(start_place(mechanism, site))
+
+    G = at(edge.frame_b)
+    if link.on_path:
+        whole = path_positions(edge, G.R, G.p + mechanism.origin)
+    else:
+        relative = at(edge.frame_a).inverse().of(G)
+        whole = joint_type(edge.kind).coordinates(relative.R, relative.p)
+    return np.asarray(joint.sign * whole[list(joint.positions)])
+
+
+def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str, float]:
+    """Return the largest residual per joint [m, or the sine of an angle], without drives."""
+    worst = {}
+    for joint in joints:
+        worst[joint.name] = float(np.max(np.abs(joint.demands(poses).residuals), initial=0.0))
+    return worst
+
+
+def _refuse_starts(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> None:
+    """Raise InputError when only the positions that the scene gives prevent the assembly."""
+    requested = [start for start in starts if start.position is not None]
+    driven = {(start.joint, start.number) for start in requested}
+    loose = [
+        replace(joint, values={k: v for k, v in joint.values.items() if (joint.name, k) not in driven})
+        for joint in joints
+    ]
+    others = assemblies(mechanism, loose, placed, starts) if requested else []
+    if others:
+        there = others[0].coordinates
+        reached = ", ".join(f"{s.name} {there[s.joint, s.number]:.6g} {s.coordinate.unit}" for s in requested)
+        raise InputError(
+            f"{requested[0].place[:-1]}.position]",
+            f"the joints cannot be assembled at the given positions, but for example at {reached}",
+            "correct the position, or give an approximate value as near",
+        )
+
+
+def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> None:
+    """Raise InputError when only the start values of drives prevent the assembly."""
+    driven = [joint for joint in joints if joint.values]
+    if not driven or close(mechanism, [replace(joint, values={}) for joint in joints], poses) is None:
+        return
+    raise _out_of_reach(mechanism, driven)
+
+
+def _out_of_reach(mechanism: Mechanism, joints: Sequence[Constraint]) -> InputError:
+    """Return the error of joints that fit together, but not at the start values of their drives."""
+    driven = {joint.name for joint in joints if joint.values}
+    scene = mechanism.scene
+    names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in driven]
+    return InputError(
+        f"[drive.{names[0]}.law]",
+        f"the joints can be assembled, but not at the positions of the drives ({', '.join(names)}) at "
+        f"t = {scene.time.start:.6g} s: the mechanism is over-driven, or a drive starts out of reach",
+        "correct the start of a drive, or remove one",
+    )
+
+
+def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> InputError:
+    left = residuals(joints, poses)
+    worst = max(left, key=lambda name: left[name])
+    listed = ", ".join(
+        f"{name} {value:.3g}" for name, value in left.items() if value > CLOSED_EXACTLY * mechanism.length
+    )
+    posed = len(given_start.given_links(mechanism)) > 1
+    where = "close to the given poses; residuals" if posed else "by its joints; residuals of the first attempt"
+    slight = misfit(mechanism, joints, poses).worst < MEANT_TO_FIT
+    return InputError(
+        f"[joint.{worst}.between]",
+        f"the mechanism cannot be assembled {where} (m, or sines of angles): {listed}"
+        + ("; several joints impose nearly equal conditions" if slight else ""),
+        "write lengths, frames and poses with more digits, or use a joint with more freedom"
+        if slight
+        else "correct lengths, frames, poses, or the start of a drive",
+    )

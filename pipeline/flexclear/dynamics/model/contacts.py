@@ -1,0 +1,127 @@
+"""Tables of the contacts: topology, numbers of their laws, and their variables in the state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.effects import FRICTION_LAWS, NORMAL_LAWS, SURFACES, Parts
+from flexclear.dynamics.effects.stops.model import End, ends_an_angle
+from flexclear.dynamics.model.components import Floors, Group
+from flexclear.dynamics.model.gauges import Gauges
+from flexclear.dynamics.model.mechanism import Contact, Mechanism
+from flexclear.dynamics.model.numbering import Numbering
+from flexclear.scene.clearance import Clearance
+from flexclear.scene.registry import lookup
+from flexclear.system.errors import InputError
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.contact.law import Resolved
+
+#: default impact floor, far below approach speeds in common machines [m/s or rad/s]; and its ratio to the size of a
+#: mechanism of 10 cm [1/s]: in a mechanism of micrometres 1 um/s would be fast
+LEAST_RATE, SLOW_IMPACT = 1e-6, 1e-5
+#: (outer site, inner site) of each contact
+SitePairs = Sequence[tuple[int, int]]
+
+
+def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
+    """Return the normal law of each contact with its numbers; raise InputError for a law with impossible values."""
+    return tuple(_resolve(mechanism, contact) for contact in mechanism.contacts)
+
+
+def fill(
+    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], site_pairs: SitePairs, gauges: Gauges, slot: int
+) -> dict[Any, Any]:
+    """Return the tables CONTACTS and CONTACT_NUMBERS.
+
+    site_pairs: (outer, inner) sites of each contact.  gauges: receives those of the stops.  slot: ledger index of the
+    first bristles.
+    """
+    mechanism, rows, reals, first = numbering.mechanism, [], [], numbering.nq + numbering.nv + slot
+    for contact, law, sites in zip(mechanism.contacts, laws, site_pairs, strict=True):
+        name, joint, *_ = contact
+        length = mechanism.components.lengths[part_of(mechanism, contact)]
+        friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
+        if joint.friction is not None:
+            friction = friction_law(name, joint)
+            friction_kind = parts.frictions.index(joint.friction.law)
+            numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
+        if isinstance(joint, End):
+            surfaces, shape = gauges.add(*sites, joint.coordinate, counts=True), (joint.limit, joint.sense)
+        else:
+            surfaces, shape = parts.surfaces.index(joint.type), joint.shape
+        kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
+        bends = bristle(name, joint) is not None
+        rows.append((*sites, *kinds_of, first if bends else -1))
+        first += 3 * bends
+        sizes = (joint.clearance, joint.radius, _floor(joint, length))
+        reals.append([*sizes, stick, *law.numbers, *numbers, *shape, length])
+    return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
+
+
+def part_of(mechanism: Mechanism, contact: Contact) -> int:
+    """Return the number of the independent mechanism that a contact belongs to."""
+    return mechanism.components.of(contact.outer.link, contact.inner.link)
+
+
+def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> dict[str, list[Group]]:
+    """Return error groups of the contacts' variables in the ledger and of their bristles (`model.filling.blocks`)."""
+    parts, ledger = [part_of(mechanism, contact) for contact in mechanism.contacts], list[Group]()
+    for part in parts:
+        floors = {"damping": energies, "friction": energies, "impulse": np.divide(energies, lengths)}  # [J], [N s]
+        ledger += [(floors[name][part], 1, part) for name in m.row_type(m.CONTACT_LEDGER).names or ()]
+    sizes = [bristle(name, joint) for name, joint, *_ in mechanism.contacts]
+    bristles = [(size, 3, part) for size, part in zip(sizes, parts, strict=True) if size is not None]
+    return {"contacts": ledger, "bristles": bristles}
+
+
+def _floor(joint: Clearance | End, length: float) -> float:
+    """Return the least impact rate of a contact [m/s or rad/s]; length: size of its mechanism [m]."""
+    if joint.floor is not None:
+        return joint.floor
+    return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW_IMPACT * length)
+
+
+def friction_law(name: str, joint: Any) -> Any:
+    """Return the friction law of a joint with friction."""
+    return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
+
+
+def bristle(name: str, joint: Any) -> float | None:
+    """Return the size of the bristles of a joint's friction [m]; None for a law without bristles."""
+    if joint.friction is None:
+        return None
+    size: float | None = friction_law(name, joint).bristle(joint.friction)
+    return size
+
+
+def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
+    joint, path = contact.joint, f"[{contact.place}.normal]"
+    normal = lookup(NORMAL_LAWS, joint.normal.law, where=path)
+    surfaces = None if isinstance(joint, End) else lookup(SURFACES, joint.type, where=path)
+    stiffness, mass = joint.normal.stiffness, None
+    try:
+        if surfaces is not None:
+            exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
+            stiffness = surfaces.stiffness(joint, exponent)
+            mass = _reduced_mass([mechanism.links[site.link].mass for site in (contact.outer, contact.inner)])
+        law: Resolved = normal.resolve(joint.normal, stiffness, mass)
+    except ValueError as error:
+        raise InputError(path, str(error)) from None
+    return law
+
+
+def _reduced_mass(masses: Sequence[float]) -> float | None:
+    """Return the reduced mass of the links on both sides [kg]; 0 means the ground, infinite. None when both are."""
+    inverse = sum(1.0 / mass for mass in masses if mass > 0.0)
+    return 1.0 / inverse if inverse > 0.0 else None
+
+
+def arms(mechanism: Mechanism) -> np.ndarray:
+    """Return the factor that makes each contact's gap a length: 1, or the size [m] for ends of angles."""
+    turning = [getattr(contact.joint, "coordinate", None) for contact in mechanism.contacts]
+    return np.array([mechanism.length if one is not None and one.turning else 1.0 for one in turning])

@@ -1,0 +1,217 @@
+r"""Jacobian of the closures from joint axes and frames alone, scaled by the natural size of each entry.
+
+Which rows of the Jacobian are independent is a question of size: an entry is zero when it is only rounding. Rounding is
+proportional to the terms whose sum an entry is, not to the sum. A hinge axis that meets a point of the closure, for
+instance, contributes the rotation times the distance along the axis, which cancels. So every entry has a natural size:
+that of a rotation is the distance between the two joints, that of a slide its displacement. Rows and columns are scaled
+until the largest natural size in each is one:
+
+.. math:: J' = D_r J D_c, \qquad \max_j (D_r N D_c)_{ij} = \max_i (D_r N D_c)_{ij} = 1
+
+Then the singular values of J' are pure numbers, independent of units, masses, axes and size, and have an absolute
+floor. Small parts of large mechanisms keep their own scale.
+
+Source: scaling: Ruiz (2001), A scaling algorithm to equilibrate both rows and columns norms in matrices, Rutherford
+Appleton Laboratory, RAL-TR-2001-034.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.effects.gears.model import Coupling
+from flexclear.dynamics.model.constraints import demands, freedoms, outboard_place
+from flexclear.dynamics.model.index_tables import closure_route, uncommon
+from flexclear.dynamics.model.interface_basis import frame_index
+from flexclear.dynamics.model.mechanism import Closure, Site
+from flexclear.dynamics.model.merge import Placement
+from flexclear.dynamics.model.model import Model
+
+#: least arm of a rotation, in units of the mechanism's size: positions are not more exact at smaller distances
+LEAST_ARM = 1e-3
+#: singular values of naturally sized rows below this are zero.  The bound is above the rounding of a zero: an entry is
+#: a sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
+#: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it is
+#: below the root of `closures.SINGULAR_PIVOT`, 3e-7, at which the kernels no longer solve for a row.
+ZERO_SINGULAR_VALUE = 1e-7
+#: iterations of scaling; each halves the exponents by which rows and columns differ
+SCALING_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Unit motion of each column of a numbering: rotation [rad], displacement [m] of point `at`; each (columns, 3)."""
+
+    turn: np.ndarray
+    shift: np.ndarray
+    at: np.ndarray
+
+    @property
+    def twists(self) -> np.ndarray:
+        """Rotation, and displacement of the point at the origin, shape (columns, 6)."""
+        return np.hstack([self.turn, self.shift + np.cross(self.at, self.turn)])
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Scaled Jacobian of the closures: of free coordinates, J (rows, nv), and of driven ones, `known` (rows, drives).
+
+    row, column: factors of scaling, of each row and of each column of both.
+    """
+
+    J: np.ndarray
+    known: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+
+    @cached_property
+    def decomposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """U, singular values and V^T of J, complete."""
+        return np.linalg.svd(self.J)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Singular values, descending."""
+        return self.decomposed[1]
+
+    @property
+    def rank(self) -> int:
+        """Number of independent rows."""
+        return int(np.sum(self.values > ZERO_SINGULAR_VALUE))
+
+    @property
+    def free(self) -> np.ndarray:
+        """Motions of the free coordinates at which all residual rates are zero, shape (nv, nv - rank)."""
+        nv = self.J.shape[1]
+        return self.column[:nv, None] * self.decomposed[2][self.rank :].T
+
+    @property
+    def self_stresses(self) -> np.ndarray:
+        """Left null space of J: multipliers in balance without loads (self-stresses), shape (rows - rank, rows)."""
+        return self.decomposed[0][:, self.rank :].T * self.row
+
+    @property
+    def dependent_drives(self) -> np.ndarray:
+        """True for each driven coordinate in a dependence among driven coordinates alone; shape (drives,)."""
+        left = self.decomposed[0][:, self.rank :].T @ self.known
+        return np.asarray(np.max(np.abs(left), axis=0, initial=0.0) > ZERO_SINGULAR_VALUE)
+
+
+def rates(model: Model, poses: Sequence[Placement]) -> Rates:
+    """Return the scaled Jacobian of a mechanism's closures at these poses of its links."""
+    numbering, L = model.numbering, model.length
+    motion, speeds = motions(model, poses), model.nv + len(model.drives)
+    J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
+    first = 0
+    for closure in model.closures:
+        for acts in row_axes(closure, poses, L):
+            mine, factor = slice(first, first + len(acts.factor)), acts.factor
+            route = uncommon(closure_route(numbering, numbering.site(acts.a), numbering.site(acts.b)))
+            for coordinate, column, sign in route:
+                turn, arm = motion.turn[column], acts.point - motion.at[column]
+                shift = motion.shift[column] + np.cross(turn, arm)
+                moved = np.where(acts.turning, acts.directions @ turn, acts.directions @ shift)
+                J[mine, coordinate] += sign * factor * moved
+                angle = float(np.linalg.norm(turn))
+                way = float(np.linalg.norm(motion.shift[column])) + angle * (np.linalg.norm(arm) + L * LEAST_ARM)
+                sizes[mine, coordinate] += np.abs(factor) * np.where(acts.turning, angle, way)
+        first += len(closure.rows)
+    by_row, by_column = scales(sizes)
+    J *= by_row[:, None] * by_column
+    return Rates(J[:, : model.nv], J[:, model.nv :], by_row, by_column)
+
+
+class RowAxes(NamedTuple):
+    """Rows of a closure between two sites a and b: each a rotation about a direction, or a displacement along one.
+
+    directions: unit vector of each row where the loop is closed, (rows, 3).  turning: True for rotations, (rows,).
+    factor: of a row's radian or metre, (rows,).  point: origin of b.
+    """
+
+    a: Site
+    b: Site
+    directions: np.ndarray
+    turning: np.ndarray
+    factor: np.ndarray
+    point: np.ndarray
+
+    def wrenches(self, length: float) -> np.ndarray:
+        """Return moment about the kernels' origin, in units of force times size, and force of each row; (rows, 6)."""
+        along = np.where(self.turning[:, None], 0.0, self.directions)
+        moment = np.where(self.turning[:, None], self.directions, np.cross(self.point, along))
+        return self.factor[:, None] * np.hstack([moment, length * along])
+
+
+def row_axes(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[RowAxes]:
+    """Return the rows of a closure, in radians or the mechanism's size, for each pair of sites that it acts on."""
+    frames = [(poses[a.link].of(a.placement), poses[b.link].of(b.placement)) for a, b in closure.ends]
+    if isinstance(closure, Coupling):
+        unit = 1.0 if closure.second.coordinate.turning else length
+        sides = zip(closure.ends, closure.parts, frames, strict=True)
+        return [
+            RowAxes(*ends, side.along(poses)[None], np.array([side.coordinate.turning]), np.array([factor / unit]), B.p)
+            for ends, (side, factor), (_, B) in sides
+        ]
+    demanded, (_, B) = demands(closure.edge.kind, *frames[0]), frames[0]
+    directions = np.where(demanded.turning[:, None], demanded.wrenches[:, :3], demanded.wrenches[:, 3:])
+    return [RowAxes(*closure.ends[0], directions, demanded.turning, np.where(demanded.turning, 1.0, 1.0 / length), B.p)]
+
+
+def motions(model: Model, poses: Sequence[Placement]) -> Motions:
+    """Return all columns' unit motions: 1 rad, the mechanism's size, for modes that size times the root of the mass."""
+    numbering, mechanism = model.numbering, model.mechanism
+    turn, shift, at = (np.zeros((numbering.columns, 3)) for _ in range(3))
+    for i, link in enumerate(mechanism.links):
+        if link.inboard is None:
+            continue
+        F, G = poses[link.inboard.link].of(link.inboard.placement), poses[i].of(outboard_place(mechanism, link))
+        turns, slides = freedoms(link.kind, F, G)
+        first = numbering.coordinates[i].start
+        middle = first + len(turns)
+        turn[first:middle], shift[middle : middle + len(slides)] = turns, mechanism.length * slides
+        at[first : middle + len(slides)] = G.p
+    for site, frame, first in numbering.ports:
+        on = numbering.sites[site].link
+        mine, moving = slice(first, first + len(numbering.moving(on))), numbering.bases[on].moving
+        turns, slides, moved = _shape_motions(model, on, frame, poses[on])
+        turn[mine], shift[mine], at[mine] = moving.T @ turns, moving.T @ slides, moved
+    return Motions(turn, shift, at)
+
+
+def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rotation and displacement per mode of a flexible link's frame, relative to the inboard one, undeformed."""
+    own, unit = model.links[link].branch.frame, model.length * model.links[link].mass ** 0.5
+    turn, shift, at = _frame_motions(model, link, frame, pose)
+    if own is not None:
+        held, moved_by, origin = _frame_motions(model, link, own, pose)
+        turn, shift = turn - held, shift - moved_by - np.cross(held, at - origin)
+    return unit * turn, unit * shift, at
+
+
+def _frame_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    bundle = model.links[link].bundle
+    assert bundle is not None
+    k = frame_index(bundle, frame.partition(".")[2])
+    turn = (pose.R @ bundle["frame_rotation_shape"].values[k]).T
+    shift = (pose.R @ bundle["frame_translation_shape"].values[k]).T
+    return turn, shift, pose.of(Placement(bundle["frame_position"].values[k])).p
+
+
+def scales(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return factors of rows and columns that bring the largest entry of each to one; empty ones have factor one."""
+    row, column = np.ones(sizes.shape[0]), np.ones(sizes.shape[1])
+    for _ in range(SCALING_ROUNDS):
+        now = sizes * row[:, None] * column
+        row /= _root(np.max(now, axis=1, initial=0.0))
+        column /= _root(np.max(now, axis=0, initial=0.0))
+    return row, column
+
+
+def _root(largest: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.where(largest > 0.0, largest, 1.0))

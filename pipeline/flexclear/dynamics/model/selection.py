@@ -1,0 +1,163 @@
+"""Selection of independent closure rows, for which the kernels solve.
+
+Loops of a planar mechanism in space, or Bricard's linkage, impose the same condition several times. Their multipliers
+are then not unique and J M^-1 J^T is singular, although the motion is determined. A selection keeps as many rows as the
+rank; the others are only observed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model.arrays import envelope_size
+from flexclear.dynamics.model.index_tables import closure_envelope, threes
+from flexclear.dynamics.model.model import Model
+
+#: rows below this fraction of their natural length are rounding: the square root of the rounding in a cancelling sum,
+#: 1e-13 at worst, with some digits to spare
+ROUNDING_ROW = 1e-6
+
+
+def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray, float]:
+    """Return the mask of `rank` rows to keep, and their least pivot: 1 for rows at right angles, 0 for dependent ones.
+
+    spread: J L^-T, shape (rows, nv), each row in the metric of the mass, M = L L^T.  scale: reference of each row's
+    length, so that a row that has shrunk to rounding is not selected; a row of scale 0 moves nothing.  Method: QR
+    decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each row selected is the
+    most independent of the previous ones.  If any number is not finite, the first rows are selected, with the pivot 0.
+    """
+    from scipy.linalg import qr  # slow to import, and most mechanisms have no redundant rows
+
+    selected, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
+    if not count:
+        return selected, 1.0
+    compared = spread / np.where(scale > 0.0, scale, 1.0)[:, None]
+    if not np.isfinite(compared).all():
+        selected[:count] = True
+        return selected, 0.0
+    R, order = qr(compared.T, mode="r", pivoting=True)
+    selected[order[:count]] = True
+    return selected, float(R[count - 1, count - 1] ** 2)
+
+
+def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndarray:
+    """Return, per row, the length of the longest row of the same closure and kind (along, turning); shape (rows,).
+
+    The scale is at least a small fraction of the row's natural length, so that rows of mere rounding stay small.
+    """
+    kinds, scales = model.arrays.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
+    lengths = np.linalg.norm(spread, axis=1)
+    for line in model.arrays.table(m.CLOSURES):
+        span = slice(line["row0"], line["row0"] + line["n_rows"])
+        for kind in (0, 1):
+            mine = np.flatnonzero(kinds[span] == kind) + span.start
+            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), ROUNDING_ROW * natural[mine])
+    return scales
+
+
+def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Return the length in the metric of the mass that each closure row would have without cancellation; shape (rows,).
+
+    columns: rows of the work space's table COLUMNS; points: origins of all sites, (sites, 3); factor: L of the mass
+    matrix.  A rotation has the mechanism's size as its arm, in place of distances that only rounding resolves.
+    All lengths are 0 where the mass matrix has no factor.
+    """
+    from scipy.linalg import solve_triangular
+
+    arrays, lengths = model.arrays, np.zeros(model.arrays.size(m.N_CLOSURE_ROWS))
+    if not np.all(factor.diagonal() > 0.0):
+        return lengths
+    entries, support = arrays.table(m.ENTRIES), arrays.table(m.SUPPORT)["coordinate"]
+    inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
+    for c in arrays.table(m.CLOSURES):
+        total: np.ndarray = np.zeros(c["n_rows"])
+        for part, (site, turning, ratio) in enumerate(_acting(model, c)):
+            mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
+            mine = mine[mine["part"] == part]
+            turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
+            angle = np.linalg.norm(turn, axis=1)
+            way = np.linalg.norm(shift + np.cross(turn, points[site]), axis=1) + model.length * angle
+            mobilities = mobility[support[c["support0"] + mine["slot"]]]
+            along, about = (np.sum((ratio * size) ** 2 * mobilities) for size in (way, angle))
+            total = total + np.where(turning, about, along)
+        lengths[c["row0"] : c["row0"] + c["n_rows"]] = np.sqrt(total)
+    return lengths
+
+
+def _acting(model: Model, c: Any) -> list[tuple[int, np.ndarray, float]]:
+    """Return per part of a closure (row of CLOSURES): second site, mask of its rotational rows, and their factor."""
+    arrays, k = model.arrays, c["coupling"]
+    if k < 0:
+        return [(c["site_b"], arrays.table(m.CLOSURE_ROWS)["kind"][c["row0"] : c["row0"] + c["n_rows"]] == 1, 1.0)]
+    gauges, coupling = arrays.table(m.GAUGES), arrays.table(m.NAMED["couplings"])[k]
+    ratio = arrays.table(m.NAMED["coupling_numbers"])["ratio"][k]
+    both = ((gauges[coupling[side]], factor) for side, factor in (("second", 1.0), ("first", ratio)))
+    return [(gauge["b"], gauge["turning"] == 1, factor) for gauge, factor in both]
+
+
+def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
+    """Write into h, a copy of the model's topology tables, the `selected` rows for which the kernels solve.
+
+    selected: mask over all closure rows.  Sizes and offsets do not change, except the number of rows solved for.
+    """
+    all_rows = model.arrays.table(m.CLOSURES)
+    closures, rows = model.arrays.table(m.CLOSURES, h), model.arrays.table(m.CLOSURE_ROWS, h)
+    declared = model.arrays.table(m.CLOSURE_ROWS)
+    start = 0
+    for closure, was in zip(closures, all_rows, strict=True):
+        span = slice(was["row0"], was["row0"] + was["n_rows"])
+        order = np.argsort(~selected[span], kind="stable")
+        rows[span] = declared[span][order]
+        closure["kept0"], closure["n_kept"] = start, np.sum(selected[span])
+        closure["threes"] = threes(closure["n_kept"])
+        start += int(closure["n_kept"])
+    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
+    envelope["first"][:start], envelope["origin"][:start] = closure_envelope(
+        closures, model.arrays.table(m.CLOSURE_PAIRS)
+    ).T
+    h[m.N_KEPT_ROWS], h[m.SCHUR_SIZE] = start, envelope_size(envelope[:start])
+
+
+def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
+    """Return selected rows by free coordinates, (..., kept, nv), from the supports that the kernels store.
+
+    stored: JACOBIAN or SPREAD of the work space, shape (..., size).
+    """
+    support = model.arrays.table(m.SUPPORT)["coordinate"]
+    full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.nv))
+    for c in model.arrays.table(m.CLOSURES, h):
+        count, slots, groups = int(c["n_kept"]), int(c["n_support"]), int(c["threes"])
+        columns = support[c["support0"] : c["support0"] + slots]
+        block = stored[..., c["jacobian0"] : c["jacobian0"] + 3 * groups * slots]
+        block = np.swapaxes(block.reshape(*stored.shape[:-1], groups, slots, 3), -1, -2)
+        block = block.reshape(*stored.shape[:-1], 3 * groups, slots)[..., :count, :]
+        full[..., c["kept0"] : c["kept0"] + count, columns] = block
+    return full
+
+
+def selected_indices(model: Model, h: np.ndarray) -> np.ndarray:
+    """Return the index of each selected row among all rows, the order of residuals and their rates."""
+    spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in model.arrays.table(m.CLOSURES, h))
+    return np.array([k for span in spans for k in span], dtype=np.int64)
+
+
+def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return the mask (nv,) of free coordinates in the closures of some rows; chosen: mask (selected rows,)."""
+    support, mask = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
+    for c in model.arrays.table(m.CLOSURES, h):
+        if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
+            mask[support[c["support0"] : c["support0"] + c["n_support"]]] = True
+    for body in model.arrays.table(m.FLEXES):  # a closure may involve only some shapes of a body
+        modes = slice(body["c0"], body["c0"] + body["n_modes"])
+        mask[modes] = np.any(mask[modes])
+    return mask
+
+
+def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
+    """Return the name of the joint of each selected row."""
+    counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
+    return [closure.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]

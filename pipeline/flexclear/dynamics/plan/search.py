@@ -1,0 +1,373 @@
+"""Decisions of a plan: the requested error is a budget, and each dropped effect spends a part of it.
+
+Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.clearance_response`),
+which cost one run of the ideal mechanism; then cheap runs of variants, rigid ones with clearance and flexible ones
+without;
+then, where clearance stays, a loose run of the whole scene, which shows whether flexible bodies change its motion.
+Effects stay unless a result shows that they are small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from flexclear.artifacts import effect_size
+from flexclear.artifacts.labelled import Labelled
+from flexclear.artifacts.points import Point
+from flexclear.dynamics.linear.clearance_response import OF_POSE, bounds
+from flexclear.dynamics.linear.response import Response, response
+from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, WHOLE, Chosen, Search, upper_bounds, widened
+from flexclear.dynamics.plan.elements import mesh
+from flexclear.dynamics.plan.impacts import cheapest, decide_bending
+from flexclear.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, ScreeningRuns
+from flexclear.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper, smooth
+from flexclear.dynamics.run.run import Run, integrate
+from flexclear.scene.load import edited
+from flexclear.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
+from flexclear.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
+from flexclear.scene.schema import Scene
+from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, pruned, uncoupled
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import Progress, silent
+
+#: fraction of the budget that bounds of clearances may use up; bounds hold under all circumstances
+BY_BOUND = 0.9
+#: factor on the response of flexible bodies, which neglects that the pose turns during a vibration and that
+#: loads follow the vibration; compared with runs the response is 0.94 times the true effect or more
+OF_RESPONSE = 2.0
+#: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
+SOFTER = 0.5
+#: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
+FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
+#: reason to drop parts that do not affect the requested motion
+UNCOUPLED = "the requested quantities do not depend on it"
+
+
+def plan(
+    scene: Scene,
+    bundles: Mapping[str, Labelled],
+    fewer: Sequence[Mapping[str, xr.Dataset]],
+    meshes: Mapping[str, tuple[int, xr.Dataset]],
+    filled: Callable[[Scene], Scene],
+    progress: Progress,
+    watched: bool = False,
+) -> Plan:
+    """Return the decisions for a scene with `[accuracy]`.
+
+    bundles: reduced flexible bodies.  fewer: those with fewer modes, for bodies with a choice, levels with the
+    fewest first.  meshes: numbers of elements, and the bodies reduced from twice as many.  filled: fills a variant
+    with the rigid bodies that recipes describe.  watched: the quantities are those that the scene watches, not named
+    for their accuracy: those that never change are left out.
+    Raises InputError where nothing is requested, or the motion is smaller than the request; SolverError where the
+    scene, or its planned variant, cannot be run.
+    """
+    assert scene.accuracy is not None
+    quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
+    uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
+    plain = edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
+    bare = pruned(plain, uncoupled_parts)
+    own, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
+    runs = ScreeningRuns(bare, own, less, filled, quantities, progress)
+    _ = runs.extent  # refuses a scene that cannot be built, before anything is run
+    runs.must_run((), BEGINNING, 0)
+    loose, soft = ([effect for effect in runs.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
+    ideal = runs.point([*loose, *soft], rtol=RTOL)
+    search = Search(runs, _requested(scene, quantities, ideal, lambda: runs.point(soft), watched))
+    runs.chosen = [q for q in quantities if q.name in search.requested]
+    rigid = _rigid(search, [*loose, *soft]) if loose or soft else None
+    _clearances(search, loose, soft, rigid)
+    _interactions(search, soft)
+    _flexibilities(search, soft, loose, rigid)
+    _confirm(search, soft)
+    _others(search)
+    constant = tuple(q.name for q in quantities if q.name not in search.requested)
+    return replace(_finished(search, effects(scene), uncoupled_parts, meshes), constant=constant)
+
+
+def _requested(
+    scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point], watched: bool
+) -> dict[str, float]:
+    """Return the requested accuracy by quantity [SI]; relative ones refer to the size in the ideal mechanism. For
+    quantities of contacts the size is that with rigid bodies, half of it where bodies are flexible.
+
+    rigid: runs the scene with clearance and rigid bodies.  watched: quantities that never change are left out.
+    Raises InputError where a quantity never changes (with `watched`: where none changes), or all requested errors
+    exceed the quantities' sizes; SolverError where the mechanism with rigid bodies cannot be run.
+    """
+    accuracies, sizes, constant = dict[str, float](), dict[str, float](), list[str]()
+    where = f"{scene.path or scene.name} [accuracy]"
+    assert scene.accuracy is not None
+    for q in quantities:
+        of_contact = any(KINDS[term.kind].owner in OF_CLEARANCE for term in q.terms())
+        point = rigid() if of_contact else ideal
+        if point.refused:
+            raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")
+        sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
+        want = scene.accuracy.quantities[q.name]
+        if want.absolute is None and sizes[q.name] <= effect_size.rounding(point, q):
+            constant.append(q.name)
+        else:
+            accuracies[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
+    if constant and not (watched and accuracies):
+        raise InputError(
+            f"{where} {constant[0]}",
+            "is a relative accuracy, but the quantity is constant in the ideal mechanism",
+            "give an absolute one, with a unit",
+        )
+    quantities = [q for q in quantities if q.name in accuracies]
+    sizes = {name: sizes[name] for name in accuracies}
+    if all(accuracies[name] >= size for name, size in sizes.items()):
+        # forces and rates may come from impacts alone
+        more = rigid() if scene.contacts() or scene.stop else ideal
+        sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else effect_size.size(more, q)) for q in quantities}
+    if all(accuracies[name] >= size for name, size in sizes.items()):
+        q = quantities[0]
+        raise InputError(
+            f"{where} {q.name}",
+            f"{accuracies[q.name]:.3g} {q.unit} exceeds its change ({sizes[q.name]:.3g} {q.unit}), "
+            "and so are all other requested accuracies: the plan would remove all effects, even the motion",
+            "request an accuracy below the change of the quantity",
+        )
+    return accuracies
+
+
+def _rigid(search: Search, dropped: Sequence[Effect]) -> Run:
+    """Run the ideal mechanism."""
+    run = integrate(search.runs.variant(dropped), {}, silent)
+    search.runs.evaluations += int(run.trajectory.counters["evaluations"])
+    return run
+
+
+def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
+    """Decide which joints keep their clearance: by bounds if only poses are requested, else by runs of rigid bodies."""
+    asked = {t.owner for q in search.runs.chosen for t in q.terms() if KINDS[t.kind].owner in OF_CLEARANCE}
+    for effect in loose:
+        if effect.owner in asked:
+            search.decide(effect, True, NONE, "a quantity of this contact is requested")
+    free = [effect for effect in loose if effect.owner not in asked]
+    if not free:
+        return
+    runs, bounded = search.runs, dict[str, Mapping[str, float]]()
+    if rigid is not None and any(q.kind in OF_POSE for q in runs.chosen):
+        bounded = dict(bounds(runs.scene, rigid, runs.chosen))
+    reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
+    total = summed(reach.values(), search.requested)
+    if search.fits(total, BY_BOUND):
+        search.spend(total)
+        for effect in free:
+            search.decide(effect, False, BOUND, "its effect is below the budget", reach[effect.name])
+        return
+    shaken = any(effect.kind == FLEXIBILITY or effect.within for effect in runs.every)
+    ordered = sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf))
+    _in_turn(search, ordered, soft, reach, "its impacts change the requested quantities by less", shaken)
+
+
+def _in_turn(
+    search: Search,
+    ordered: Sequence[Effect],
+    others: Sequence[Effect],
+    reach: Mapping[str, Mapping[str, float]],
+    why: str,
+    shaken: bool,
+) -> None:
+    """Drop effects one after the other, as long as their joint effect size fits into the budget.
+
+    others: effects that no run has.  reach: bounds by effect, where known.  shaken: see `soft` of `widened`.
+    """
+    runs, dropped, left = search.runs, list[Effect](), dict[str, float]()
+    reference = runs.point(others)
+    for effect in ordered:
+        trial = [*dropped, effect]
+        sizes = widened(search, runs.between(runs.point([*others, *trial]), reference), shaken)
+        bound = summed([reach.get(e.name, {}) for e in trial], search.requested)
+        upper = {name: min(value, bound[name]) for name, value in upper_bounds(sizes).items()}
+        small = search.fits(upper)
+        search.judge(effect, why if small else "", upper, sizes)
+        if small:
+            dropped, left = trial, upper
+    if dropped:
+        search.spend(left)
+
+
+def _interactions(search: Search, soft: Sequence[Effect]) -> None:
+    """Keep clearances that rigid bodies can do without but flexible bodies, excited by impacts, cannot.
+
+    This concerns rates and forces only: vibrations after impacts are small in positions and large in rates and forces.
+    """
+    runs = search.runs
+    dropped = [e for e in search.dropped if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
+    if not soft or not dropped or all(q.kind in OF_POSE for q in runs.chosen):
+        return
+    fraction = runs.part(())
+    sizes = runs.between(runs.point(dropped, fraction=fraction), runs.point((), fraction=fraction))
+    sizes = widened(search, sizes, False, 0.0 if fraction == 1.0 else WHOLE)
+    upper = upper_bounds(sizes)
+    if all(upper[name] <= BUDGET * requested for name, requested in search.requested.items()):
+        return
+    search.used = {}
+    for effect in dropped:
+        search.judge(effect, "", upper, sizes)
+
+
+def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
+    """Return the sum by quantity, infinite where a part lacks the quantity."""
+    return {name: sum(part.get(name, np.inf) for part in parts) for name in requested}
+
+
+def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effect], rigid: Run | None) -> None:
+    """Decide which bodies stay flexible."""
+    if not soft:
+        return
+    if any(search.decisions[e.name].kept for e in loose):
+        decide_bending(search, soft)
+        return
+    bundles, bending = search.runs.bundles, dict[str, Mapping[str, float]]()
+    if rigid is not None:
+        together = response(rigid, bundles, search.runs.chosen)
+        for effect in soft:
+            own = {effect.owner: bundles[effect.owner]}
+            single = together if len(soft) == 1 else response(rigid, own, search.runs.chosen)
+            bending[effect.name] = _with_margin(single.influence)
+        total = _with_margin(together.influence)
+        if search.fits(total):
+            search.spend(total)
+            why = f"its effect is below the budget: {_vibrating(together)}"
+            for effect in soft:
+                search.decide(effect, False, RESPONSE, why, bending[effect.name])
+            return
+    ordered = sorted(soft, key=lambda e: max(bending.get(e.name, {}).values(), default=np.inf))
+    _in_turn(search, ordered, search.dropped, {}, "its deformation changes the requested quantities by less", False)
+
+
+def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
+    """Return a first-order response with its uncertainty."""
+    return {name: OF_RESPONSE * value for name, value in influence.items()}
+
+
+def _vibrating(estimated: Response) -> str:
+    """Describe the mechanism's first vibration, and the amplification of the first one that the loads excite."""
+    first = f"the mechanism's first frequency is {estimated.first:.3g} Hz"
+    if np.isnan(estimated.excited):
+        return f"{first}, and the loads of the ideal motion excite no vibration"
+    which = (
+        "that vibration"
+        if estimated.excited == estimated.first
+        else f"the first excited vibration, of {estimated.excited:.3g} Hz,"
+    )
+    size = f"{estimated.amplification:.2g} times its quasi-static value"
+    return f"{first}, and the loads of the ideal motion take {which} to {size}"
+
+
+def _confirm(search: Search, soft: Sequence[Effect]) -> None:
+    """Test dropped clearances together with bodies that stay flexible, by one run of the whole scene.
+
+    Bounds hold along the motion of rigid bodies, and flexible bodies may move differently.
+    """
+    runs = search.runs
+    dropped = [effect for effect in search.dropped if effect.kind == CLEARANCE]
+    if not dropped or all(effect in search.dropped for effect in soft):
+        return
+    fraction = min(1.0, MEMBERS * runs.part(()))
+    sizes = runs.between(runs.point(search.dropped, fraction=fraction), runs.must_run((), fraction, 0))
+    upper = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in sizes.items()}
+    if all(upper[name] <= requested for name, requested in search.requested.items()):
+        return
+    for effect in dropped:
+        search.judge(effect, "", upper, sizes)
+
+
+def _others(search: Search) -> None:
+    """Decide on gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows a small effect."""
+    every = {effect.name: effect for effect in search.runs.every}
+    others = [effect for effect in every.values() if effect.kind not in (CLEARANCE, FLEXIBILITY)]
+    remaining = {d.effect.name: d.effect.kind for d in search.decisions.values() if d.kept}
+    dear = {CLEARANCE, FLEXIBILITY} <= set(remaining.values())
+    for effect in others:
+        if effect.within and effect.within not in remaining:
+            owner = every[effect.within]
+            search.decide(effect, False, search.decisions[owner.name].evidence, f"goes with the {owner.words}")
+    for effect in others:
+        if effect.name in search.decisions:
+            continue
+        if dear:
+            search.decide(effect, True, NONE, NOT_WORTH)
+            continue
+        dropped = search.dropped
+        reference, changed = search.runs.point(dropped), search.runs.point([*dropped, effect])
+        sizes = search.runs.between(changed, reference)
+        upper = upper_bounds(sizes)
+        small = search.fits(upper)
+        free = effect.kind in FREE or bool(effect.within)  # friction is dropped together with its contact
+        if small and free and not search.fits(upper, NEGLIGIBLE + max(search.used.values(), default=0.0)):
+            search.judge(effect, "", upper, sizes, "it costs no time, and ")
+            continue
+        if small:
+            search.spend(upper)
+        search.judge(effect, "its effect is below the budget" if small else "", upper, sizes)
+
+
+def _chosen(search: Search) -> Chosen:
+    """Choose number of modes, integrator and tolerance for the remaining effects."""
+    runs, dropped = search.runs, search.dropped
+    scene = runs.variant(dropped)
+    if scene.contacts() or scene.stop:
+        return cheapest(search)
+    for level in range(len(runs.fewer)):
+        if not runs.modes(level, scene.flexible()):
+            continue
+        sizes = widened(search, runs.between(runs.point(dropped, level=level), runs.point(dropped)), False)
+        upper = upper_bounds(sizes)
+        if search.fits(upper):
+            search.spend(upper)
+            return smooth(runs, dropped, search.requested, level)
+    return smooth(runs, dropped, search.requested, None)
+
+
+def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
+    """Return the finite elements that flexible bodies need, judged by the effect of their flexibility."""
+    scene, numbers = search.runs.scene, {}
+    for body, (given, finer) in meshes.items():
+        decision = search.decisions.get(f"body.{body}.modes")
+        if decision is not None and decision.kept:
+            bending = {n: v + decision.uncertainty.get(n, 0.0) for n, v in decision.estimate.items()}
+            duration = scene.time.end - scene.time.start
+            numbers[body] = mesh(given, search.runs.bundles[body], finer, bending, search.requested, duration)
+    return numbers
+
+
+def _finished(
+    search: Search,
+    every: Sequence[Effect],
+    uncoupled_parts: tuple[str, ...],
+    meshes: Mapping[str, tuple[int, xr.Dataset]],
+) -> Plan:
+    order = {effect.name: k for k, effect in enumerate(every)}
+    chosen = cheaper_method(search, _chosen(search))
+    if scene_is_cheaper(search, chosen):
+        chosen = UNCHANGED
+        for decision in [d for d in search.decisions.values() if not d.kept]:
+            search.decisions[decision.effect.name] = replace(decision, kept=True, reason=NO_CHEAPER)
+    left = search.runs.variant(search.dropped).flexible()
+    modes = {} if chosen.level is None else search.runs.modes(chosen.level, left)
+    for effect in every:
+        if ".".join(effect.name.split(".")[:2]) in uncoupled_parts:
+            search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.requested, 0.0))
+    decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
+    runs = search.runs
+    return Plan(
+        tuple(decisions),
+        dict(search.requested),
+        chosen.integrator,
+        chosen.rtol,
+        chosen.error,
+        modes,
+        runs.evaluations,
+        len(runs.points),
+        uncoupled_parts,
+        _meshes(search, meshes),
+        chosen.ledger_tolerance,
+    )

@@ -1,0 +1,71 @@
+"""Joint coordinates and their rates, for every joint with named freedoms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.effects.gears.model import Coupling
+from flexclear.dynamics.equations.observation import Observed
+from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.model.driving import joint_type, label
+from flexclear.dynamics.model.model import Model
+from flexclear.scene.schema import Scene
+
+Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and second rate, shape (time,) each
+
+
+def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
+    """Return coordinates and rates by ``joint`` or ``joint.coordinate``; angles continue beyond half a turn."""
+    series: dict[str, Series] = {}
+    for i, link in enumerate(model.links):
+        edge = link.branch.edge
+        if edge is None or link.on_path or not joint_type(edge.kind).COORDINATES:
+            continue
+        positions, coordinates = model.numbering.positions[i], model.numbering.coordinates[i]
+        for index, q, c in zip(link.joint.positions, positions, coordinates, strict=True):
+            parts = (seen.positions[:, q], seen.speeds[:, c], seen.accelerations[:, c])
+            position, rate, second = (link.joint.sign * part for part in parts)
+            series[label(edge.name, edge.kind, index)] = position, rate, second
+    closures = model.arrays.table(m.CLOSURES)
+    for row, closure in zip(closures, model.closures, strict=True):
+        if isinstance(closure, Coupling):
+            continue
+        edge = closure.edge
+        a, b = seen.sites[:, row["site_a"]], seen.sites[:, row["site_b"]]
+        for index, coordinate in enumerate(joint_type(edge.kind).COORDINATES):
+            series[label(edge.name, edge.kind, index)] = _measured(a, b, coordinate)
+    return {name: series[name] for name, _, _ in named_coordinates(model.scene) if name in series}
+
+
+def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
+    """List the coordinates of all joints in the scene's order: name in records, joint, whether it is an angle."""
+    contacts = scene.contacts()
+    kinds = {name: joint.type for name, joint in scene.joint.items() if name not in contacts}
+    return [
+        (label(name, kind, k), name, coordinate.turning)
+        for name, kind in kinds.items()
+        for k, coordinate in enumerate(joint_type(kind).COORDINATES)
+    ]
+
+
+def _measured(a: np.ndarray, b: np.ndarray, coordinate: Coordinate) -> Series:
+    """Return the coordinate of a loop-closing joint from the frames of its two sites, named fields over the rows."""
+    F, G = a["axes"], b["axes"]
+    along = (G if coordinate.side else F)[:, :, coordinate.axis]
+    omega, turning = a["omega"], b["omega"] - a["omega"]
+    if coordinate.turning:
+        R = np.einsum("tki,tkj->tij", F, G)
+        (i, j), (k, l) = coordinate.sine, coordinate.cosine
+        angle = np.unwrap(np.arctan2(R[:, i, j], R[:, k, l]))
+        swing = np.cross((b if coordinate.side else a)["omega"], along)
+        return angle, _dot(along, turning), _dot(along, b["alpha"] - a["alpha"]) + _dot(swing, turning)
+    r, v, acceleration = (b[name] - a[name] for name in ("origin", "velocity", "acceleration"))
+    slide = v - np.cross(omega, r)
+    second = acceleration - np.cross(a["alpha"], r) - np.cross(omega, np.cross(omega, r) + 2.0 * slide)
+    return _dot(along, r), _dot(along, slide), _dot(along, second)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    product: np.ndarray = np.einsum("ti,ti->t", a, b)
+    return product

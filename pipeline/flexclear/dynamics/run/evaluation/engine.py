@@ -1,0 +1,294 @@
+"""The engine: a model with compiled functions and a work array; evaluation, closure rows, pieces of laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile import functions
+from flexclear.dynamics.compile.functions import function, place
+from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
+from flexclear.dynamics.effects import INTEGRATORS, scheme_of
+from flexclear.dynamics.integrate.method import Method
+from flexclear.dynamics.model import selection
+from flexclear.dynamics.model.driving import coordinate_of
+from flexclear.dynamics.model.initial import given_rates
+from flexclear.dynamics.model.mobility import Mobility, analyse, moves
+from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.model.plausibility import refuse_missed
+from flexclear.dynamics.run.evaluation.specialised_code import SpecialisedCode, address, equations, made
+from flexclear.scene.loads import SampledPid
+from flexclear.scene.registry import lookup
+from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import Progress
+
+#: selections of closure rows with specialised steps, per integration
+SELECTIONS = 4
+#: without steps: no output times, no rows, no events
+NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
+#: two breaks closer than this fraction of the run are the same instant, computed in two ways
+SHORTEST_SEGMENT = 1e-12
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine; each run has its own, since the work array is not shared.
+
+    h: topology with the selected rows.  w, n: floats and integers of the work array.  lengths: of the sections of w.
+    selected: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
+    specialised: specialised code for this topology.
+    """
+
+    model: Model
+    entry: functions.Entry
+    method: Method
+    h: np.ndarray
+    w: np.ndarray
+    n: np.ndarray
+    lengths: Mapping[int, int]
+    selected: np.ndarray
+    mobility: Mobility
+    start: float
+    end: float
+    rtol: float
+    specialised: SpecialisedCode
+
+    @property
+    def has_specialised_code(self) -> bool:
+        """True when evaluations use code specialised for the topology."""
+        return "evaluate" not in self.entry.addresses
+
+    @cached_property
+    def breaks(self) -> np.ndarray:
+        """Return start, breaks of drives, loads and samples, end [s]; times that differ only by rounding are merged."""
+        starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
+        for first, count in self.model.arrays.table(m.LAWS):
+            inner |= {float(t) for t in starts[first + 1 : first + count]}
+        for period in {load.period for load in self.model.scene.load.values() if isinstance(load, SampledPid)}:
+            inner |= set((self.start + period * np.arange(1, np.ceil((self.end - self.start) / period))).tolist())
+        shortest = SHORTEST_SEGMENT * (self.end - self.start)
+        times = [self.start]
+        for t in sorted(inner):
+            if t - times[-1] > shortest and self.end - t > shortest:
+                times.append(t)
+        return np.array([*times, self.end])
+
+    @cached_property
+    def pieces(self) -> np.ndarray:
+        """Piece of every law between each break and the next, shape (breaks - 1, laws)."""
+        starts, laws = self.model.arrays.table(m.PIECES)["start"], self.model.arrays.table(m.LAWS)
+        middles, indices = 0.5 * (self.breaks[:-1] + self.breaks[1:]), np.zeros((len(self.breaks) - 1, len(laws)), int)
+        for k, (first, count) in enumerate(laws):
+            passed = np.searchsorted(starts[first : first + count], middles, side="right")
+            indices[:, k] = first + np.maximum(passed - 1, 0)
+        return indices
+
+    def segments(self, times: np.ndarray | float, *, after: bool) -> np.ndarray:
+        """Return the segment that contains each time; on a break, the one before it, or the one `after` it."""
+        index = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
+        return np.asarray(np.minimum(np.maximum(index, 0), len(self.breaks) - 2))
+
+    def output_times(self, interval: float, origin: float | None = None) -> np.ndarray:
+        """Return regular output times and all breaks [s], increasing; times that differ only by rounding are merged.
+
+        origin: from which the regular ones are counted [s]; the first break by default.
+        """
+        breaks, origin = self.breaks, self.breaks[0] if origin is None else origin
+        first, last = (np.ceil((breaks[0] - origin) / interval), (breaks[-1] - origin) / interval * (1 + 1e-12))
+        regular = origin + interval * np.arange(int(first), int(np.floor(last)) + 1)
+        after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
+        distinct = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
+        return np.union1d(regular[distinct], breaks)
+
+    def select_pieces_after(self, t: float) -> None:
+        """Select the pieces of laws that hold right after `t`, since an earlier run leaves those of its end."""
+        first = self.n[m.ACTIVE]
+        self.n[first : first + self.model.arrays.size(m.N_LAWS)] = self.pieces[self.segments(t, after=True)]
+
+    def keep(self, rows: np.ndarray) -> None:
+        """Select these closure rows; the others must follow from them."""
+        if not np.array_equal(self.selected, rows):
+            self.selected[:] = rows
+            selection.write(self.model, self.h, self.selected)
+        self.view(m.ROW_SCALE)[: len(rows)] = 0.0
+        self.connect()
+
+    def connect(self) -> None:
+        """Connect the functions for the selected rows: specialised code for the steps where it exists."""
+        rows, known = self.selected.tobytes(), self.specialised
+        alone = rows in known.rows
+        if self.has_specialised_code:
+            self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
+        self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
+        self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
+
+    @property
+    def staged(self) -> bool:
+        """True when the engine can step together with others."""
+        return bool(self.method.staged and self.has_specialised_code)
+
+    def settle(self, progress: Progress) -> None:
+        """Let further steps use specialised code for the selected rows, at a place together with other engines.
+
+        The selections that the integration has met decide, so an interrupted integration continues with the same code
+        as an uninterrupted one.
+        """
+        specialised, rows, changes = self.specialised, self.selected.tobytes(), self.h[m.N_CHANGES]
+        if self.has_specialised_code or changes:
+            if specialised.place is not None and specialised.group is None and self.staged:
+                where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
+                specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
+            if rows not in specialised.rows and (len(specialised.rows) < SELECTIONS or changes):
+                specialised.rows.append(rows)
+            for met in specialised.rows:
+                address(self.model, self.h, specialised, met, progress=progress)
+        self.connect()
+
+    def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
+        """Evaluate the outputs of every row, in this thread."""
+        if self.has_specialised_code:
+            self.h[m.DESCRIBE] = address(self.model, self.h, self.specialised, self.selected.tobytes(), DESCRIBED)
+        rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
+        given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
+        function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
+
+    def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
+        """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
+        group, record = self.specialised.group, _record(outputs, rows, events)
+        if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
+            group.advance(self.entry.addresses["advance"], [*self._arrays(), *record])
+        else:
+            function("advance", self.entry.addresses["advance"])(*self._arrays(), 0, -1, *record)
+
+    def evaluate(self, t: float, repeat: int = 1) -> None:
+        """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
+        function("advance", self.entry.addresses["advance"])(*self._arrays(), t, repeat, *_record(*NO_RECORD))
+
+    def _arrays(self) -> tuple[Any, ...]:
+        """Return the addresses of h, f, w and n for compiled functions."""
+        return place(self.h, np.int64), place(self.model.arrays.f), place(self.w), place(self.n, np.int64)
+
+    def view(self, index: int) -> np.ndarray:
+        """Return a section of the work array, not copied."""
+        o = self.h[index]
+        return self.w[o : o + self.lengths[index]]
+
+    def table(self, table: Any) -> np.ndarray:
+        """Return a table of the work array with named fields, not copied, shape (rows,)."""
+        return m.named(table, self.view(table.at))
+
+    @property
+    def control(self) -> np.ndarray:
+        """Control floats of the stepper, not copied; m.TIME is the index of the time."""
+        return self.view(m.CONTROL)
+
+    @property
+    def slope(self) -> np.ndarray:
+        """Rates of the state from the last evaluation, not copied."""
+        return self.view(m.SLOPES)[: self.model.ny]
+
+    @property
+    def magnitudes(self) -> np.ndarray:
+        """Typical magnitude of each variable of the state, shape (NY,)."""
+        arrays = self.model.arrays
+        return np.asarray(arrays.table(m.FLOORS)["magnitude"][arrays.table(m.GROUPS)["group"]])
+
+    @property
+    def modes(self) -> np.ndarray:
+        """Modes of the contacts, 1 closed and 0 open, not copied."""
+        return self.n[self.n[m.MODE] :]
+
+    @property
+    def latched(self) -> np.ndarray:
+        """Impact rates of the contacts [m/s], not copied."""
+        return self.view(m.LATCHED)
+
+    def explained(self) -> str | None:
+        """Reason for which an effect ends the run; None when none does."""
+        reasons = (explain(self) for explain in self.model.parts.functions("explains"))
+        return next((why for why in reasons if why is not None), None)
+
+    def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
+        """Evaluate f(t, y) in the work array; return True on success."""
+        self.view(m.Y)[:] = y
+        self.evaluate(t, repeat)
+        return bool(self.n[m.EVALUATION] == m.OK)
+
+    def complete(self) -> None:
+        """Evaluate the state at the end of the last step again, unless the work array has all intermediate results."""
+        if self.n[m.ABRIDGED]:
+            self.evaluate(float(self.control[m.TIME]))
+
+    def independence(self) -> np.ndarray:
+        """Return the independence of each selected closure row from those before it, at the state evaluated last."""
+        envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
+        diagonal = envelope["origin"] + np.arange(len(envelope))
+        return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
+
+    def rows(self, stored: int) -> np.ndarray:
+        """Return JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
+        return selection.dense(self.model, self.h, self.view(stored))
+
+
+def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[Any, ...]:
+    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
+
+
+def prepare(model: Model, progress: Progress) -> Engine:
+    """Return the engine of a model, its kernels compiled or loaded. Raise SolverError for an impossible start."""
+    refuse_missed(model.mechanism)
+    solver, mobility = model.scene.solver, analyse(model)
+    progress(None, mobility.text())
+    if mobility.singular_start and not may_start_singular(model):
+        raise SolverError(mobility.start_refusal)
+    _check_branch(model, mobility)
+    alone = equations(model, mobility)
+    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
+    return assemble(model, entry, lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]"), mobility)
+
+
+def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:
+    """Return an engine with a new work array for a model whose functions are compiled."""
+    solver, space = model.scene.solver, model.arrays.work_space(method.room)
+    entry.connect(space.h)
+    selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
+    engine = Engine(
+        model, entry, method, *space, selected, mobility, time.start, time.end, solver.rtol, SpecialisedCode()
+    )
+    engine.control[m.LENGTH] = model.length
+    engine.connect()
+    return engine
+
+
+def another(engine: Engine) -> Engine:
+    """Return a new engine of the same model, in the state before any run."""
+    made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
+    made.specialised.exact = engine.specialised.exact
+    made.specialised.addresses = engine.specialised.addresses.copy()
+    return made
+
+
+def may_start_singular(model: Model) -> bool:
+    """Return True when a run may start in a singular pose: the branch is determined, and no contact interferes."""
+    bodies = model.scene.body.values()
+    given = [v for b in bodies for v in (getattr(b, "velocity", None), getattr(b, "angular_velocity", None))]
+    moved = any(v is not None and np.any(np.asarray(v) != 0.0) for v in given) or bool(given_rates(model))
+    moved = moved or (model.scene.start is not None and bool(model.scene.start.branch))
+    return not model.contacts and (moved or any(moves(model, name) for name in model.drives))
+
+
+def _check_branch(model: Model, mobility: Mobility) -> None:
+    """Raise InputError when `[start] branch` is given without a choice, or names an unknown coordinate."""
+    if model.scene.start is None or not model.scene.start.branch:
+        return
+    for choice in model.scene.start.branch:
+        coordinate_of(model.scene, choice.joint, choice.coordinate, "[start.branch]")
+    if not mobility.singular_start:
+        raise InputError(
+            "[start.branch]", "the mechanism does not start in a change point and has no branches", "remove it"
+        )

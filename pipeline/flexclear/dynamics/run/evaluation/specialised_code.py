@@ -1,0 +1,114 @@
+"""Specialised code for the topology of a mechanism: which parts exist, and their addresses.
+
+It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Kernels serve mechanisms
+whose code would be too long. The topology alone decides, so that equal scenes give equal bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from threading import Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile import functions, sources
+from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.effects import Parts
+from flexclear.dynamics.kernels import INTERPRETED
+from flexclear.dynamics.model import selection
+from flexclear.dynamics.model.mobility import Mobility
+from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.specialise.tape import UnsuitedError
+from flexclear.dynamics.specialise.topology import Topology, topology_of
+from flexclear.system.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
+
+_making = Lock()
+#: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
+_known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
+
+
+@dataclass
+class SpecialisedCode:
+    """Code for one topology (`Engine.settle`), shared by the engines of one work array.
+
+    exact: whether one state and several at once must give the same bits.
+    place: for stepping together with others; by default each engine takes its own steps.
+    group: the group at that place, for the closure rows of its code.
+    addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
+    rows: those for which the present integration has specialised steps.  They belong to one integration, since other
+    integrations of this engine must not change a bit of this one.
+    """
+
+    exact: bool = False
+    place: Place | None = None
+    group: LaneGroup | None = None
+    addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
+    rows: list[bytes] = field(default_factory=list)
+
+
+def equations(model: Model, mobility: Mobility) -> dict[str, str]:
+    """Return the sources of a model's evaluation and description, by name, with all closure rows: the longest code.
+
+    Steps that solve for all rows are specialised as well; for redundant rows that is decided later.
+    """
+    if INTERPRETED:
+        return sources.kernels(model.parts)
+    topology = topology_of(model.arrays, model.arrays.h)
+    names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
+    return {name: sources.specialised(model.parts, topology, name) for name in names}
+
+
+def address(
+    model: Model,
+    h: np.ndarray,
+    code: SpecialisedCode,
+    rows: bytes,
+    name: str = SPECIALISED,
+    progress: Progress = silent,
+) -> int:
+    """Return the address of specialised code for closure rows, by its name (`compile.sources`)."""
+    known = code.addresses
+    if (rows, name) not in known:
+        known[rows, name] = made(model, h, rows, progress, name, exact=code.exact)
+    return known[rows, name]
+
+
+def made(
+    model: Model,
+    h: np.ndarray,
+    rows: bytes,
+    progress: Progress,
+    name: str = SPECIALISED,
+    lanes: int = 1,
+    *,
+    exact: bool = False,
+) -> int:
+    """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
+    h, parts, of_steps = h.copy(), model.parts, name == SPECIALISED
+    changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
+    selection.write(model, h, np.frombuffer(rows, dtype=bool))
+    with _making:  # engines may run concurrently
+        topology = topology_of(model.arrays, h)
+        key = (parts, topology, name, lanes, exact, changes)
+        if key not in _known:
+            if lanes > 1:
+                source = sources.batched(parts, topology, lanes)
+            else:
+                source = (
+                    sources.tangent(parts, topology)
+                    if changes
+                    else sources.specialised(parts, topology, name, exact=exact)
+                )
+            try:
+                _known[key] = functions.specialised(name, source, partial(progress, None))
+            except UnsuitedError:
+                if changes:
+                    raise
+                _known[key] = 0
+        return _known[key]

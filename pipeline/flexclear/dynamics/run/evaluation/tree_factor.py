@@ -1,0 +1,93 @@
+"""Factor of the mass matrix and bias forces as full arrays, from the results of an evaluation in the work array."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.run.evaluation.engine import Engine
+
+
+def mass_factor(engine: Engine) -> np.ndarray:
+    """Return L of the mass matrix M = L L^T of the last evaluation, shape (nv, nv)."""
+    L = _from_envelope(engine)
+    return L + _from_gains(engine) if engine.model.parts.articulated else L
+
+
+def _from_envelope(engine: Engine) -> np.ndarray:
+    """Return the factor in the envelope; with articulated inertias only the blocks of modes and coordinates."""
+    L, entries = np.zeros((engine.model.nv,) * 2), engine.view(m.MASS)
+    for i, (first, origin) in enumerate(engine.model.arrays.table(m.ENVELOPE)):
+        L[i, first : i + 1] = entries[origin + first : origin + i + 1]
+        L[i, i] = 1.0 / L[i, i]
+    return L
+
+
+def _from_gains(engine: Engine) -> np.ndarray:
+    """Return the products of columns with the gains of the coordinates beyond them."""
+    numbering, columns, gains = engine.model.numbering, engine.table(m.COLUMNS), engine.table(m.GAIN)
+    L, origins = np.zeros((engine.model.nv,) * 2), engine.table(m.LINK_FRAMES)["origin"]
+    for i in range(1, len(numbering.coordinates)):
+        pairs = [pair for pair in numbering.joint_route(i) if pair[0] < numbering.nv]
+        route, modal = np.array(pairs, dtype=np.int64).reshape(-1, 2), numbering.modal_coordinates.get(i, ())
+        for k in (c for c in (*modal, *numbering.coordinates[i]) if c < numbering.nv):
+            force = gains["force"][k]
+            moment = gains["moment"][k] + np.cross(origins[i], force)
+            nearer, their = route[route[:, 0] > k].T
+            L[nearer, k] = columns["angular"][their] @ moment + columns["linear"][their] @ force
+    return L
+
+
+def carried_wrenches(engine: Engine, w: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the wrench that each link and its subtree need for the motion without free accelerations.
+
+    Moments about the kernels' origin and forces, shapes (links, 3).  w: as of `bias`.
+    """
+    w = engine.w if w is None else w
+    moments, pushes = (_vectors(engine, w, m.WRENCH, field) for field in (m.WRENCH.moment, m.WRENCH.force))
+    if not engine.model.parts.articulated:  # passed to the ground by the kernels
+        return moments, pushes
+    own, origins = (
+        _vectors(engine, w, m.ARTICULATED, m.ARTICULATED.own_force),
+        _vectors(engine, w, m.LINK_FRAMES, m.LINK_FRAMES.origin),
+    )
+    moments = moments + _vectors(engine, w, m.ARTICULATED, m.ARTICULATED.own_moment) + np.cross(origins, own)
+    pushes = pushes + own
+    for i in range(len(moments) - 1, 0, -1):
+        above = engine.model.links[i].branch.parent
+        moments[above] += moments[i]
+        pushes[above] += pushes[i]
+    return moments, pushes
+
+
+def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
+    """Return the generalised forces that the motion needs without free accelerations, shape (nv,).
+
+    w: the work space; that of the last evaluation, or one of numbers with changes (`specialise.dual`).
+    """
+    model, w = engine.model, engine.w if w is None else w
+    if not model.parts.articulated:
+        return _stretch(engine, w, m.BIAS)[: model.nv].copy()
+    moments, pushes = carried_wrenches(engine, w)
+    turns, shifts = (_vectors(engine, w, m.COLUMNS, field) for field in (m.COLUMNS.angular, m.COLUMNS.linear))
+    numbering, forces = model.numbering, _stretch(engine, w, m.MODAL_BIAS)[: model.nv].copy()
+    modal = [k for modes in numbering.modal_coordinates.values() for k in modes]
+    forces[np.setdiff1d(np.arange(model.nv), modal)] = 0.0
+    for i in range(len(moments) - 1, 0, -1):
+        above = model.links[i].branch.parent
+        shapes = numbering.moving(above) if model.links[above].flexible else ()
+        mine = {*shapes, *(c for c in numbering.coordinates[i] if c < model.nv)}
+        for k, column in (pair for pair in numbering.joint_route(i) if pair[0] in mine):
+            forces[k] = forces[k] + np.sum(turns[column] * moments[i] + shifts[column] * pushes[i])
+    return forces
+
+
+def _stretch(engine: Engine, w: np.ndarray, index: int) -> np.ndarray:
+    return w[engine.h[index] : engine.h[index] + engine.lengths[index]]
+
+
+def _vectors(engine: Engine, w: np.ndarray, table: Any, field: int) -> np.ndarray:
+    """Return a vector of each row of a table."""
+    return _stretch(engine, w, table.at).reshape(-1, table.size)[:, field : field + 3]

@@ -1,0 +1,220 @@
+"""The energy ledger: energy supplied, stored and lost, by cause; and its balance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.equations.observation import Observed, Variables
+from flexclear.dynamics.model.mechanism import Site
+from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.run.trajectory import Trajectory
+from flexclear.scene.integrators import INTEGRATORS
+from flexclear.scene.solver import Solver
+from flexclear.system.errors import SolverError
+
+#: losses of an effect, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
+#: dimension; for each loss its two sites, and its cause in words
+Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
+#: roundings of the largest energies, which may cancel in the balance
+BALANCE_ROUNDING = 1e-12
+#: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
+NO_ENERGY = 1e-30
+#: no contact law is known to a thousandth of its energy; a larger error of a run with adaptive steps has another cause.
+#: Tighter tolerances have a better balance: of three hundred hard cases at rtol 1e-10 (benchmarks/atlas.py) none is off
+#: by 1e-6, unless something is wrong; numerical damping is not distinguished from a fault that soon. Fixed steps serve
+#: comparisons: their error is to be visible, up to a tenth of all energy
+CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
+#: fraction of the exchanged energy above which an error is a warning: forces and speeds are wrong by about a per cent
+DOUBTFUL = 1e-2
+#: speed above which a run diverges [m/s]: a hundredth of that of light, where Newton's mechanics is off by 1e-4
+DIVERGED = 3e6
+#: remedy for an unbounded motion
+REMEDY = "reduce the gain or the period of a controller, or increase the time constant of a load"
+#: steps over many vibrations leave up to half of this in the work of oscillating forces while the drives' speeds change
+LONG_STEPS, LONG_PER_RTOL = 2e-2, 50.0
+
+
+def _of_effects(model: Model) -> list[tuple[int, Losses]]:
+    """Return the index in the ledger of each effect's losses."""
+    losing = [effect for effect in model.parts.present if effect.losses]
+    return [(model.arrays.size(m.SIZES[f"{one.name}_slot"]), one.load(one.losses)(model)) for one in losing]
+
+
+def series(model: Model, seen: Observed, component: int | None = None) -> Variables:
+    """Return the variables of the ledger, total and by cause.
+
+    component: the independent mechanism to which totals are restricted; None for all.
+    """
+    parts, ledger = model.mechanism.components, seen.state[:, model.speeds.stop :]
+    some = slice(None) if component is None else slice(component, component + 1)
+    books, energy = model.arrays.table(m.BOOKS)[some], seen.energy[:, some]
+    kinetic, potential, elastic = (energy[name].sum(axis=1) for name in ("kinetic", "potential", "elastic"))
+
+    def total(values: np.ndarray, owners: Iterable[tuple[Site, Site]]) -> np.ndarray:
+        """Sum over the parts that act between the sites; values: shape (rows, owners)."""
+        mine = [component in (None, parts.of(a.link, b.link)) for a, b in owners]
+        return np.asarray((values if all(mine) else values[:, mine]).sum(axis=1))
+
+    slots = ledger[:, m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(model.contacts)]
+    lost = m.named(m.CONTACT_LEDGER, slots)
+    # the ledger has friction's work; the energy that bent bristles still store is not lost
+    damping, friction = lost["damping"], lost["friction"] - seen.touch["bent"]
+    work, modal = (ledger[:, books[name]].sum(axis=1) for name in ("work", "loss"))
+    touching = [(contact.outer, contact.inner) for contact in model.contacts]
+    dissipated = modal + total(damping, touching) + total(friction, touching)
+    balance = kinetic + potential + elastic + dissipated - work
+    loaded: Variables = {}
+    if model.loads:
+        load_work, load_loss = (ledger[:, books["load"] + k].sum(axis=1) for k in range(2))
+        dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
+        loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
+    for slot, (variable, dimension, sites, _) in _of_effects(model):
+        values = ledger[:, slot : slot + len(sites)]
+        lost_there = total(values, sites)
+        dissipated, balance = dissipated + lost_there, balance + lost_there
+        loaded[variable] = (("time", dimension), values)
+    variables: Variables = {
+        "kinetic": (("time",), kinetic),
+        "potential": (("time",), potential),
+        "elastic": (("time",), elastic),
+        "dissipated": (("time",), dissipated),
+        "drive_work": (("time",), work),
+        "energy_error": (("time",), balance - balance[0]),
+        "constraint_error": (("time",), seen.residual),
+        **loaded,
+    }
+    if model.numbering.flexible:
+        variables["modal_damping_loss"] = (("time",), modal)
+    if model.contacts:
+        variables["contact_elastic"] = (("time", "contact"), seen.touch["stored"] + seen.touch["bent"])
+        variables["contact_damping_loss"] = (("time", "contact"), damping)
+        variables["contact_impulse"] = (("time", "contact"), lost["impulse"])
+        variables["contact_friction_loss"] = (("time", "contact"), friction)
+    return variables
+
+
+def usual(solver: Solver) -> float:
+    """Return the default energy error above which a run is refused, as a fraction of the exchanged energy."""
+    if solver.step is not None:
+        return FIXED
+    if INTEGRATORS[solver.integrator].dissipative:
+        return CHOSEN
+    usual = max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
+    return (
+        max(usual, min(LONG_STEPS, LONG_PER_RTOL * solver.rtol)) if INTEGRATORS[solver.integrator].long_steps else usual
+    )
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Energy error at the rows of a run, the energy exchanged, and the rounding of the largest energy [J].
+
+    of: the mechanism whose energies these are, in words; empty for all bodies.
+    """
+
+    of: str
+    totals: dict[str, np.ndarray]
+    error: np.ndarray
+    exchanged: float
+    rounding: float
+
+    @property
+    def worst(self) -> int:
+        """Row of the largest error, or of the first that is not finite."""
+        finite = np.isfinite(self.error)
+        return int(np.argmax(self.error)) if finite.all() else int(np.argmin(finite))
+
+
+def balances(model: Model, seen: Observed) -> list[Balance]:
+    """Return the energy balance of each independent mechanism in observed rows.
+
+    Methods that integrate all vibrations together account for them as one mechanism, which has one balance.
+    """
+    count = len(model.mechanism.components.lengths)
+    if count == 1 or INTEGRATORS[model.scene.solver.integrator].long_steps:
+        return [_balance(model, seen, None)]
+    return [_balance(model, seen, component) for component in range(count)]
+
+
+def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
+    totals = {name: values for name, (_, values) in series(model, seen, component).items()}
+    exchanging = [
+        n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in totals
+    ]
+    exchanged = max(float(totals["kinetic"].max()), *(float(np.ptp(totals[n])) for n in exchanging))
+    largest = max(float(np.abs(totals[n]).max()) for n in exchanging)
+    of = ""
+    if component is not None:
+        mechanism = model.mechanism
+        body = next(n for n in mechanism.moving_bodies if mechanism.components.of(mechanism.link_of[n]) == component)
+        of = f" of body {body} and what it is connected to"
+    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, max(BALANCE_ROUNDING * largest, NO_ENERGY))
+
+
+def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:
+    """Return the largest energy exchanged [J], by this run or before it.
+
+    exchanged: energy before it, of a run that continues another one.
+    Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance.
+    """
+    for refuse in model.parts.functions("refuses"):
+        refuse(model, trajectory, seen)
+    _require_bounded(model, trajectory, seen)
+    made = balances(model, seen)
+    for energies in made:
+        _require(model, trajectory, energies, exchanged)
+    return max([exchanged, *(energies.exchanged for energies in made)])
+
+
+def _require(model: Model, trajectory: Trajectory, result: Balance, exchanged: float) -> None:
+    solver = model.scene.solver
+    tolerance = solver.ledger_tolerance or usual(solver)
+    allowed = tolerance * max(result.exchanged, exchanged) + result.rounding
+    if result.error[result.worst] <= allowed:
+        return
+    first = int(np.argmax(~(result.error <= allowed)))
+    raise SolverError(
+        f"at t = {trajectory.time[first]:.6g} s: the energy balance{result.of} does not close: the error is up to "
+        f"{result.error[result.worst]:.3g} J of {result.exchanged:.3g} J exchanged (tolerance {tolerance:g}, "
+        f"[solver.ledger_tolerance]); lost so far: {_losses(model, result.totals, first)}; "
+        "choose a smaller rtol or step, or another integrator"
+    )
+
+
+def warnings(model: Model, seen: Observed) -> list[str]:
+    """Warn of an energy error above a hundredth of the exchanged energy, which the scene's tolerance allows."""
+    return [
+        f"the energy balance{one.of} is off by {error:.3g} J, {100.0 * error / one.exchanged:.2g} % of the "
+        f"{one.exchanged:.3g} J that are exchanged: choose a smaller rtol or step"
+        for one in balances(model, seen)
+        if not (error := float(one.error[one.worst])) <= DOUBTFUL * one.exchanged + one.rounding
+    ]
+
+
+def _require_bounded(model: Model, trajectory: Trajectory, seen: Observed) -> None:
+    """Raise SolverError for an unbounded motion, for instance under a controller that makes it unstable."""
+    speeds = np.linalg.norm(seen.body_velocity, axis=2).max(axis=1, initial=0.0)
+    beyond = np.flatnonzero(~(speeds <= DIVERGED))
+    if len(beyond):
+        k = int(beyond[0])
+        name = model.mechanism.moving_bodies[int(np.argmax(np.linalg.norm(seen.body_velocity[k], axis=1)))]
+        text = f"the motion diverges: body {name} moves at {speeds[k]:.3g} m/s"
+        raise SolverError(f"at t = {trajectory.time[k]:.6g} s: {text}; {REMEDY}")
+
+
+def _losses(model: Model, totals: dict[str, np.ndarray], t: int) -> str:
+    parts = []
+    for c, contact in enumerate(model.contacts):
+        for cause in ("damping", "friction"):
+            parts.append(f"{totals[f'contact_{cause}_loss'][t, c]:.3g} J to the {cause} of {contact.words}")
+    if "modal_damping_loss" in totals:
+        parts.append(f"{totals['modal_damping_loss'][t]:.3g} J to modal damping")
+    for _, (variable, *_, words) in _of_effects(model):
+        parts += [f"{totals[variable][t, k]:.3g} J to {what}" for k, what in enumerate(words)]
+    if "load_loss" in totals:
+        parts.append(f"{totals['load_loss'][t]:.3g} J to the loads")
+    return ", ".join(parts) or "nothing"

@@ -1,0 +1,144 @@
+"""Range of validity of linear modes: how far flexible bodies bend, how fast they rotate.
+
+At the limits the omitted terms reach some per cent: the tip of a cantilever that bends by a tenth of its length is one
+per cent off the elastica, and the centrifugal stiffening of a rotating beam over its stiffness is about the square of
+its speed over the square of its first frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.equations.observation import Observed
+from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.refusals.reach import preserved
+
+#: displacement of a point in its body frame, as fraction of the body's length, above which a warning follows
+BENT = 0.05
+#: rotation of a section in the body frame [rad] above which a warning follows
+SECTION_ROTATION = 0.15
+#: angular speed, as fraction of the first frequency, above which a warning follows for a body without stiffening
+SPIN = 0.2
+#: rows whose shapes are superposed at a time
+ROWS = 16
+
+
+@dataclass(frozen=True)
+class Flexible:
+    """Data of a flexible link for the limits.
+
+    axis: unit vector along its longest extent, `length` [m], in the body frame.
+    first: lowest frequency [rad/s] of its modes; 0 for a body whose rotation is not limited.
+    """
+
+    name: str
+    link: int
+    coordinates: range
+    shapes: np.ndarray
+    rotations: np.ndarray
+    axis: np.ndarray
+    length: float
+    first: float
+
+
+def flexibles(model: Model) -> list[Flexible]:
+    """Return the flexible links of a model, with their data for the limits."""
+    bodies = []
+    for i, coordinates in sorted(model.numbering.modal_positions.items()):
+        name, bundle = str(model.links[i].flexible), model.links[i].bundle
+        assert bundle is not None
+        places = bundle["node_position"].values
+        offsets = places - places.mean(axis=0)
+        axis = np.linalg.svd(offsets, full_matrices=False)[2][0]
+        along = offsets @ axis
+        stiffened = getattr(model.scene.body[name], "stiffening", None) is not None
+        least = 0.0 if stiffened else float(np.linalg.eigvalsh(bundle["modal_stiffness"].values)[0])
+        bodies.append(
+            Flexible(
+                name,
+                i,
+                coordinates,
+                bundle["shape_translation"].values,
+                bundle["shape_rotation"].values,
+                axis,
+                float(along.max() - along.min()),
+                float(np.sqrt(max(least, 0.0))),
+            )
+        )
+    return bodies
+
+
+def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
+    """Return warnings about flexible bodies that left the range of linear modes in the observed rows of a run."""
+    return [text for body in flexibles(model) for text in _judged(body, time, seen.positions, seen.links)]
+
+
+def doubts(engine: Engine) -> list[str]:
+    """Return such warnings about the state at the end of the last step; the engine is not changed."""
+    with preserved(engine):
+        # the last evaluation may be of a step that was rejected, at speeds that the motion never had
+        engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
+        coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
+        if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.at)))):
+            return []
+        time = engine.control[m.TIME : m.TIME + 1]
+        return [text for body in flexibles(engine.model) for text in _judged(body, time, coordinates, frames)]
+
+
+def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray) -> Iterator[str]:
+    """Return warnings about one body; shapes (rows, coordinate) and (rows, link), the latter fields of LINK_FRAMES."""
+    yield from _spun(body, time, frames[:, body.link])
+    q = coordinates[:, body.coordinates]
+    if body.length > 0.0:
+        row, bent = largest(body.shapes, q, BENT * body.length)
+        if bent > BENT * body.length:
+            yield (
+                f"{body.name}: at t = {time[row]:.6g} s a point is {bent:.3g} m from its undeformed position, "
+                f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: divide it into several "
+                "bodies joined by fixed joints, or make it stiffer"
+            )
+    row, turned = largest(body.rotations, q, SECTION_ROTATION)
+    if turned > SECTION_ROTATION:
+        yield (
+            f"{body.name}: at t = {time[row]:.6g} s a section is rotated by {turned:.3g} rad by its deformation; "
+            f"linear modes hold below {SECTION_ROTATION:g} rad: divide it into several bodies joined by fixed "
+            "joints, or make it stiffer"
+        )
+
+
+def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
+    """Warn of rotation across the body's length; rotation about it neither stiffens nor softens bending."""
+    if body.first <= 0.0:
+        return
+    speeds = np.linalg.norm(np.cross(frame["omega"], frame["axes"] @ body.axis), axis=1)
+    row = int(np.argmax(speeds))
+    if speeds[row] > SPIN * body.first:
+        yield (
+            f"{body.name}: at t = {time[row]:.6g} s it turns at {speeds[row]:.4g} rad/s, "
+            f"{speeds[row] / body.first:.2g} of its first natural frequency ({body.first:.4g} rad/s), and nothing "
+            f"stiffens it; linear modes hold below {SPIN:g} and diverge close to 1: give the beam stiffening = {{}}"
+        )
+
+
+def largest(shapes: np.ndarray, q: np.ndarray, floor: float) -> tuple[int, float]:
+    """Return row and size of the largest displacement or rotation of any node, among rows that can exceed `floor`.
+
+    shapes: (node, axis, mode).  q: modal coordinates, (rows, mode).
+    """
+    bound = np.abs(q) @ np.linalg.norm(shapes, axis=1).max(axis=0, initial=0.0)
+    order = np.argsort(-bound, kind="stable")
+    peak = (0, 0.0)
+    for first in range(0, len(order), ROWS):
+        rows = order[first : first + ROWS]
+        if not bound[rows[0]] > max(floor, peak[1]):
+            break
+        sizes = np.linalg.norm(np.einsum("nam,tm->tna", shapes, q[rows]), axis=2).max(axis=1)
+        best = int(np.argmax(sizes))
+        if sizes[best] > peak[1]:
+            peak = int(rows[best]), float(sizes[best])
+    return peak

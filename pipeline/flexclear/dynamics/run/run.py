@@ -1,0 +1,268 @@
+"""One run from scene to observed rows; an implicit method continues where an explicit one would be too slow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import import_module
+from threading import Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexclear.artifacts.labelled import Labelled
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.drives.pieces import Pieces
+from flexclear.dynamics.effects import STARTS, way
+from flexclear.dynamics.equations import observation
+from flexclear.dynamics.equations.observation import Blocks, Observed
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.run import trajectory as stepping
+from flexclear.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.dynamics.run.evaluation.observation import observe_blocks
+from flexclear.dynamics.run.evaluation.start import consistent_start, mends
+from flexclear.dynamics.run.ledger import require_closed
+from flexclear.dynamics.run.progress_rate import Judges, Panel
+from flexclear.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
+from flexclear.scene.load import edited
+from flexclear.scene.registry import lookup, module_of
+from flexclear.scene.schema import Scene
+from flexclear.system.errors import SolverError, StoppedError
+from flexclear.system.progress import Progress
+from flexclear.workflow.cores import meanwhile
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.run.horizon.horizon import PerturbedRun
+    from flexclear.dynamics.run.singular_poses.collocation import Collocation
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished integration.
+
+    scene: as the user gave it; the engine may have an edited one.
+    perturbed: the same run from a perturbed start, for scenes with contacts.
+    mended: differences of the start from the scene's, in words.
+    switched: time and reason of the change to another integrator; empty without a change.
+    """
+
+    scene: Scene
+    engine: Engine
+    trajectory: Trajectory
+    observed: Observed
+    perturbed: PerturbedRun | None = None
+    switched: str = ""
+    mended: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """Model of the run."""
+        return self.engine.model
+
+
+def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Engine:
+    """Return the compiled engine of a scene at the begin of its run; paths are not solved for."""
+    return prepare(tabulate(build(begun(scene, bundles, progress)[0], bundles)), progress)
+
+
+def placed(scene: Scene) -> Scene:
+    """Return the scene with bodies positioned by joints and drives at the begin of the run, if it begins elsewhere."""
+    if scene.start is None or scene.start.at is None:
+        return scene
+    scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
+    return scene_placed
+
+
+def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
+    """Return the scene whose actuators are driven so that they produce the given paths, and the actuators' laws."""
+    actuated = way(scene, "inverse dynamics")
+    return actuated(scene, bundles, progress) if actuated else (scene, {})
+
+
+def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
+    """Return the scene with the poses and velocities of its `[start]`.
+
+    Return also which of several assemblies was chosen, in words; empty when there is one, or the scene chooses.
+    """
+    if scene.start is None or scene.start.at is None:
+        return scene, ""
+    begin = lookup(STARTS, scene.start.at, where="[start.at]")
+    started: tuple[Scene, str] = begin(scene, bundles, progress)
+    return started
+
+
+def engines(
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress
+) -> tuple[Engine, Callable[[str], Engine]]:
+    """Return the engine of a run, and a function that makes an engine for another integrator, by name."""
+    made = maker(scene, bundles, progress)
+    return made(), cache(made)
+
+
+def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[..., Engine]:
+    """Return a function that makes the engine of a run for an integrator's name, by default the scene's."""
+    posed, choice = begun(scene, bundles, progress)
+    moved, given = driven(posed, bundles, progress)
+    making = Lock()  # a run and its perturbed run may both continue with another integrator
+
+    def made(name: str = "", tell: Progress = progress) -> Engine:
+        requested = edited(moved, {"solver.integrator": name}) if name else moved
+        with making:
+            model = tabulate(build(requested, bundles), given)
+            if choice:  # the poses found no longer describe it
+                model = replace(model, mechanism=replace(model.mechanism, choice=choice))
+            return prepare(model, tell)
+
+    return made
+
+
+def integrate(
+    scene: Scene,
+    bundles: Mapping[str, Labelled],
+    progress: Progress,
+    judges: Judges | None = None,
+) -> Run:
+    """Build, start, integrate and observe a scene; actuators of a path are driven so that they produce it.
+
+    bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default explicit
+    methods hand over when they would be too slow.  The perturbed run of a scene with contacts steps concurrently when a
+    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run cannot continue,
+    StoppedError with the run so far as `partial` on a request to stop.
+    """
+    made = maker(scene, bundles, progress)
+    engine = made()
+    start = consistent_start(engine)
+    mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
+    for sentence in [*mended, *([choice] if choice else [])]:
+        progress(None, sentence)
+
+    ours, others = judges or (None, None)
+
+    def steps(
+        mine: Engine, y: np.ndarray, tell: Progress, panel: Panel | None, stop: Stop, outputs: np.ndarray | None = None
+    ) -> Followed:
+        return follow(mine, y, tell, lambda name: made(name, tell), panel, stop, outputs)
+
+    def seen(last: Engine, trajectory: Trajectory, switched: str = "") -> Run:
+        return Run(scene, last, trajectory, observed(last, trajectory), None, switched, mended)
+
+    def checked(followed: Callable[[], Followed]) -> Run:
+        try:
+            done = seen(*followed())
+        except StoppedError as stopped:
+            if stopped.partial is not None:
+                stopped.partial = seen(*stopped.partial)
+            raise
+        require_shallow(done.model, done.trajectory, done.observed)
+        require_closed(done.model, done.trajectory, done.observed)
+        return done
+
+    if not engine.model.contacts:
+        return checked(lambda: steps(engine, start, progress, ours, never))
+    pair = way(scene, "horizon")(engine)
+
+    def neighbour(alive: Progress) -> PerturbedRun:
+        return pair.perturbed_run(start, lambda mine, y, *text: steps(mine, y, alive, others, *text), alive)
+
+    with meanwhile(neighbour) as perturbed:
+        done = checked(lambda: pair.run(lambda *text: steps(engine, start, progress, ours, *text)))
+        try:
+            return replace(done, perturbed=perturbed())
+        except StoppedError as stopped:
+            stopped.partial = done
+            raise
+
+
+def follow(
+    engine: Engine,
+    y: np.ndarray,
+    progress: Progress,
+    other: Callable[[str], Engine],
+    judges: Panel | None = None,
+    stop: Stop = never,
+    outputs: np.ndarray | None = None,
+) -> Followed:
+    """Return the trajectory from a consistent start y, the engine at its end, and why another engine continued, if so.
+
+    other: makes the engine of another integrator, called only when needed.  judges: by integrator; an integrator to
+    which a run returns has none.
+    stop, outputs: as of `trajectory.integrate`.
+    """
+    left, reasons, judges = None, list[str](), dict(judges or {})
+    while True:
+        traits = engine.method.traits
+        judge, heir = judges.pop(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
+        try:
+            done = stepping.integrate(engine, y, progress, stop, left, outputs, judge)
+            return engine, done, "\n".join(reasons)
+        except StiffError as stiff:
+            progress(None, f"{stiff}; continuing with {heir}")
+            reasons.append(str(stiff))
+            specialised, engine, left = engine.specialised, other(heir), stiff.handover
+            engine.specialised.exact = specialised.exact
+
+
+def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
+    """Raise SolverError for a contact deeper than its surfaces allow."""
+    if not model.contacts:
+        return
+    from flexclear.dynamics.contact.validity import deepest, refuse_deep
+
+    depths, _ = deepest(trajectory.events, seen.touch)
+    for contact, depth in zip(model.contacts, depths, strict=True):
+        refuse_deep(contact.words, contact.joint, float(depth))
+
+
+def observed(engine: Engine, trajectory: Trajectory) -> Observed:
+    """Return the observed rows of a trajectory, each with the closure rows selected at its time.
+
+    Raises SolverError when a row could not be evaluated.
+    """
+    parts = list[Blocks]()
+    for part, selected in trajectory.parts():
+        engine.keep(selected)
+        out = observe_blocks(engine, trajectory.rows[part])
+        for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
+            limit = _limit(engine, trajectory.rows[part][k], motion, bool(out["status"][k, 0]))
+            for name, values in limit.items():
+                out[name][k] = values
+        parts.append(out)
+    # megabytes are copied only when there is something to join: copying takes as long as a short run
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts[1:] else parts[0]
+    seen = observation.by_name(joined, engine.model.arrays.size)
+    bad = np.flatnonzero(seen.status)
+    if len(bad):
+        at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
+        if seen.status[bad[0]] == m.JAMMED:
+            raise SolverError(at + "friction of ideal joints jams the mechanism in the recorded state")
+        if seen.status[bad[0]] == m.SINGULAR:
+            lost = (
+                "the recorded state is so close to a singular pose that accelerations and forces are "
+                "undetermined: let the mechanism pass the pose at speed, or stop elsewhere"
+            )
+        raise SolverError(at + lost)
+    return seen
+
+
+def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> dict[str, np.ndarray]:
+    """Return the outputs around a row next to a singular pose; nothing when the row itself is as accurate."""
+    poses = way(engine.model.scene, "collocation")
+    limit = poses.observe_around(engine, row, motion, poses.CLEAR)
+    if limit is None and lost:
+        limit = poses.observe_around(engine, row, motion, poses.NEARLY_CLEAR)
+    return limit or {}
+
+
+def _near_singular(
+    engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
+) -> Iterator[tuple[int, Collocation]]:
+    """Return the indices of rows too close to a singular pose, and the motion over it to which they belong."""
+    for motion in motions:
+        blurred = way(engine.model.scene, "collocation").blurred
+        engine.select_pieces_after(0.5 * (motion.start + motion.end))
+        begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
+        for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
+            if blurred(engine, rows[k]):
+                yield k, motion

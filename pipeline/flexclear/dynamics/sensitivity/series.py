@@ -1,0 +1,85 @@
+"""Derivatives of recorded series, from the derivatives of the states.
+
+A row of the record is observed at four points along the direction of its own change, with a step for each row: a
+closed contact moves by a small part of its penetration, which is millionths of the clearance. So the code that
+records a quantity also differentiates it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from flexclear.dynamics.integrate import recording
+from flexclear.dynamics.record.dataset import series
+from flexclear.dynamics.record.motion import Motions
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.horizon.tangents import Differentiated
+from flexclear.dynamics.run.run import observed
+from flexclear.dynamics.sensitivity.parameters import Family, Parameter, central
+from flexclear.scene.quantity import Quantity
+
+#: steps along a direction, in its units: powers of ten between these; the widest also as a fraction of the size of the
+#: quantity that changes most
+WIDEST_STEP, FINEST = 1e-3, 1e-10
+#: step of a closed contact, as a fraction of its penetration
+OF_DEPTH = 1e-2
+#: name of the contacts' normal forces among the series
+NORMAL_FORCE = "normal force"
+
+Series = dict[str, np.ndarray]
+
+
+def read(family: Family, engine: Engine, run: Differentiated, requested: Collection[Quantity]) -> Series:
+    """Return quantities over time, (rows, components), by name; and NORMAL_FORCE, (rows, contacts)."""
+    seen = observed(engine, run.trajectory)
+    result = series(family.scene, Motions(engine.model, seen), requested, run.trajectory.time)
+    return result | {NORMAL_FORCE: seen.touch["normal_force"]}
+
+
+def derivatives(
+    family: Family, run: Differentiated, k: int, parameter: Parameter, requested: Collection[Quantity]
+) -> Series:
+    """Return the derivatives of the series of `read` along direction k of a run, per unit of the parameter."""
+    result: Series = {}
+    # rows with equal steps together
+    powers = np.floor(np.log10(_steps(family, run, k, parameter)) + 1e-9).astype(int)
+    for power in np.unique(powers):
+        rows, step = np.flatnonzero(powers == power), 10.0**power
+        around = {
+            j: read(family, family.changed(parameter, j * step), moved(run, k, rows, j * step), requested)
+            for j in (-2, -1, 1, 2)
+        }
+        for name in around[1]:
+            change = central({j: values[name] for j, values in around.items()}, step)
+            result.setdefault(name, np.zeros((len(run.trajectory.rows), change.shape[1])))[rows] = change
+    return result
+
+
+def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differentiated:
+    """Return some rows of a run, moved by a step along direction k."""
+    some = run.trajectory.rows[rows]
+    record = recording.record(some, run.trajectory.contacts)
+    record.state[:] += step * run.changes[rows, k]
+    record.latched[:] += step * run.impact_rates[rows, k]
+    return replace(run, trajectory=replace(run.trajectory, rows=some))
+
+
+def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) -> np.ndarray:
+    """Return the step of each row."""
+    model, changes = family.engine.model, np.abs(run.changes[:, k])
+    positions = slice(0, model.speeds.stop)
+    size = np.maximum(np.abs(run.trajectory.state), family.engine.magnitudes)[:, positions]
+    steps = WIDEST_STEP / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
+    if model.contacts:
+        everything, probe = np.arange(len(steps)), float(steps.min()) * 1e-3
+        sides = [(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
+        gaps = [observed(engine, side.trajectory).touch["gap"] for engine, side in sides]
+        depth, change = -0.5 * (gaps[0] + gaps[1]), np.abs(gaps[1] - gaps[0]) / (2.0 * probe)
+        closed = (recording.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            allowed = np.where(closed & (change > 0.0), OF_DEPTH * depth / change, np.inf)
+        steps = np.minimum(steps, allowed.min(axis=1))
+    return np.clip(steps, FINEST, WIDEST_STEP)

@@ -1,0 +1,135 @@
+"""Right-hand side of one topology as specialised code: no tables, no loops, only registers and the stack as storage.
+
+Each topology has two versions. The steps call the one that stores in w only the values that they read (`KEPT`): the
+state's rates, the contacts' results, residuals of the loops and the independence of their rows; n[ABRIDGED] reports
+that. LLVM optimises this version. The other one stores all results of an evaluation. It is called some hundreds of
+times in a run, and LLVM assembles it without optimisation, in a tenth of the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.specialise import topology as topologies
+from flexclear.dynamics.specialise.code import Emitter, Program, loads
+from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, same
+from flexclear.dynamics.specialise.trace import Memory, Trace
+
+#: operations beyond which specialised code takes longer to build than kernels and is hardly faster: it no longer fits
+#: the processor's first caches; and the limit for tangents, for which kernels are no alternative
+LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
+#: arrays of w that the steps read after an evaluation; for ROW_SCALE and SCHUR see `_kept`
+KEPT = {m.TOUCH.at, m.LOAD_BENDS.at, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, topologies.RATES}
+KEPT |= {m.NAMED[watched].at for watched in ("bends", "bearing")}
+#: integers of n that are stored
+REPORTS = {m.EVALUATION, m.ABRIDGED}
+_INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
+#: name of the function
+NAME = "specialised"
+
+
+def program(
+    kernel: Callable, topology: topologies.Topology, *, whole: bool = False, describes: bool = False, longest: int = 0
+) -> Program:
+    """Return the program of kernel rates(h, f, w, n, y, dy) for a topology; raise UnsuitedError when it is too long.
+
+    whole: True to store all of w, else only values that steps read.  describes: the kernel is describe(h, f, w, n), for
+    an evaluated state; all is stored.  longest: most operations; `LONGEST` when 0.
+    """
+    h, trace = topologies.header(topology), Trace(longest or LONGEST)
+    w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
+    ground = topologies.ground(h)
+    w.values.update(ground)
+    trace.plain(kernel)(
+        h, f, w, n, *(() if describes else (topologies.start(topologies.STATE), topologies.start(topologies.RATES)))
+    )
+    if describes or whole:
+        changed = {index: v for index, v in w.values.items() if index not in ground or not same(v, ground[index])}
+        return Program(trace.tape.block, [*_stores("w", changed), *_stores("n", n.values, REPORTS.__contains__)])
+    kept = _kept(h)
+    stores = _stores("w", w.values, lambda index: kept(*topologies.split(index)))
+    return Program(trace.tape.block, [*stores, ("n", m.EVALUATION, n.values[m.EVALUATION]), ("n", m.ABRIDGED, 1)])
+
+
+def _stores(array: str, values: dict[int, Any], kept: Callable[[int], bool] = lambda _: True) -> list[Any]:
+    return [(array, index, value) for index, value in values.items() if kept(index)]
+
+
+def _kept(h: list[int]) -> Callable[[int, int], bool]:
+    """Return the test whether an index is read after an evaluation: of the factor of J M^-1 J^T only its diagonal."""
+    o = h[m.CLOSURE_ENVELOPE.at]
+    diagonal = {h[o + m.CLOSURE_ENVELOPE.size * r + m.CLOSURE_ENVELOPE.origin] + r for r in range(h[m.N_KEPT_ROWS])}
+
+    def kept(stretch: int, index: int) -> bool:
+        scale = stretch == m.ROW_SCALE and index >= h[m.N_CLOSURE_ROWS]
+        return stretch in KEPT or scale or (stretch == m.SCHUR and index in diagonal)
+
+    return kept
+
+
+def llvm_text(
+    kernel: Callable,
+    topology: topologies.Topology,
+    *,
+    whole: bool = False,
+    exact: bool = False,
+    describes: bool = False,
+) -> str:
+    """Return the LLVM text of a C function that does a kernel's work for a topology.
+
+    It is evaluate(h, f, w, n, t, y, dy), which first evaluates the laws at time t, or, to describe, describe(h, f, w,
+    n).  whole, describes: see `program`.  exact: True for the results of each lane of `batched`, bit by bit; sums in
+    any order are faster by a sixth.
+    """
+    tape, module = program(kernel, topology, whole=whole, describes=describes), ir.Module(NAME)
+    tables = [_INTEGER.as_pointer(), _FLOAT.as_pointer(), _FLOAT.as_pointer(), _INTEGER.as_pointer()]
+    more = [] if describes else [_FLOAT, _INTEGER, _INTEGER]
+    function = ir.Function(module, ir.FunctionType(_INTEGER, [*tables, *more]), NAME)
+    arrays, given = function.args[:4], function.args[5:]
+    for array in arrays:
+        array.add_attribute("noalias")
+    builder = ir.IRBuilder(function.append_basic_block())
+    if not describes:
+        address = builder.load(builder.gep(arrays[0], [_INTEGER(m.PRESCRIBE)]))
+        laws = ir.FunctionType(_INTEGER, [*tables, _FLOAT]).as_pointer()
+        builder.call(builder.inttoptr(address, laws), function.args[:5])
+    Emitter(builder, tape, places(builder, tape, [[*arrays, *given]]), exact=exact).emit()
+    builder.ret(_INTEGER(0))
+    return str(module)
+
+
+def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
+    """Return the function `where` that gives the address of an array's element in a lane, from offsets looked up once.
+
+    given: h, f, w, n, y and dy of each lane; for a tangent also offsets of its changes (`batched.differentiated`); for
+    `describes` the arrays only.
+    """
+    begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
+    places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
+    stretches = sorted({(array, topologies.split(index)[0]) for array, index in places if isinstance(index, int)})
+    for lane, (h, f, w, n, *states) in enumerate(given):
+        arrays.append({"h": h, "f": f, "w": w, "n": n})
+        reported, changes = {-1: _INTEGER(0)}, states[2:]
+        if states:
+            builder.store(states[0], builder.gep(n, [_INTEGER(m.STATE)]))
+            reported |= {topologies.STATE: states[0], topologies.RATES: states[1]}
+        if changes:
+            arrays[lane] |= {"df": builder.gep(f, [changes[0]]), "dw": builder.gep(w, [changes[1]])}
+            reported |= {topologies.STATE_CHANGE: changes[2], topologies.RATES_CHANGE: changes[3]}
+        for array, stretch in stretches:
+            begin = reported.get(stretch)
+            if begin is None:
+                begin = builder.load(builder.gep(h, [_INTEGER(stretch)]))
+            begins[array, stretch, lane] = builder.gep(arrays[lane][array], [begin])
+
+    def where(array: str, index: Any, lane: int) -> Any:
+        if not isinstance(index, int):
+            return builder.gep(arrays[lane][array], [index])
+        stretch, inside = topologies.split(index)
+        return builder.gep(begins[array, stretch, lane], [_INTEGER(inside)])
+
+    return where

@@ -1,0 +1,69 @@
+"""Topology of a mechanism as its specialised code depends on it, without all that the code does not depend on.
+
+It has sizes and tables of h, without those that only laws of time, error norms and the record read. Offsets in w and
+f are excluded: code identifies work arrays by their index in the header, so that one code serves every integrator and
+any number of pieces of laws.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model.arrays import Arrays
+
+#: sizes of the header, then the rows of each table of h
+Topology = tuple[tuple[int, ...], ...]
+#: tables that only laws of time, error norms and the record read
+LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
+SIZES = m.ADDRESSES[0]
+#: bits of an index for the position in a work array; higher bits number the array, 0 for the array h, f, w or n itself
+STRETCH = 40
+#: arrays of w that arguments give: the state and its rates, and small changes of both
+STATE, RATES, STATE_CHANGE, RATES_CHANGE = range(m.HEADER + 1, m.HEADER + 5)
+
+
+def topology_of(arrays: Arrays, h: np.ndarray) -> Topology:
+    """Return the topology in h, with the closure rows that its selection keeps."""
+    sizes = h[:SIZES].copy()
+    sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
+    sizes[m.NY] = sizes[m.NQ] + sizes[m.NV] + sizes[m.N_LEDGER]  # without changes
+    tables = []
+    for table in m.TABLES["h"]:
+        rows = arrays.table(table, h).view(np.int64).reshape(-1, table.size)
+        if table is m.CLOSURE_ENVELOPE:
+            rows = rows[: h[m.N_KEPT_ROWS]]
+        tables.append(() if table in LEFT_OUT else tuple(rows.ravel().tolist()))
+    return (tuple(sizes.tolist()), *tables)
+
+
+def header(topology: Topology) -> list[int]:
+    """Return the array h of a topology, with work array numbers in place of all offsets in f and w."""
+    h = [*topology[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
+    for table, rows in zip(m.TABLES["h"], topology[1:], strict=True):
+        h[table.at] = len(h)
+        h += rows
+    return h
+
+
+def split(index: int) -> tuple[int, int]:
+    """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array."""
+    return (index >> STRETCH) - 1, index & ((1 << STRETCH) - 1)
+
+
+def start(stretch: int) -> int:
+    """Return the index of the first entry of a work array."""
+    return (stretch + 1) << STRETCH
+
+
+def ground(h: list[int]) -> dict[int, Any]:
+    """Return the entries of w for the ground, which no kernel changes: its frame, at rest, and zero inertia."""
+    frame, own = h[m.LINK_FRAMES.at], h[m.OWN.at]
+    axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
+    return {
+        **{index: 0.0 for index in range(frame, frame + m.FRAME.size)},
+        **{index: 1.0 for index in axes},
+        **{index: 0.0 for index in range(own, own + m.OWN.size)},
+    }

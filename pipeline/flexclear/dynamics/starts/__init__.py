@@ -1,0 +1,15 @@
+"""Starts of a run, other than the poses of its scene. To add one: a module here, and its name in `Start.at`,
+scene/start.
+
+Each module has a function ``begin(scene, bundles, progress) -> (Scene, str)``: the scene with the poses, velocities and
+modal coordinates of that start in place of its own, and `Mechanism.choice` of the mechanism that gave them;
+and ``placed(scene) -> Scene``: the scene whose joints and drives position the bodies there, which `flexclear check`
+builds.
+"""
+
+from typing import get_args
+
+from flexclear.scene.start import At
+
+KIND = "start"
+NAMES = {name: f"{name}:begin" for name in get_args(At)}

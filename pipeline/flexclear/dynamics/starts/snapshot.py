@@ -1,0 +1,99 @@
+"""Scenes whose bodies have the poses of an engine's state, whatever joints or drives that engine has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.model.initial import centre_of
+from flexclear.dynamics.run.evaluation import closure_rows
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.numerics.rotations import matrix_to_quaternion
+from flexclear.scene.clearance import Clearance
+from flexclear.scene.fields import Pose
+from flexclear.scene.parts import Ground
+from flexclear.scene.schema import Scene
+from flexclear.scene.start import JointStart, ModalStart, Start
+from flexclear.scene.units import LARGEST_NUMBER
+
+Vector = tuple[float, float, float]
+
+
+def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
+    """Return the scene with every body's pose and deformation of state y at time t.
+
+    Velocities are those of the scene.  Its joint positions and its place to begin are left out.
+    """
+    closure_rows.evaluate(engine, y, t)
+    frames, model, bodies = engine.table(m.LINK_FRAMES), engine.model, dict[str, Any]()
+    for name, body in scene.body.items():
+        i = model.mechanism.link_of[name]
+        if isinstance(body, Ground):
+            bodies[name] = body
+            continue
+        placement, frame = model.links[i].placements[name], frames[i]
+        p = frame["origin"] + frame["axes"] @ placement.p + model.mechanism.origin
+        quaternion = matrix_to_quaternion(frame["axes"] @ placement.R)
+        pose = Pose(position=tuple(_given(p)), quaternion=tuple(_given(quaternion)))
+        bodies[name] = body.model_copy(update={"pose": pose})
+    given = scene.start.modal if scene.start is not None else {}
+    modal = {
+        name: ModalStart(coordinate=tuple(q), velocity=given[name].velocity if name in given else None)
+        for name, q in _modes(engine, y[: model.nq], model.numbering.modal_positions).items()
+    }
+    return scene.model_copy(update={"body": bodies, "start": _start_without_poses(scene, modal)})
+
+
+def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
+    """Return the scene as `posed` does, with the velocities of the state as well."""
+    still, model = posed(scene, engine, y, t), engine.model
+    frames, q, u, bodies = engine.table(m.LINK_FRAMES), y[: model.nq], y[model.speeds], dict(still.body)
+    for name, body in still.body.items():
+        if not isinstance(body, Ground):
+            twist = centre_of(model, name).motion(frames, q, u)
+            given = {"angular_velocity": tuple(twist[:3].tolist()), "velocity": tuple(twist[3:].tolist())}
+            bodies[name] = body.model_copy(update=given)
+    assert still.start is not None
+    rates = _modes(engine, u, model.numbering.modal_coordinates)
+    modal = {n: ModalStart(coordinate=s.coordinate, velocity=tuple(rates[n])) for n, s in still.start.modal.items()}
+    start = still.start.model_copy(update={"joint": {}, "modal": modal})
+    return still.model_copy(update={"body": bodies, "start": start})
+
+
+def resting(scene: Scene, contacts: Mapping[str, Clearance]) -> Scene:
+    """Return the scene with those of these contacts at rest that are closed at the start."""
+    at_rest = {
+        name: joint.model_copy(update={"initial_approach_speed": 0.0})
+        for name, joint in contacts.items()
+        if joint.initial_approach_speed is None
+    }
+    return scene.model_copy(update={"joint": scene.joint | at_rest})
+
+
+def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
+    """Return the values of the modes of flexible bodies, by name."""
+    return {str(engine.model.links[i].flexible): _given(values[own]) for i, own in numbers.items()}
+
+
+def _given(values: np.ndarray) -> Any:
+    """Return computed values as a scene may give them; rounding below the smallest number of scenes becomes zero."""
+    return np.where(np.abs(values) < 1.0 / LARGEST_NUMBER, 0.0, values).tolist()
+
+
+def _start_without_poses(scene: Scene, modal: dict[str, ModalStart]) -> Start:
+    """Return the start without entries that the poses now replace."""
+    old = scene.start if scene.start is not None else Start()
+    rates = joint_starts(old, lambda one: None if one.velocity is None else JointStart(velocity=one.velocity))
+    return old.model_copy(update={"at": None, "joint": rates, "modal": modal})
+
+
+def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:
+    """Return the non-empty results of `left`, applied to a start's entry of each joint coordinate, by joint."""
+    reduced = {
+        joint: {name: new for name, one in coordinates.items() if (new := left(one)) is not None}
+        for joint, coordinates in start.joint.items()
+    }
+    return {joint: coordinates for joint, coordinates in reduced.items() if coordinates}

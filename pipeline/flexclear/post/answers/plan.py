@@ -1,0 +1,286 @@
+"""A plan as a dataset, a table, words and a page: decisions, reasons and evidence."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from flexclear.artifacts.effect_size import Agreement
+from flexclear.post.answers.effect_sizes import listed, written
+from flexclear.post.plotting.table import Table
+from flexclear.scene.output import Schema
+from flexclear.scene.output import table as described
+from flexclear.scene.plan_decisions import EVIDENCE, NOT_WORTH, Plan
+
+#: variables of a plan; those of quantities are in the unit of each
+PLAN: Schema = described("""
+influence | effect quantity | | estimated influence of the effect on the quantity, in the quantity's unit
+uncertainty | effect quantity | | uncertainty of the estimate, in the quantity's unit
+kept | effect | | 1: the planned scene has the effect
+evidence | effect | | evidence of the decision
+reason | effect | | the decision in words
+requested | quantity | | requested accuracy
+integration | quantity | | estimated error of the planned run's integration, and of the modes that it leaves out
+elements | body | | finite elements of the body
+elements_called_for | body | | finite elements that the requested accuracy requires
+mesh_frequency_error | body | | largest error of a retained frequency due to the mesh, as a fraction
+mesh_compliance_error | body | | largest error of the frames' compliance due to the mesh, as a fraction
+mesh_error | body quantity | | estimated error of the quantity due to the body's mesh, at most, in the quantity's unit
+""")
+
+
+def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
+    """Return effect sizes over (effect, quantity), decisions and evidence by effect, requests by quantity; in SI units.
+
+    units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
+    differ.
+    """
+    names, decisions, meshes = list(plan.requested), plan.decisions, list(plan.meshes.values())
+    uncertainties = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
+    planned = {
+        "gone": [effect.name for effect in plan.gone],
+        "modes": dict(plan.modes),
+        **({"integrator": plan.integrator, "rtol": plan.rtol} if plan.integrator else {}),
+        **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
+        "uncoupled": list(plan.uncoupled),
+        "constant": list(plan.constant),
+    }
+    values = {
+        "influence": np.reshape([[d.estimate.get(n, np.nan) for n in names] for d in decisions], (-1, len(names))),
+        "uncertainty": np.reshape(uncertainties, (-1, len(names))),
+        "kept": np.array([d.kept for d in decisions], dtype=np.int8),
+        "evidence": _texts(d.evidence for d in decisions),
+        "reason": _texts(d.reason for d in decisions),
+        "requested": np.array(list(plan.requested.values())),
+        "integration": np.array([plan.integration.get(name, np.nan) for name in names]),
+        "elements": np.array([m.given for m in meshes], dtype=np.int64),
+        "elements_called_for": np.array([m.called_for for m in meshes], dtype=np.int64),
+        "mesh_frequency_error": np.array([m.frequency for m in meshes], dtype=float),
+        "mesh_compliance_error": np.array([m.compliance for m in meshes], dtype=float),
+        "mesh_error": np.reshape([[m.error[name] for name in names] for m in meshes], (-1, len(names))),
+    }
+    return xr.Dataset(
+        {name: (PLAN[name].dims, value, {"long_name": PLAN[name].long_name}) for name, value in values.items()},
+        coords={
+            "body": _texts(plan.meshes),
+            "effect": _texts(d.effect.name for d in decisions),
+            "words": ("effect", _texts(d.effect.words for d in decisions)),
+            "quantity": _texts(names),
+            "unit": ("quantity", _texts(units[name] for name in names)),
+        },
+        attrs={
+            "Conventions": "CF-1.11",
+            "title": title,
+            "planned": json.dumps(planned, sort_keys=True),
+            "evaluations": plan.evaluations,
+            "runs": plan.runs,
+        },
+    )
+
+
+def _texts(words: Iterable[str]) -> np.ndarray:
+    return np.array(list(words), dtype=object)
+
+
+def drawn(planned: xr.Dataset) -> xr.Dataset:
+    """Return the upper bounds of a plan's effect sizes, as the chart takes them."""
+    return xr.Dataset(
+        {"dropped": planned["influence"] + planned["uncertainty"].fillna(0.0)},
+        coords={"effect": planned["effect"], "quantity": planned["quantity"], "unit": planned["unit"]},
+    )
+
+
+def table(planned: xr.Dataset) -> Table:
+    """Tabulate decision, evidence and reason of each effect, and its estimated size in each quantity."""
+    names = [str(name) for name in planned["quantity"].values]
+    units = [str(unit) for unit in planned["unit"].values]
+    rows = []
+    for i, effect in enumerate(planned["words"].values):
+        part = planned.isel(effect=i)
+        cells = [
+            written(float(part["influence"][k]), float(np.nan_to_num(part["uncertainty"][k])), unit)
+            for k, unit in enumerate(units)
+        ]
+        decision = "keep" if int(part["kept"]) else "drop"
+        rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
+    requested = [
+        written(float(value), 0.0, unit) for value, unit in zip(planned["requested"].values, units, strict=True)
+    ]
+    rows.append(("requested", "", *requested, "", ""))
+    decided = json.loads(planned.attrs["planned"])
+    notes = [words(planned)]
+    notes += [f"{name} retains {count} of its modes, which suffice." for name, count in decided["modes"].items()]
+    notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
+    if decided["uncoupled"]:
+        notes.append(
+            f"Not integrated, since the requested quantities do not depend on it: {listed(decided['uncoupled'])}."
+        )
+    notes += _constant(decided)
+    notes.append(
+        f"{_integrated(decided)} The plan is based on {planned.attrs['runs']} short runs, "
+        f"{planned.attrs['evaluations']:,} evaluations."
+    )
+    return Table(
+        "Effects that the requested accuracy requires",
+        ("effect", "decision", *names, "evidence", "why"),
+        tuple(rows),
+        tuple(notes),
+    )
+
+
+def _constant(decided: Mapping[str, Any]) -> list[str]:
+    """Return a sentence that lists the watched quantities for which nothing is planned; else nothing."""
+    names = decided["constant"]
+    if not names:
+        return []
+    verb = "never changes" if len(names) == 1 else "never change"
+    return [f"Left out: {listed(names)}, which {verb} in the ideal mechanism; [accuracy] takes an absolute accuracy."]
+
+
+def _integrated(decided: Mapping[str, Any]) -> str:
+    """Return a sentence on integrator and tolerance of the planned run."""
+    if "integrator" not in decided:
+        return "No other integrator or tolerance is cheaper and as accurate as requested: the scene's own is used."
+    return f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}."
+
+
+def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
+    """Return one or two sentences on whether a body has enough finite elements."""
+    given, called = int(part["elements"]), int(part["elements_called_for"])
+    errors = [
+        f"{name} by at most {written(float(value), 0.0, unit)}"
+        for name, value, unit in zip(part["quantity"].values, part["mesh_error"].values, units, strict=True)
+        if np.isfinite(value)
+    ]
+    frequency, compliance = (100.0 * float(part[f"mesh_{of}_error"]) for of in ("frequency", "compliance"))
+    head = (
+        f"{part['body'].item()} has {given} finite elements; errors: {frequency:.2g} % in a natural frequency, "
+        f"{compliance:.2g} % in compliance"
+    )
+    if not errors:
+        return f"{head}; the effect on the requested quantities cannot be determined."
+    text = f"{head}, which change {listed(errors)}"
+    if called > given:
+        return f"{text}: the requested accuracy requires {called}."
+    return f"{text}: enough; {called} suffice. Elements cost no time in a run, so the recipe is unchanged."
+
+
+def words(planned: xr.Dataset) -> str:
+    """Return the plan in a sentence or two, for a designer."""
+    needed, unseen, gone = _sorted(planned)
+    asked = " and ".join(str(name) for name in planned["quantity"].values)
+    if not needed and not unseen:
+        return f"For the requested accuracy of {asked} the ideal mechanism suffices: {listed(gone)} may be omitted."
+    left = f"{listed(gone)} may be omitted" if gone else "nothing may be omitted" if not unseen else ""
+    parts = [f"{listed(needed)} must be modelled" if needed else "", left]
+    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} modelled unexamined" if unseen else ""]
+    return f"For the requested accuracy of {asked}: {'; '.join(filter(None, parts))}."
+
+
+MET, MET_TO_HORIZON, MISSED, UNDECIDED = "met", "met to the horizon", "missed", "not decided"
+
+
+def verdict(one: Agreement) -> str:
+    """Return met where error plus chance is below the allowed error, missed where certainly above, else not decided."""
+    if one.met:
+        return MET if one.horizon == 1.0 else MET_TO_HORIZON
+    return MISSED if one.missed else UNDECIDED
+
+
+def until_decided(
+    compared: Callable[[int], list[Agreement]], levels: Sequence[int], affordable: Callable[[int], bool]
+) -> tuple[list[Agreement], int]:
+    """Return agreements over the members that decide all of them, and that number of members.
+
+    compared: computes them for a number of members.  levels: rising numbers of members.  affordable: the budget's
+    limit.
+    """
+    members = levels[0]
+    while True:
+        found = compared(members)
+        needed = max((one.enough(members) for one in found if verdict(one) == UNDECIDED), default=0.0)
+        more = [n for n in levels if n > members and affordable(n)]
+        if not needed or not more:
+            return found, members
+        members = next((n for n in more if n >= needed), more[-1])
+
+
+def verified(planned: xr.Dataset) -> Table:
+    """Tabulate the true distance of the planned run from the full one, next to the requested one."""
+    rows = []
+    for k, name in enumerate(planned["quantity"].values):
+        unit, one = str(planned["unit"].values[k]), agreement_of(planned, k)
+        requested = written(float(planned["requested"][k]), 0.0, unit)
+        rows.append((str(name), requested, written(one.error, one.chance, unit), _verdict(planned, k)))
+    notes = [
+        f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
+        f"{int(planned.attrs['planned_evaluations']):,} as planned"
+        + (f", of {planned.attrs['members']} members each." if planned.attrs["members"] else "."),
+        "For runs with contacts, the number after ± may be due to chance (Student's t of the members' means).",
+    ]
+    return Table(
+        "The plan against the full scene", ("quantity", "requested", "true error", "verdict"), tuple(rows), tuple(notes)
+    )
+
+
+def agreement_of(planned: xr.Dataset, k: int) -> Agreement:
+    """Return the agreement in the k-th quantity of a verified plan."""
+    return Agreement(*(float(planned[name][k]) for name in ("error", "chance", "allowed", "horizon")))
+
+
+def _verdict(planned: xr.Dataset, k: int) -> str:
+    """Return the verdict on one quantity; beyond the horizon the scatter of single runs; members that decide it."""
+    one, unit = agreement_of(planned, k), str(planned["unit"].values[k])
+    result, reasons = verdict(one), list[str]()
+    if result == MISSED:
+        return f"missed, {one.error / one.allowed:.2g} times the allowed error" if one.allowed else result
+    if one.horizon < 1.0:
+        reasons.append(
+            f"beyond {one.horizon:.0%} of the time single runs of the full scene scatter by "
+            f"{written(float(planned['scatter'][k]), 0.0, unit)}"
+            + (", and the means differ by less" if result == MET_TO_HORIZON else "")
+        )
+    enough = one.enough(planned.attrs["members"])
+    if result == UNDECIDED and np.isfinite(enough):
+        reasons.append(f"{int(np.ceil(enough))} members would decide")
+    return f"{result}: {'; '.join(reasons)}" if reasons else result
+
+
+def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
+    """Tabulate the plan for each accuracy, by the accuracy in words; a string says why a plan is missing."""
+    rows, constant = list[tuple[str, ...]](), dict[str, None]()
+    for level, result in plans.items():
+        if isinstance(result, str):
+            rows.append((level, "–", "–", "–", "–", result.splitlines()[0]))
+            continue
+        text = json.loads(result.attrs["planned"])
+        constant |= dict.fromkeys(_constant(text))
+        needed, unseen, gone = _sorted(result)
+        modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
+        method = f"{text['integrator']}, rtol {text['rtol']:.0e}" if "integrator" in text else "as the scene"
+        rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
+    return Table(
+        "Effects that each accuracy requires",
+        ("accuracy", "needed", "unexamined", "may be omitted", "modes", "integrated by"),
+        tuple(rows),
+        (
+            "Each accuracy is that of all watched quantities, of positions and angles a fraction of the largest change "
+            "from the start, of others of the largest value; name one in [accuracy] to get its planned scene. "
+            "Unexamined: omitting the effect would save less time than the runs that measure its size.",
+            *constant,
+        ),
+    )
+
+
+def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
+    """Return effects in words: those needed, those that stay without evidence, and those that may be left out."""
+    rows = list(zip(result["words"].values, result["kept"].values, result["reason"].values, strict=True))
+    return (
+        [str(w) for w, recorded, reason in rows if recorded and reason != NOT_WORTH],
+        [str(w) for w, recorded, reason in rows if recorded and reason == NOT_WORTH],
+        [str(w) for w, recorded, _ in rows if not recorded],
+    )

@@ -1,0 +1,193 @@
+"""Stability of a run: checks with value, limit, verdict and remedy, and a figure of the errors over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from flexclear.artifacts.quantities import SEPARATED
+from flexclear.post.cost.study import methods
+from flexclear.post.overview.curves import size_of
+from flexclear.post.plotting import style
+from flexclear.post.single_run.series import sentence
+
+#: largest error of the energy balance, as a fraction of the largest change of any energy
+ENERGY = 1e-3
+#: largest opening of loops, as a fraction of the mechanism's extent
+LOOPS = 1e-6
+#: values below this are rounding
+ROUNDING = 1e-15
+#: largest disagreement with runs at other tolerances and by other methods, as a fraction of each quantity's size
+AGREEMENT = 0.01
+#: largest fractions of rejected steps, and of steps limited by stability
+REJECTED, STIFF = 0.3, 0.3
+#: condition number of the closures above which a singular pose is near
+CONDITION = 1e6
+ENERGIES = ("kinetic", "potential", "elastic", "drive_work", "load_work")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check in words.  good: True when the value is within its limit."""
+
+    name: str
+    value: str
+    limit: str
+    good: bool
+    remedy: str
+
+    @property
+    def verdict(self) -> str:
+        """Verdict in words."""
+        return "good" if self.good else "note"
+
+    @property
+    def advice(self) -> str:
+        """The remedy where one is needed."""
+        return "–" if self.good else self.remedy
+
+
+def checks(
+    run: xr.Dataset, study: xr.Dataset | None, members: float | None = None, *, by_need: bool = False
+) -> list[Check]:
+    """Return all checks of a run and of its cost study, or of the run alone for None.
+
+    members: horizon of the scene's ensemble [s], or None.  by_need: True when the program chose the integrator.
+    """
+    agreement = [] if study is None else _agreement(study)
+    result = [_energy(run), *_loops(run), *agreement, _rejected(run), _stiff(run, by_need)]
+    return [*result, *_condition(run), *_predictable(run, members)]
+
+
+def lost_energy(run: xr.Dataset) -> np.ndarray:
+    """Return the error of the energy balance, as a fraction of the largest change of any energy, shape (time,)."""
+    changes = [np.abs(run[n].values - run[n].values[0]).max() for n in ENERGIES if n in run]
+    largest, missed = max(map(float, changes), default=0.0), np.abs(run["energy_error"].values)
+    return np.asarray(missed / largest) if largest > 0.0 else np.zeros_like(missed)
+
+
+def _drift(run: xr.Dataset) -> np.ndarray | None:
+    """Return the opening of loops, as a fraction of the mechanism's extent, shape (time,); None without loops."""
+    if "constraint_error" not in run or "condition" not in run:
+        return None
+    extent = float(np.linalg.norm(np.ptp(run["position"].values.reshape(-1, 3), axis=0))) or 1.0
+    return np.asarray(np.abs(run["constraint_error"].values) / extent)
+
+
+def _energy(run: xr.Dataset) -> Check:
+    fraction = float(lost_energy(run).max())
+    remedy = "a tighter tolerance: [solver] rtol" if "step" not in run.attrs else "shorter steps: [solver] step"
+    return Check("energy balance", f"{fraction:.1e} of the largest energy", f"{ENERGY:g}", fraction < ENERGY, remedy)
+
+
+def _loops(run: xr.Dataset) -> list[Check]:
+    """Check the drift of closed loops; empty without loops."""
+    if (drift := _drift(run)) is None:
+        return []
+    fraction = float(drift.max())
+    value = f"{fraction:.1e} of the extent" if fraction > ROUNDING else "rounding"
+    return [Check("drift of closed loops", value, f"{LOOPS:g}", fraction < LOOPS, "a tighter tolerance")]
+
+
+def _agreement(study: xr.Dataset) -> list[Check]:
+    """Check agreement with half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
+    result = []
+    for group, method, setting, one in methods(study):
+        distance = one[f"distance_by_{group}"]
+        available = [float(s) for s in study[setting].values if np.isfinite(distance.sel({setting: s})).all()]
+        if method == study.attrs["own_integrator"]:
+            at = float(study.attrs[f"own_{setting}"])
+            shown = [s for s in available if 0.05 * at < s < 0.9 * at]
+        else:
+            shown = [min(available)] if available else []
+        for s in shown:
+            values = distance.sel({setting: s}).values
+            worst = int(np.argmax(values))
+            value, unit, which = (float(values[worst]), *(str(study[n].values[worst]) for n in ("unit", "quantity")))
+            name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
+            text = f"{value:.1e} of the {size_of(unit)} of {which}"
+            result.append(Check(name, text, f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance"))
+    return result
+
+
+def _rejected(run: xr.Dataset) -> Check:
+    steps, rejected = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
+    fraction = rejected / max(steps + rejected, 1.0)
+    remedy = "another integrator, or a tighter tolerance"
+    return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
+
+
+def _stiff(run: xr.Dataset, by_need: bool) -> Check:
+    fraction, chosen = float(run.attrs.get("stiff_share", 0.0)), by_need or "method_reason" in run.attrs
+    limit = "none: the integrator was chosen by its cost" if chosen else f"{100.0 * STIFF:g} %"
+    remedy = "remove [solver] integrator, or choose an implicit one"
+    name = "steps limited by stability"
+    return Check(name, f"{100.0 * fraction:.2g} %", limit, chosen or fraction < STIFF, remedy)
+
+
+def _condition(run: xr.Dataset) -> list[Check]:
+    if "condition" not in run:
+        return []
+    worst = int(np.argmax(run["condition"].values))
+    value, time = float(run["condition"][worst]), float(run["time"][worst])
+    text = f"condition number {value:.2g} at t = {time:.4g} s"
+    return [
+        Check("distance from singular poses", text, f"{CONDITION:.0e}", value < CONDITION, "pass the pose at speed")
+    ]
+
+
+def _predictable(run: xr.Dataset, members: float | None) -> list[Check]:
+    if "horizon" not in run:
+        return []
+    end = float(run["time"][-1])
+    horizon = min(float(run["horizon"]), end if members is None else members)
+    return [
+        Check(
+            "predictability",
+            f"up to t = {horizon:.4g} s",
+            f"{end:.4g} s, the end",
+            horizon >= end,
+            "beyond it, means over members: [ensemble]",
+        )
+    ]
+
+
+def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -> str:
+    """Return the result of all checks in words.  members: as in `checks`."""
+    bad = [check for check in result if not check.good and check.name != "predictability"]
+    disagreeing = [check for check in bad if check.name.startswith("agreement")]
+    bad = [check for check in bad if check not in disagreeing[1:]]  # one is enough in words, the table has the others
+    text = (
+        f"Yes: all {len(result)} checks hold."
+        if all(check.good for check in result)
+        else "The integration is stable: all its checks hold."
+        if not bad
+        else "Not in all checks: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
+    )
+    if "horizon" in run:
+        text += " " + sentence(float(run["horizon"]), float(run["time"][-1]), members)
+    return text
+
+
+def figure(run: xr.Dataset) -> dict[str, bytes]:
+    """Draw ``stability.png`` and ``.svg``: errors of energy and loops over time, with limits, and the separation."""
+    panels = [("energy error", "fraction of the largest energy", run["time"].values, lost_energy(run), ENERGY)]
+    drift = _drift(run)
+    if drift is not None and drift.max(initial=0.0) > ROUNDING:
+        panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, drift, LOOPS))
+    if "separation" in run:
+        times, values = run["separation_time"].values, run["separation"].values
+        panels.append(("distance of a perturbed run", "fraction of each motion", times, values, SEPARATED))
+    with style.style():
+        figure, axes = style.grid(1, len(panels), (3.6 * len(panels), 2.9))
+        for axis, (title, label, time, values, limit) in zip(axes.ravel(), panels, strict=True):
+            shown = np.where(values > 0.0, values, np.nan)
+            axis.plot(1e3 * time, shown, color="#0072B2", lw=1.0)
+            axis.axhline(limit, color="#D55E00", lw=1.2, label="limit")
+            axis.set(yscale="log", title=title, xlabel="time (ms)", ylabel=label)
+            low = float(np.nanmin(shown)) if np.isfinite(shown).any() else limit * 1e-3
+            axis.set_ylim(max(low, 1e-18) * 0.5, None)
+        axes.ravel()[0].legend(fontsize=8)
+        return style.files("stability", figure)

@@ -1,0 +1,365 @@
+"""Cost of accuracy in words: a paragraph on one scene, and a page with advice on several scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from flexclear.post.cost.causes import CAUSES, dominant
+from flexclear.post.cost.study import methods, recording, resolved
+from flexclear.post.cost.work_precision import LOOKS
+from flexclear.post.overview.curves import size_of
+from flexclear.post.plotting import style
+from flexclear.post.plotting.table import Table
+
+#: a setting as accurate as the scene's own is named where it costs less than this fraction
+CHEAPER = 0.7
+
+
+def sentences(study: xr.Dataset) -> str:
+    """Return the answer in words; study: of `stages.cost_study`."""
+    return " ".join(filter(None, (_own(study), _digit(study), _looser(study), _cause(study), *undone(study))))
+
+
+def _worst(study: xr.Dataset) -> tuple[str, float]:
+    """Return quantity and size that the largest error refers to, in words, and that error."""
+    errors = study["own_error"].values
+    k = int(np.argmax(errors))
+    return f"{size_of(str(study['unit'].values[k]))} of {study['quantity'].values[k]}", float(errors[k])
+
+
+def _own(study: xr.Dataset) -> str:
+    of, error = _worst(study)
+    setting = (
+        f"rtol {study.attrs['own_rtol']:g}" if "own_rtol" in study.attrs else f"steps of {study.attrs['own_step']:g} s"
+    )
+    took = (
+        f"With {study.attrs['own_integrator']} at {setting} the integration takes {study.attrs['own_seconds']:.2g} s "
+        f"of processor time ({study.attrs['own_evaluations']:.0f} evaluations)."
+    )
+    horizon = study.attrs["horizon"]
+    whole = horizon == "none" or horizon >= study.attrs["end"]
+    until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
+    if not np.isfinite(error):
+        return f"{took} Its error is unknown: other runs{until} have another number of impacts."
+    return f"{took} Its largest error at the outputs{until} is {error:.1e} of the {of}."
+
+
+def _digit(study: xr.Dataset) -> str:
+    """Return a sentence on the cost of one more digit."""
+    _, error = _worst(study)
+    better = cheapest(study, 0.1 * error) if np.isfinite(error) else None
+    if better is None:
+        return "One more digit was not reached within the budget." if np.isfinite(error) else ""
+    return f"One more digit costs {better.seconds / study.attrs['own_seconds']:.2g} times as much ({better.name})."
+
+
+def _looser(study: xr.Dataset) -> str:
+    """Return a sentence on a setting that is as accurate for less, or nothing."""
+    _, error = _worst(study)
+    same = cheapest(study, error) if np.isfinite(error) else None
+    if same is None or same.seconds > CHEAPER * study.attrs["own_seconds"]:
+        return ""
+    return f"{same.name} is as accurate for {same.seconds / study.attrs['own_seconds']:.2g} times the cost."
+
+
+def _cause(study: xr.Dataset) -> str:
+    """Return a sentence on the largest known cause of error, by the largest error of any quantity."""
+    if "error_by_cause" not in study:
+        return ""
+    largest = study["error_by_cause"].max("quantity")
+    known = {str(c): float(v) for c, v in zip(study["cause"].values, largest.values, strict=True) if not np.isnan(v)}
+    if not known:
+        return ""
+    first = max(known, key=lambda cause: known[cause])
+    others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first and value > 0.0)
+    size = f"{known[first]:.0e} of a quantity's size" if np.isfinite(known[first]) else "other impacts"
+    rest = f"; {others}" if others else ""
+    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
+    unseen = f" Not examined: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
+    helps = ", which the root finder bounds" if first == "event location" else f"; remedy: {CAUSES[first]}"
+    return f"The largest cause of error is {first} ({size}{rest}){helps}.{unseen}"
+
+
+def undone(study: xr.Dataset) -> list[str]:
+    """Return a sentence for each reason why runs were skipped."""
+    reasons = {
+        "undone": "Not run within the budget",
+        "given_up": "Not run, since their method reached the limit of evaluations at the same or a looser tolerance",
+    }
+    return [f"{text}: {study.attrs[name]}." for name, text in reasons.items() if study.attrs.get(name)]
+
+
+def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
+    """Draw ``<name>.png`` and ``.svg``: largest error of any quantity against processor time; a star: this scene."""
+    by_method: dict[str, list[Choice]] = {}
+    for choice in choices(study):
+        by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
+    with style.style():
+        made, axes = style.grid(1, 1, (6.4, 3.6))
+        panel = axes[0, 0]
+        for method, result in by_method.items():
+            shown = sorted((c.seconds, c.error) for c in result if np.isfinite(c.error) and c.error > 0.0)
+            color, mark = LOOKS.get(method, ("#6b6b6b", "x"))
+            panel.plot(*np.array(shown).reshape(-1, 2).T, mark, color=color, ls="-", lw=1.0, ms=5, label=method)
+        _, error = _worst(study)
+        if np.isfinite(error):
+            panel.plot(study.attrs["own_seconds"], error, "*", color="#222222", ms=13, label="this scene", zorder=5)
+        uncertain = float(study["reference_uncertainty"].max())
+        if np.isfinite(uncertain) and uncertain > 0.0:
+            panel.axhline(uncertain, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
+        panel.set(xscale="log", yscale=style.scale_of(panel), xlabel="processor time of the integration (s)")
+        panel.set_ylabel("largest relative error")
+        style.plain(panel.xaxis)
+        panel.legend(fontsize=8)
+        style.heading(made, title)
+        return style.files(name, made)
+
+
+INTRODUCTION = """# What accuracy costs
+
+Made from the datasets `results/cost/<scene>/cost.nc` by
+
+    flexclear cost {scenes} \\
+        --page {page}
+
+Nothing on this page is typed in. Errors are the largest differences from a reference
+run over the whole run, or up to the horizon beyond which the motion of the scene cannot be predicted point by point;
+each is a fraction of the quantity's own size. Times are processor seconds of the integration of warm runs,
+without their record, on one core of the machine that made the page: their ratios carry over to others, their values do
+not.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Studied:
+    """Section of the page on a scene: `advice`, tables (Markdown), pictures by title, relative to the page."""
+
+    scene: str
+    advice: str
+    tables: tuple[str, ...]
+    pictures: Mapping[str, str]
+
+
+def markdown(scenes: tuple[Studied, ...], page: str) -> str:
+    """Return the whole page."""
+    names = " ".join(s.scene for s in scenes)
+    return "\n".join([INTRODUCTION.format(scenes=names, page=page), sections(scenes)])
+
+
+def sections(scenes: tuple[Studied, ...]) -> str:
+    """Return the advice on each scene, and then each scene's pictures and tables."""
+    parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
+    for s in scenes:
+        parts.append(f"\n## {s.scene}\n")
+        parts += [f"![{title} of {s.scene}]({path})\n" for title, path in s.pictures.items()]
+        parts += [table.rstrip() + "\n" for table in s.tables]
+    return "\n".join(parts)
+
+
+def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
+    """Return one paragraph: cheapest way to each accuracy, cost of a digit, horizon, and limits of the scene."""
+    choices = {target: cheapest(study, target) for target in TARGETS}
+    met = {target: choice for target, choice in choices.items() if choice is not None}
+    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in met.items())
+    parts = [f"{text}." if met else "No requested accuracy can be reached for all quantities; see the tables below."]
+    if met:
+        parts += [_digits(met)]
+    parts += [_some(study, target) for target in TARGETS if target not in met]
+    parts += [_horizon(study, tables), _limits(study)]
+    return " ".join(filter(None, parts))
+
+
+def _some(study: xr.Dataset, target: float) -> str:
+    """Return a sentence on the quantities that reach an accuracy which not all reach."""
+    names = [str(name) for name in study["quantity"].values]
+    able = [name for name in names if cheapest(study.sel(quantity=[name]), target) is not None]
+    unable = ", ".join(name for name in names if name not in able)
+    return (
+        f"{target:g} is possible for {', '.join(able)}, not for {unable}." if able else f"{target:g} is not possible."
+    )
+
+
+def _digits(met: Mapping[float, Choice]) -> str:
+    loose, tight = met[max(met)], met[min(met)]
+    digits = np.log10(max(met) / min(met))
+    if not digits > 0.0 or tight.seconds <= loose.seconds:
+        return ""
+    return f"Each further digit multiplies the time by {(tight.seconds / loose.seconds) ** (1.0 / digits):.2f}."
+
+
+def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
+    """Return advice for a run that cannot be predicted to its end."""
+    horizon, end = study.attrs["horizon"], study.attrs["end"]
+    if horizon == "none" or horizon >= end:
+        return ""
+    beyond = "the means of an ensemble (below), which more members improve and tighter tolerances do not"
+    if not any("Beyond the horizon" in table for table in tables):
+        beyond = "an ensemble, which the scene can request (`[ensemble]`)"
+    return f"All this holds up to t = {horizon:.3g} s of {end:.3g} s; beyond that use only {beyond}."
+
+
+def _limits(study: xr.Dataset) -> str:
+    """Return advice on refinement of the scene: the dominant causes, each with its quantities."""
+    if "error_by_cause" not in study:
+        return ""
+    by_cause: dict[str, list[str]] = {}
+    for name in study["quantity"].values:
+        cause = dominant(
+            dict(zip(study["cause"].values, study["error_by_cause"].sel(quantity=name).values, strict=True))
+        )
+        by_cause.setdefault(cause, []).append(str(name))
+    parts = [f"{CAUSES[c]} ({c} limits {', '.join(q)})" for c, q in by_cause.items() if c in CAUSES]
+    return f"To refine the scene as it is: {'; '.join(parts)}." if parts else ""
+
+
+TARGETS = (1e-3, 1e-6, 1e-9)
+#: a best error within this multiple of the reference's uncertainty, which it contains, is rounding
+ROUNDED = 3.0
+COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
+
+
+def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Table:
+    """Tabulate settings, cost and error for 1e-3, 1e-6 and 1e-9, by the worst of all quantities.
+
+    notes: further notes of the table.
+    """
+    rows = []
+    for target in TARGETS:
+        choice = cheapest(study, target)
+        if choice is None:
+            best = min(choices(study), key=lambda c: c.error, default=NOTHING)
+            rows.append((f"{target:g}", _absent(study), "–", "–", f"{best.error:.1e} at best", best.worst))
+        else:
+            seconds = f"{choice.seconds:.3f}"
+            rows.append(
+                (f"{target:g}", choice.name, f"{choice.evaluations:.0f}", seconds, f"{choice.error:.1e}", choice.worst)
+            )
+    return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
+
+
+def by_quantity(study: xr.Dataset, title: str) -> Table:
+    """Tabulate settings and costs for the same accuracies for each quantity by itself."""
+    rows = []
+    for name in study["quantity"].values:
+        one = study.sel(quantity=[name])
+        best = min(choices(one), key=lambda c: c.error, default=NOTHING)
+        best_for = [cheapest(one, target) for target in TARGETS]
+        cells = (f"{c.name} ({c.seconds:.2g} s)" if c is not None else _absent(study) for c in best_for)
+        rows.append((str(name), *cells, f"{best.error:.1e}"))
+    heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
+    return Table(title, heads, tuple(rows), ("In brackets: processor time of the integration of one run.",))
+
+
+def _absent(study: xr.Dataset) -> str:
+    """Return the words for an accuracy that no run of a study has."""
+    return "cannot be reached" if study.attrs.get("complete", 1) else "not reached yet"
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One way to integrate: its name, cost, largest relative error and the quantity that has it.
+
+    error: distance from the reference plus the reference's uncertainty: never below what can be determined.
+    """
+
+    name: str
+    evaluations: float
+    seconds: float
+    error: float
+    worst: str
+
+
+#: times within this factor are alike: times of repeated runs differ by some per cent
+AS_FAST = 1.1
+#: substitute where no run of a study can be compared
+NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
+
+
+def cheapest(study: xr.Dataset, target: float) -> Choice | None:
+    """Return the choice with the least processor time whose largest error is at most `target`; None without one.
+
+    Among choices with nearly the same time (AS_FAST) the one with the fewest evaluations is returned.
+    """
+    good = [choice for choice in choices(study) if choice.error <= target]
+    least = min((choice.seconds for choice in good), default=np.nan)
+    fast = [choice for choice in good if not choice.seconds > AS_FAST * least]
+    return min(fast, key=lambda choice: choice.evaluations, default=None)
+
+
+def choices(study: xr.Dataset) -> list[Choice]:
+    """Return all ways to integrate whose error is known."""
+    choices = []
+    uncertain = study["reference_uncertainty"].fillna(0.0)
+    for group, method, setting, mine in methods(study):
+        for s in study[setting].values:
+            one = mine.sel({setting: s})
+            error = one[f"error_by_{group}"] + uncertain
+            if not np.isfinite(error).all():
+                continue
+            worst = str(study["quantity"].values[int(np.argmax(error.values))])
+            evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
+            unit = " s" if setting == "step" else ""
+            choices.append(Choice(f"{method}, {setting} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
+    return choices
+
+
+def _notes(study: xr.Dataset) -> list[str]:
+    recorded = recording(study)
+    notes = [
+        "The error is the largest of all quantities: "
+        + ", ".join(str(q) for q in study["quantity"].values)
+        + "; each as a fraction of its own size (of positions and angles the largest change from the start, of others "
+        "the largest value), the reference's uncertainty included.",
+        _confirmed(study),
+    ]
+    if recorded == recorded:
+        notes.append(
+            f"CPU is that of the integration; the record of a run takes {recorded:.2g} s more with every integrator."
+        )
+    missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
+    if missing:
+        notes.append(f"{' and '.join(missing)} {_absent(study)}: {_why_not(study)}.")
+    hidden = sum(int((~resolved(one, g) & np.isfinite(one[f"error_by_{g}"])).sum()) for g, _, _, one in methods(study))
+    if hidden:
+        notes.append(
+            f"{hidden} errors are less than 10 times the reference's own uncertainty and are not drawn; "
+            "the figure shows that bound."
+        )
+    if study.attrs["horizon"] != "none":
+        notes.append(f"Pointwise errors count up to the predictability horizon, t = {study.attrs['horizon']:.4g} s.")
+    if study.attrs["refused"]:
+        notes.append(f"Refused: {study.attrs['refused']}.")
+    return notes
+
+
+def _confirmed(study: xr.Dataset) -> str:
+    uncertain, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
+    reference = f"Reference: {study.attrs['reference']}. "
+    if not by:
+        return f"{reference}Not confirmed: there is no second run."
+    if np.isnan(uncertain).any():
+        return f"{reference}Not confirmed: {by} was refused."
+    if np.isinf(uncertain).any():
+        return f"{reference}Not confirmed: {by} has another number of impacts."
+    worst = str(study["quantity"].values[int(np.argmax(uncertain))])
+    return f"{reference}Confirmed by {by}, which differs by at most {uncertain.max():.1e} ({worst})."
+
+
+def _why_not(study: xr.Dataset) -> str:
+    """Return why an accuracy cannot be had: the tried settings end too early, or rounding decides."""
+    uncertain = study["reference_uncertainty"].fillna(0.0)
+    best = min(choices(study), key=lambda c: c.error, default=NOTHING)
+    if np.isinf(uncertain).any():
+        return "the reference and its confirmation do not agree on the number of impacts"
+    if best is NOTHING:
+        return "every run is refused, or has another number of impacts than the reference"
+    if best.error <= ROUNDED * float(uncertain.sel(quantity=best.worst)):
+        agree = f"the reference and its confirmation, the tightest runs, differ as much ({best.worst})"
+        if not study.attrs.get("complete", 1):
+            return f"{agree}; a larger budget allows tighter ones"
+        return f"{agree}; rounding errors, which the motion magnifies, limit the accuracy of every method"
+    return f"the best setting tested reaches {best.error:.1e} ({best.worst})"

@@ -1,0 +1,378 @@
+"""A run as moving solids: its bodies, joints and rods, and their poses at one output."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.post.render import forms, surfaces
+from flexclear.post.render.forms import Seat, Solid, Wheel, equivalent, wheels
+from flexclear.post.render.surfaces import Surface
+from flexclear.post.render.view import View, view
+from flexclear.post.shapes import body_shape
+from flexclear.post.shapes.body_shape import faces, scale_to, surface
+from flexclear.post.single_run.series import parameters
+from flexclear.scene.fields import Pose
+from flexclear.system.errors import InputError
+
+#: one colour per kind of body: bodies of equal mass and inertia look alike
+COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")
+JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf", "#E69F00", "#d7191c"
+GROUND_COLOR = "#8d98a4"
+#: fractions of the mechanism's size: joint spheres without a known ball radius, radius of pins, thickness of rails
+BALL, PIN, RAIL = 0.022, 0.011, 0.008
+#: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
+SOCKET = 1.3
+#: size of a mechanism without extent: one body that rests [m]
+LONE = 1.0
+#: outputs at which the program measures the extent of a mechanism
+SAMPLES = 24
+_CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
+#: largest drawn deformation as a fraction of the body's length
+DEFORMATION_SHARE = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A solid that moves with a body.
+
+    surface: about the body's centre of mass, or about the origin of `frame`, in the body's axes; for the ground in the
+    world.  contact: its column among the contacts, where it shows a joint with clearance.
+    """
+
+    owner: int | None  #: index of the body in the run; None for the ground
+    surface: Surface
+    color: str
+    opacity: float = 1.0
+    frame: int | None = None
+    contact: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Flexible:
+    """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration, colour.
+
+    stressed: True when its colours show von Mises stress instead of displacement.
+    """
+
+    index: int
+    bundle: xr.Dataset
+    columns: np.ndarray
+    scale: float
+    color: str | None = None
+    stressed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """Settings of a scene for its pictures.
+
+    bodies: `geometry` and `color` by body.  folder: base of relative paths of shape files.  The rest as of `[view]`.
+    """
+
+    bodies: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    folder: Path = Path(".")
+    direction: Sequence[float] | None = None
+    up: Sequence[float] | None = None
+    zoom: float = 1.0
+    exaggeration: float | None = None
+    duration: float | None = None
+    impact_slowdown: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mechanism:
+    """The drawn mechanism of one run."""
+
+    run: xr.Dataset
+    parts: tuple[Part, ...]
+    flexible: tuple[Flexible, ...]
+    view: View
+    size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
+    cloud: np.ndarray  #: points that span everything drawn over the run, world axes [m], shape (n, 3)
+    looks: Looks
+    stress: float | None = None  #: stress at the upper end of the colours [Pa], where they show stress
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Poses of the bodies and frames of a run. given: parameters of its scene.  bundles: by name of the body."""
+
+    run: xr.Dataset
+    given: Mapping[str, Any]
+    bundles: Mapping[str, xr.Dataset]
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the moving bodies."""
+        return _names(self.run, "body")
+
+    @property
+    def frames(self) -> list[str]:
+        """Names of the frames whose positions are recorded."""
+        return _names(self.run, "frame")
+
+    def owner(self, frame: str) -> int | None:
+        """Return the index of the body that has a frame; None for the ground."""
+        body = frame.partition(".")[0]
+        return self.bodies.index(body) if body in self.bodies else None
+
+    def local(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return origin [m] and axes (columns) of a frame in those of its body."""
+        body, _, name = frame.partition(".")
+        if body in self.bundles:
+            data = self.bundles[body].sel(frame=name)
+            return data["frame_position"].values, data["frame_rotation"].values
+        pose = Pose.model_validate(self.given.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
+        return np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())
+
+    def at_start(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return origin [m] and axes of a frame, in the world, at the first output."""
+        (origin, axes), owner = self.local(frame), self.owner(frame)
+        if owner is None:
+            return origin, axes
+        matrix = pose(self.run, owner, 0)
+        recorded = frame in self.frames
+        where = self.run.frame_position.values[0, self.frames.index(frame)] if recorded else matrix[:3, 3]
+        return where, matrix[:3, :3] @ axes
+
+    def centre(self, body: str) -> np.ndarray:
+        """Return the centre of mass of a moving body at rest, in its axes [m]."""
+        if body in self.bundles:
+            return centre_at_rest(self.bundles[body])
+        return np.array(self.given["body"][body].get("com", (0.0, 0.0, 0.0)))
+
+    def seated(self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
+        """Return a part at a frame, given in the frame's axes."""
+        (origin, axes), owner = self.local(frame), self.owner(frame)
+        if owner is None:
+            return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
+        if frame in self.frames:
+            number = self.frames.index(frame)
+            return Part(owner, surfaces.moved(part, np.zeros(3), axes), color, opacity, number, contact)
+        origin = origin - self.centre(frame.partition(".")[0])
+        return Part(owner, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
+
+
+def mechanism(
+    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None, *, stressed: bool = False
+) -> Mechanism:
+    """Return the drawn mechanism of a run; bundles by name of the flexible body.
+
+    stressed: True colours flexible bodies by von Mises stress.  InputError for a run that records none.
+    """
+    looks, at = looks or Looks(), Layout(run, parameters(run), bundles)
+    if stressed and not body_shape.stress_recorded(run):
+        problem = "the run records no von Mises stress"
+        raise InputError(
+            "--what stress", problem, 'request it: [output] stress = ["BODY"], a rod of known section or a solid'
+        )
+    flexible = tuple(
+        _flexible(run, name, bundle, looks, stressed=stressed) for name, bundle in bundles.items() if name in at.bodies
+    )
+    positions = run.frame_position.values if at.frames else run.position.values
+    shown = np.concatenate([positions.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
+    size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
+    parts = (*_bodies(at, looks, size), *_joints(at, size))
+    chosen_view = view(run, at.given, looks.direction, looks.up)
+    top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
+    return Mechanism(run, parts, flexible, chosen_view, size, _cloud(run, parts, flexible), looks, top)
+
+
+def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
+    """Return corners of the boxes of all parts, and points of flexible bodies, at some outputs of the run."""
+    clouds = []
+    for step in np.unique(np.linspace(0, run.sizes["time"] - 1, SAMPLES).astype(int)):
+        for part in parts:
+            low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
+            corners = np.where(_CORNERS, high, low)
+            matrix = part_pose(run, part, int(step))
+            clouds.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
+        clouds += [placed(run, body, int(step))[0][::7] for body in flexible]
+    return np.concatenate(clouds) if clouds else run.position.values[0]
+
+
+def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
+    """Return the homogeneous matrix of a body, from axes through its centre of mass to the world."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = quaternion_to_matrix(run.quaternion.values[step, index])
+    matrix[:3, 3] = run.position.values[step, index]
+    return matrix
+
+
+def part_pose(run: xr.Dataset, part: Part, step: int) -> np.ndarray:
+    """Return the homogeneous matrix from the axes of a part's surface to the world."""
+    matrix = np.eye(4) if part.owner is None else pose(run, part.owner, step)
+    if part.frame is not None:
+        matrix[:3, 3] = run.frame_position.values[step, part.frame]
+    return matrix
+
+
+def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return world points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
+    q = run.modal_coordinate.values[step, body.columns]
+    points, size = surface(body.bundle, q, body.scale)
+    matrix = pose(run, body.index, step)
+    moment = body.bundle.first_moment.values + body.bundle.modal_first_moment.values @ q
+    return (points - moment / float(body.bundle.mass)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
+
+
+def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
+    """Return the coloured values at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
+    if body.stressed:
+        return body_shape.stress_on_surface(run, body.bundle, _names(run, "body")[body.index], step)
+    return placed(run, body, step)[1]
+
+
+def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surface:
+    """Return the surface of a flexible body through points as of `placed` or `rest`; empty for bare nodes.
+
+    Unless `sharp`, points keep their number, so that fields fit; edges of solids are then shaded softly.
+    """
+    return surfaces.shaded(points, surfaces.triangulated(faces(bundle)), sharp=sharp)
+
+
+def centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
+    """Return the centre of mass in the bundle's axes [m]; it is the run's position, unlike the bundle's origin."""
+    moment: np.ndarray = bundle.first_moment.values
+    return moment / float(bundle.mass)
+
+
+def rest(bundle: xr.Dataset) -> np.ndarray:
+    """Return points of the skin of an undeformed body, its centre of mass at the origin [m], shape (point, 3)."""
+    return surface(bundle, np.zeros(bundle.sizes["mode"]))[0] - centre_at_rest(bundle)
+
+
+def _names(run: xr.Dataset, dim: str) -> list[str]:
+    """Return the names along a dimension; none where the run lacks the dimension."""
+    return [str(name) for name in run[dim].values] if dim in run.coords else []
+
+
+def _seats(at: Layout) -> dict[str, list[Seat]]:
+    """Return the joints' frames on each body."""
+    by_body: dict[str, list[Seat]] = {}
+    for joint in at.given.get("joint", {}).values():
+        for k, frame in enumerate(joint["between"]):
+            seat = Seat(frame, *at.local(frame), joint["type"], k == 0)
+            by_body.setdefault(frame.partition(".")[0], []).append(seat)
+    return by_body
+
+
+def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
+    """Yield rigid bodies and the ground, as their scene draws them or as links between their joints."""
+    kinds: dict[tuple[Any, ...], str] = {}
+    seats, geared = _seats(at), wheels(at.given, at.at_start)
+    for name, body in at.given.get("body", {}).items():
+        look = looks.bodies.get(name, {})
+        own = None if "geometry" not in look else forms.shapes(look["geometry"], looks.folder)
+        owner = at.owner(name)
+        if owner is None:
+            if own is not None:
+                yield Part(None, own, look.get("color", GROUND_COLOR))
+        elif name in at.bundles:
+            if own is not None:  # shapes fixed to the deformed mesh
+                yield Part(owner, surfaces.moved(own, -at.centre(name)), look.get("color", COLORS[0]))
+        elif "inertia" in body:
+            com, inertia = at.centre(name), np.array(body["inertia"])
+            key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
+            color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
+            solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
+            drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
+            if len(drawn.points):
+                yield Part(owner, surfaces.moved(drawn, -com), color)
+
+
+def _with_wheels(
+    geared: Sequence[Wheel], seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int
+) -> Surface:
+    """Return a body between its joints, with the wheels of its gears."""
+    discs = [
+        forms.wheel_of_gear(
+            next(seat for seat in seats if seat.frame == wheel.frame), wheel.radius, size, inner=wheel.inner
+        )
+        for wheel in geared
+    ]
+    if discs and all(np.linalg.norm(seat.origin - seats[0].origin) < 1e-9 for seat in seats):
+        return surfaces.merged(discs)  # the body is the wheel
+    return surfaces.merged([*discs, forms.link(seats, com, solid, size, layer)])
+
+
+def _joints(at: Layout, size: float) -> Iterator[Part]:
+    """Yield balls, pins, rails, crosses and planes of the joints."""
+    contacts = _names(at.run, "contact")
+    for name, joint in at.given.get("joint", {}).items():
+        kind, (first, second) = joint["type"], joint["between"]
+        contact = contacts.index(name) if name in contacts else None
+        color = JOINT_COLOR if contact is None else CLEARANCE_COLOR
+        grounded = at.owner(first) is None
+        if kind in forms.BALLS:
+            radius = float(joint.get("ball_radius", BALL * size))
+            yield at.seated(second, surfaces.sphere(radius), color, contact)
+            if kind == "ball-on-plane":
+                yield at.seated(first, _floor(at, joint, size), GROUND_COLOR)
+            else:
+                yield at.seated(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
+        elif "revolute" in kind or kind == "clearance-slot":
+            radius = float(joint.get("pin_radius", PIN * size))
+            long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # the links would hide shorter ones
+            yield at.seated(second, surfaces.cylinder(radius, long), color, contact)
+            if kind == "clearance-slot":
+                half = np.array([[-0.5 * joint["travel"], 0.0], [0.5 * joint["travel"], 0.0]])
+                rim = surfaces.prism(surfaces.hull(half, SOCKET * radius), 0.5 * long)
+                yield at.seated(first, rim, SOCKET_COLOR, opacity=0.5)
+            elif kind == "clearance-revolute":
+                yield at.seated(first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, opacity=0.35)
+            elif grounded:
+                yield at.seated(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
+        elif kind in forms.SLIDING:
+            low, high = _travel(at.run, name)
+            rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
+            middle = np.array([0.0, 0.0, 0.5 * (low + high)])
+            yield at.seated(first, surfaces.moved(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
+        elif kind == "universal":
+            for frame, axis in ((first, np.eye(3)[0]), (second, np.eye(3)[1])):
+                arm = surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size)
+                yield at.seated(frame, surfaces.moved(arm, np.zeros(3), surfaces.along(axis)), color)
+        elif kind == "planar":
+            yield at.seated(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
+
+
+def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
+    """Return an unlimited plane as far as its ball goes; around the frame's origin where the plane itself moves."""
+    first, second = joint["between"]
+    low = high = np.zeros(2)
+    reach = 0.25 * size
+    if at.owner(first) is None and second in at.frames:
+        origin, axes = at.local(first)
+        path = (at.run.frame_position.values[:, at.frames.index(second)] - origin) @ axes
+        low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
+        reach = 2.5 * float(joint["ball_radius"])
+    plane = surfaces.box((*(high - low + 2.0 * reach), 0.004 * size))
+    return surfaces.moved(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
+
+
+def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
+    """Return least and largest displacement along a joint's axis [m], that of the assembled start included."""
+    for name in (joint, f"{joint}.translation"):
+        if "coordinate" in run.coords and name in run.coordinate.values:
+            values = run.joint_position.sel(coordinate=name).values
+            return min(0.0, float(values.min())), max(0.0, float(values.max()))
+    return 0.0, 0.0
+
+
+def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
+    columns = np.flatnonzero(run.mode_body.values == name)
+    q = run.modal_coordinate.values[:, columns]
+    largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
+    scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    color = looks.bodies.get(name, {}).get("color")
+    shown = stressed and name in body_shape.stress_recorded(run)
+    if stressed:  # grey does not look like a stress
+        color = None if shown else GROUND_COLOR
+    return Flexible(_names(run, "body").index(name), bundle, columns, scale, color, shown)

@@ -1,0 +1,161 @@
+"""Verdict on a scene's sections: periodic, quasi-periodic or chaotic, with its evidence (schema VERDICT).
+
+One rule for all:
+
+- *periodic* when the states return, and the largest exponent is not positive;
+- *chaotic* when the whole confidence interval of the largest exponent is above the apparent exponent of neutral
+  freedoms, and the 0-1 test agrees;
+- *quasi-periodic* when the exponent may be zero, the 0-1 test gives regular, and a few lines hold the spectrum;
+- *undecided* otherwise.
+
+A neutral freedom, on which nothing depends, such as the spin of a leg with balls at both ends, lets perturbed runs
+diverge in proportion to time: after n periods its apparent exponent is ln(n) / n per period, and no smaller exponent
+can be determined.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from flexclear.artifacts.schema import Schema, conform
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.post.sections import chaos
+from flexclear.scene.output import table
+
+Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
+#: K of the 0-1 test below which a motion is regular, and above which chaotic; in between a finite series cannot tell
+REGULAR, CHAOTIC = 0.2, 0.8
+#: fraction of the variance that few lines hold in the spectrum of a motion with few frequencies
+DISCRETE = 0.95
+#: number of states below which the 0-1 test and the spectrum show nothing
+ENOUGH = 200
+
+VERDICT: Schema = table("""
+exponent | | s-1 | largest Lyapunov exponent
+exponent_low | | s-1 | lower end of its 95 % confidence interval
+exponent_high | | s-1 | upper end of its 95 % confidence interval
+least_exponent | | s-1 | exponent that so many periods cannot distinguish from zero
+zero_one? | | 1 | K of the 0-1 test, of the component that decides least for regular motion
+returns_after | | 1 | periods after which the states return; 0 where they do not
+return_distance | | 1 | largest distance of a return, as a fraction of the motion's size
+contraction? | | 1 | factor per period by which successive returns come closer
+few_lines? | | 1 | fraction of the variance in the sixteen largest lines of the spectrum
+principal | section component | 1 | states along their directions of largest variance
+power | frequency component | 1 | fraction of the variance at each frequency
+impact_correlation? | lag contact | 1 | correlation of the first impact's phase with that of later periods
+""")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Kind of a motion, and reasons in words.
+
+    numbers: as in the schema VERDICT.  principal: states along their directions of largest variance, (n, components).
+    """
+
+    kind: Kind
+    reasons: tuple[str, ...]
+    numbers: dict[str, float]
+    principal: np.ndarray
+
+
+def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) -> Verdict:
+    """Judge states at equal phases, shape (n, d), and logarithms of a perturbed run's growth per period, (k,).
+
+    period [s].  size: of the whole motion, in the units of the states.
+    """
+    rate = chaos.exponent(growth, period)
+    least = float(np.log(len(growth)) / len(growth) / period)
+    after, distance = chaos.period_of(states, size)
+    shown = chaos.principal(states)
+    K = np.array([chaos.zero_one(component) for component in shown.T])
+    lines = np.array([chaos.few_lines(component) for component in shown.T])
+    zero_one = float(np.nanmax(K)) if np.isfinite(K).any() else float("nan")
+    discrete = float(lines.min())
+    kind, reasons = _rule(rate, least, after, distance, zero_one, discrete)
+    if len(states) < ENOUGH and kind != "periodic":
+        kind, reasons = "undecided", (f"{len(states)} sections are too few, {ENOUGH} are needed", *reasons)
+    numbers = {
+        "exponent": rate.mean,
+        "exponent_low": rate.low,
+        "exponent_high": rate.high,
+        "least_exponent": least,
+        "zero_one": zero_one,
+        "returns_after": after,
+        "return_distance": distance,
+        "contraction": chaos.contraction(states, after or 1),
+        "few_lines": discrete,
+    }
+    return Verdict(kind, reasons, numbers, shown)
+
+
+def _rule(
+    rate: chaos.Interval, least: float, after: int, distance: float, K: float, discrete: float
+) -> tuple[Kind, tuple[str, ...]]:
+    text = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"
+    grows, still = rate.low > least, rate.low <= least
+    if after and still:
+        times = "one period" if after == 1 else f"{after} periods"
+        return "periodic", (f"the states return after {times}, to {distance:.2g} of the motion", text)
+    tested = f"0-1 test K = {K:.2f}"
+    if grows and K > CHAOTIC:
+        return "chaotic", (f"{text}, above the {least:.2g} of freedoms without influence", tested)
+    lined = f"{100 * discrete:.0f} % of the variance in {chaos.LINES} lines of the spectrum"
+    if still and K < REGULAR and discrete > DISCRETE and not after:
+        return "quasi-periodic", (text, tested, lined)
+    back = f"the states return to {distance:.2g} of the motion at best"
+    return "undecided", (text, tested, lined, back)
+
+
+def derive(sections: xr.Dataset) -> xr.Dataset:
+    """Return verdict and evidence (schema VERDICT) of a scene's sections (schema SECTIONS)."""
+    states, size = features(sections)
+    period = float(sections.attrs["period"])
+    verdict = judge(states, sections.growth.values, period, size)
+    shown = verdict.principal
+    lines = [chaos.spectrum(component) for component in shown.T]
+    arrays = {name: np.array(value) for name, value in verdict.numbers.items() if np.isfinite(value)}
+    arrays |= {"principal": shown, "power": np.stack([power for _, power in lines], axis=1)}
+    coordinates = {"section": sections.section.values, "frequency": lines[0][0]}
+    if "impact_phase" in sections:
+        impacts = [first_impacts(sections, str(name)) for name in sections.contact.values]
+        correlations = np.stack([chaos.autocorrelation(phase) for phase in impacts], axis=1)
+        arrays["impact_correlation"] = np.nan_to_num(correlations)
+        coordinates |= {"contact": sections.contact.values}
+    attributes = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
+    title = f"Verdict on the {str(sections.attrs.get('title', 'sections')).lower()}"
+    data = {name: (VERDICT[name].dims, values) for name, values in arrays.items()}
+    return conform(xr.Dataset(data, coords=coordinates), VERDICT, title=title, **attributes)
+
+
+def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:
+    """Return states at the sections, each kind of coordinate in units of its change over a period, and their size then.
+
+    Shape (section, ...): positions, rotation matrices (which have no sign to choose), velocities, offsets.
+    """
+    columns = list[np.ndarray]()
+    kinds = {"position": None, "quaternion": quaternion_to_matrix, "velocity": None, "contact_offset": None}
+    for name, form in kinds.items():
+        if name not in sections:
+            continue
+        values, orbit = (sections[which].values for which in (name, f"orbit_{name}"))
+        for k in range(values.shape[1]):
+            here, path = (x[:, k] if form is None else form(x[:, k]).reshape(len(x), 9) for x in (values, orbit))
+            size = float(np.linalg.norm(path - path.mean(axis=0), axis=1).max())
+            if size > chaos.STANDING * max(float(np.abs(path).max()), 1e-300):
+                columns.append(here / size)
+    if not columns:
+        return np.zeros((sections.sizes["section"], 1)), 1.0
+    return np.concatenate(columns, axis=1), float(np.sqrt(len(columns)))
+
+
+def first_impacts(sections: xr.Dataset, contact: str) -> np.ndarray:
+    """Return the phase of the first impact in each period that has one [s]."""
+    mine = sections.impact_contact.values == contact
+    _, first = np.unique(sections.impact_section.values[mine], return_index=True)
+    phases: np.ndarray = sections.impact_phase.values[mine][first]
+    return phases if len(phases) > 1 else np.zeros(2)

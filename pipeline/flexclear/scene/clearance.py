@@ -1,0 +1,336 @@
+"""Contacts in a scene: geometry, materials, normal law, friction law; and the friction of ideal joints.
+
+The friction law 'modified-coulomb' is described in `dynamics.contact.friction.modified_coulomb`.
+"""
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, Union, get_args
+
+from pydantic import Field, create_model, model_validator
+
+from flexclear.scene.fields import Force, FrameName, Length, Mass, Number, Part, Positive, Pressure, Speed
+
+Share = Field(ge=0.0, le=1.0)
+
+
+class Material(Part):
+    """Elastic constants of a contacting surface."""
+
+    youngs_modulus: Annotated[Pressure, Positive]
+    """Young's modulus"""
+    poisson: Annotated[Number, Field(ge=0.0, lt=0.5)]
+    """Poisson's ratio"""
+
+
+class NormalLaw(Part):
+    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii."""
+
+    law: str
+    """name of the law, as docs/contact.md lists them"""
+    restitution: Annotated[Number, Share] | None = None
+    """the law's own parameter c_r; a free impact rebounds with c_r only as well as the law achieves"""
+    delivered_restitution: Annotated[Number, Share] | None = None
+    """coefficient of restitution that a free impact must have; the law's parameter follows from it"""
+    exponent: Annotated[Number, Field(ge=1.0)] | None = None
+    """exponent of the penetration; default 1.5, for linear laws 1"""
+    stiffness: Annotated[Number, Positive] | None = None
+    """K in force = K penetration^exponent; default: from materials and radii"""
+    damping: Annotated[Number, Field(ge=0.0)] | None = None
+    """damping coefficient of linear laws [N s/m]"""
+    effective_mass: Annotated[Mass, Positive] | None = None
+    """mass that rebounds, for linear laws; default: the reduced mass of the two bodies"""
+
+    @model_validator(mode="after")
+    def _one_restitution(self) -> Self:
+        if self.restitution is not None and self.delivered_restitution is not None:
+            raise ValueError(
+                "restitution (the law's parameter) and delivered_restitution (the rebound) are alternatives; give one"
+            )
+        return self
+
+
+class ModifiedCoulomb(Part):
+    """Wang & Wang's modified Coulomb friction, with its four parameters (Table 6)."""
+
+    law: Literal["modified-coulomb"]
+    static: Annotated[Number, Field(ge=0.0)]
+    """largest coefficient of friction"""
+    dynamic: Annotated[Number, Field(ge=0.0)]
+    """coefficient of friction at high speed"""
+    v_static: Annotated[Speed, Positive]
+    """sliding speed at which the coefficient is `static`"""
+    v_dynamic: Annotated[Speed, Positive]
+    """sliding speed from which the coefficient is `dynamic`"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.v_static < self.v_dynamic:
+            raise ValueError(
+                "v_static must be below v_dynamic, as friction falls from static to dynamic between them; "
+                f"v_static = {self.v_static:g} m/s, v_dynamic = {self.v_dynamic:g} m/s"
+            )
+        _not_above(self.dynamic, self.static)
+        return self
+
+
+class Ambrosio(Part):
+    """Ambrosio's Coulomb friction: none below v0, a linear rise to `dynamic` at v1."""
+
+    law: Literal["ambrosio"]
+    dynamic: Annotated[Number, Field(ge=0.0)]
+    """coefficient of friction"""
+    v0: Annotated[Speed, Field(ge=0.0)]
+    """sliding speed up to which friction is zero"""
+    v1: Annotated[Speed, Positive]
+    """sliding speed from which friction has its full value"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.v0 < self.v1:
+            raise ValueError(
+                "v0 must be below v1, as friction rises from zero at v0 to `dynamic` at v1; "
+                f"v0 = {self.v0:g} m/s, v1 = {self.v1:g} m/s"
+            )
+        return self
+
+
+class LuGre(Part):
+    """LuGre friction per unit of normal force."""
+
+    law: Literal["lugre"]
+    static: Annotated[Number, Positive]
+    """coefficient of friction when sliding begins"""
+    dynamic: Annotated[Number, Positive]
+    """coefficient of friction at high speed"""
+    v_stribeck: Annotated[Speed, Positive]
+    """speed over which friction falls from static to dynamic"""
+    bristle_stiffness: Annotated[Number, Positive]
+    """sigma_0 [1/m], over the normal force"""
+    bristle_damping: Annotated[Number, Field(ge=0.0)] = 0.0
+    """sigma_1 [s/m], over the normal force"""
+    viscous: Annotated[Number, Field(ge=0.0)] = 0.0
+    """sigma_2 [s/m], over the normal force"""
+
+    @model_validator(mode="after")
+    def _passive(self) -> Self:
+        _not_above(self.dynamic, self.static)
+        # the damping fades as exp(-(v/v_stribeck)^2); its v-fold is then at most 0.4289 v_stribeck sigma_1, and
+        # the law takes energy only while that stays below 4 mu (Barahanov & Ortega 2000, for constant damping)
+        most = 4.0 * self.dynamic / (0.42888194248035340 * self.v_stribeck)
+        if self.bristle_damping > most:
+            raise ValueError(
+                f"bristle_damping = {self.bristle_damping} s/m would add energy to the "
+                f"sliding; with these coefficients at most {most:.6g} s/m dissipates"
+            )
+        return self
+
+
+Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre, Field(discriminator="law")]
+#: all friction laws
+FRICTIONS: tuple[Any, ...] = get_args(get_args(Friction)[0])
+
+
+def _not_above(dynamic: float, static: float) -> None:
+    if dynamic > static:
+        raise ValueError(
+            "dynamic must not exceed static, as friction does not grow when sliding begins; "
+            f"dynamic = {dynamic:g} exceeds static = {static:g}"
+        )
+
+
+class Wear(Part):
+    """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area)."""
+
+    coefficient: Annotated[Number, Positive]
+    """wear coefficient k [-] of the pair of surfaces"""
+    hardness: Annotated[Pressure, Positive]
+    """hardness of the softer surface"""
+    sectors: Annotated[int, Field(ge=4, le=720)] = 36
+    """number of sectors about their axis into which both surfaces are divided for the map of depths; a ball and its
+    socket also into bands of equal area"""
+
+
+class _Contact(Part):
+    """Keys of all contacts between surfaces."""
+
+    between: tuple[FrameName, FrameName]
+    """frames of the outer and the inner surface, each as body.FRAME"""
+    normal: NormalLaw
+    """law of the normal force"""
+    friction: Friction | None = None
+    """law of friction; default: no friction"""
+    floor: Annotated[Speed, Positive] | None = None
+    """least approach speed used as the impact rate of a closing [m/s]; keeps the law regular for grazing and resting
+    contact. Default: 1e-5 of the size of the mechanism per second, at most 1e-6 m/s"""
+    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
+    """impact rate of a contact that exists at the start, 0 for a resting one; without this key a start in contact is
+    refused"""
+
+    #: names of the outer and the inner surface in keys
+    surfaces: ClassVar[tuple[str, str]]
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> Self:
+        if self.normal.stiffness is None and None in self.materials:
+            names = " and ".join(f"{surface}_material" for surface in self.surfaces)
+            raise ValueError(f"the contact stiffness is unknown: give {names}, or normal.stiffness")
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius of the inner surface [m]."""
+        return float(getattr(self, f"{self.surfaces[1]}_radius"))
+
+    @property
+    def materials(self) -> tuple[Material | None, Material | None]:
+        """Materials of the outer and the inner surface."""
+        outer, inner = (getattr(self, f"{surface}_material") for surface in self.surfaces)
+        return outer, inner
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Further sizes that the kernels of the surfaces need."""
+        return 0.0, 0.0
+
+
+class _Clearance(_Contact):
+    """Keys of all clearance joints."""
+
+    clearance: Annotated[Length, Positive]
+    """half the difference of the diameters"""
+
+
+class ClearanceSpherical(_Clearance):
+    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+
+    surfaces = ("socket", "ball")
+    type: Literal["clearance-spherical"]
+    ball_radius: Annotated[Length, Positive]
+    """radius of the ball"""
+    socket_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    ball_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    wear: Wear | None = None
+    """wear of both surfaces; default: none"""
+
+
+class ClearanceRevolute(_Clearance):
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
+
+    surfaces = ("journal", "pin")
+    type: Literal["clearance-revolute"]
+    pin_radius: Annotated[Length, Positive]
+    """radius of the pin"""
+    length: Annotated[Length, Positive]
+    """length of the bearing along the axis"""
+    journal_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    pin_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    wear: Wear | None = None
+    """wear of both surfaces; default: none"""
+
+
+class ClearanceSlot(_Clearance):
+    """Pin in a straight slot with round ends; between = [slot frame, pin frame].
+
+    The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
+    """
+
+    surfaces = ("slot", "pin")
+    type: Literal["clearance-slot"]
+    clearance: Annotated[Length, Positive]
+    """half the slot's width minus the pin's radius"""
+    travel: Annotated[Length, Positive]
+    """travel of the pin's centre along the slot's middle line, from the centre of one end's half circle to that of the
+    other"""
+    pin_radius: Annotated[Length, Positive]
+    """radius of the pin"""
+    length: Annotated[Length, Positive]
+    """length of the bearing along the axis"""
+    slot_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    pin_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Half the length of the straight part [m]."""
+        return 0.5 * self.travel, 0.0
+
+
+class BallOnPlane(_Contact):
+    """Ball above an unbounded plane; between = [plane frame, ball frame].
+
+    The plane contains x and y of its frame; the ball is on the side of z.
+    """
+
+    surfaces = ("plane", "ball")
+    type: Literal["ball-on-plane"]
+    ball_radius: Annotated[Length, Positive]
+    """radius of the ball"""
+    plane_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    ball_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @property
+    def clearance(self) -> float:
+        """Distance that counts as far [m], since no second wall limits it: the radius."""
+        return self.ball_radius
+
+
+Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
+#: all types of contacts
+CONTACTS: tuple[Any, ...] = get_args(Clearance)
+
+#: sizes that the bearing of a joint may have, and those that it must have
+SIZES: dict[str, tuple[set[str], set[str]]] = {
+    "revolute": ({"radius", "length", "axial_radius"}, {"radius"}),
+    "prismatic": ({"radius", "length"}, set()),
+    "cylindrical": ({"radius", "length"}, {"radius"}),
+    "universal": ({"radius", "length"}, {"radius"}),
+    "spherical": ({"radius"}, {"radius"}),
+}
+
+
+class _Bearing(Part):
+    """Surfaces of an ideal joint with friction; loads whose conversion needs an absent size are not counted."""
+
+    radius: Annotated[Length, Positive] | None = None
+    """radius of the pin, the ball, or the pins of a universal joint's cross; of a prismatic joint the lever arm of the
+    pads that carry moments about its axis"""
+    length: Annotated[Length, Positive] | None = None
+    """distance between the two ends that carry moments across the axis; of a prismatic joint the length of the slider,
+    its middle at the second frame's origin"""
+    axial_radius: Annotated[Length, Positive] | None = None
+    """radius of the collar that carries the axial force of a revolute joint; default: `radius`"""
+    preload: Annotated[Force, Field(ge=0.0)] = 0.0
+    """constant normal force, added to the others"""
+
+
+def _rubbing(law: Any) -> Any:
+    """Return a model with the parameters of a friction law and those of a bearing."""
+    return create_model(f"{law.__name__}Bearing", __base__=(_Bearing, law), __doc__=law.__doc__, __module__=__name__)
+
+
+if TYPE_CHECKING:
+    JointFriction: TypeAlias = Any
+else:
+    JointFriction = Annotated[Union[tuple(_rubbing(law) for law in FRICTIONS)], Field(discriminator="law")]  # noqa: UP007
+
+
+def require_fitting(kind: str, friction: Any) -> None:
+    """Raise ValueError for a joint type without friction, and for sizes that its bearing lacks or cannot have."""
+    if kind not in SIZES:
+        known = ", ".join(SIZES)
+        raise ValueError(f"a joint of type '{kind}' has no friction of its own; those that have: {known}")
+    possible, needed = SIZES[kind]
+    given = {name for name in ("radius", "length", "axial_radius") if getattr(friction, name) is not None}
+    for name in sorted(needed - given):
+        raise ValueError(
+            f"friction in a {kind} joint needs a {name}, the lever arm of the friction force; none is given"
+        )
+    for name in sorted(given - possible):
+        may = ", ".join(sorted(possible))
+        raise ValueError(f"the bearing of a {kind} joint has no {name}; sizes of such a joint: {may}")

@@ -1,0 +1,178 @@
+"""Expressions of loads in the form from which code is generated: structure as text, numbers separately.
+
+The text is the expression in postfix order: ``c0`` is its first number, ``p0.x`` a component of a position that it
+reads, ``q1`` a joint coordinate, ``t`` the time. Expressions that differ only in numbers and names have the same text,
+and share compiled code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flexclear.scene.expression import (
+    BENT,
+    FUNCTIONS,
+    JUMPING,
+    OPERANDS,
+    SEVERAL,
+    check_unit,
+    fold,
+    measure,
+)
+from flexclear.scene.loads import EXPRESSIONS, JointExpression, LineExpression, PointExpression
+from flexclear.scene.owners import turns
+from flexclear.scene.parts import FlexibleBody
+from flexclear.scene.quantity import KINDS, Quantity, read
+
+#: quantities that follow from positions and velocities: letter of their leaves
+READ = {
+    "position": "p",
+    "velocity": "v",
+    "angular_velocity": "o",
+    "frame_position": "p",
+    "joint_position": "q",
+    "joint_velocity": "r",
+    "t": "t",
+}
+#: letters of vectors
+VECTORS = "pvo"
+#: largest exponent computed by multiplication
+WHOLE = 8
+
+
+@dataclass(frozen=True)
+class Local:
+    """A name that exists only in loads of one kind: its letter and SI unit."""
+
+    letter: str
+    unit: str
+    dim: str = ""
+    over_time: bool = True
+
+
+#: names that an expression along a line may use
+OF_LINES = {"length": Local("l", "m"), "rate": Local("s", "m/s")}
+
+
+@dataclass(frozen=True)
+class Formula:
+    """Expressions of one load.
+
+    code: their structure, separated by ``;``. numbers: SI values. reads: kind (``body``, ``frame`` or ``coordinate``)
+    and name of every component that is read.
+    """
+
+    code: str
+    numbers: tuple[float, ...]
+    reads: tuple[tuple[str, str], ...]
+
+    @property
+    def bends(self) -> int:
+        """Number of functions whose slope jumps where their argument is zero."""
+        return sum(token in BENT for token in self.code.split())
+
+
+def operands(token: str) -> int:
+    """Return the number of operands of a token of a code; 0 for a leaf."""
+    return 1 if token[0] == "^" and len(token) > 1 else OPERANDS.get(token, 0)
+
+
+def formula(scene: Any, name: str) -> Formula | None:
+    """Return the formula of a load of a scene; None for a load without an expression.
+
+    Raises ValueError, in words, for an expression that cannot be computed or has another unit than the load.
+    """
+    load = scene.load[name]
+    if not isinstance(load, EXPRESSIONS):
+        return None
+    known = constants_of(load.values)
+    require_used(known, load.texts)
+    dimension = "torque" if isinstance(load, JointExpression) and turns(scene, load) else "force"
+    vector = isinstance(load, PointExpression) and isinstance(load.force, str)
+    numbers, reads, codes = list[float](), list[tuple[str, str]](), list[str]()
+    for text in load.texts:
+        try:
+            steps = read(text, scene.owners(), known, OF_LINES if isinstance(load, LineExpression) else None)
+            measure(steps)
+            for step in steps:
+                _check(scene, step)
+            check_unit(steps, dimension, vector=vector)
+        except ValueError as error:
+            raise ValueError(f"force = '{text}': {error}") from None
+        codes.append(_encoded(steps, numbers, reads))
+    return Formula(" ; ".join(codes), tuple(numbers), tuple(reads))
+
+
+def check_formulas(scene: Any) -> None:
+    """Raise ValueError, with the load's name, for an expression of a scene that cannot be computed."""
+    for name in scene.forces():
+        try:
+            formula(scene, name)
+        except ValueError as error:
+            raise ValueError(f"load.{name}: {error}") from None
+
+
+def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+    """Return value and SI unit of named constants; raise ValueError for an invalid name."""
+    known = {}
+    for name, value in values.items():
+        if not re.fullmatch(r"[^\W\d]\w*", name) or name in (*FUNCTIONS, *SEVERAL, "t", "time", "pi", *OF_LINES):
+            raise ValueError(
+                f"values.{name}: '{name}' cannot name a constant: choose letters, digits and _, but no function, t, "
+                "pi, length or rate"
+            )
+        number, _, unit = value.partition(" ") if isinstance(value, str) else (value, "", "1")
+        known[name] = float(number), unit
+    return known
+
+
+def require_used(known: Iterable[str], texts: Sequence[str]) -> None:
+    """Raise ValueError for a constant that no text uses."""
+    for name in known:
+        if not any(re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) for text in texts):
+            raise ValueError(f"values.{name} is not used: remove it, or name it in the expression")
+
+
+def _check(scene: Any, step: Any) -> None:
+    """Raise ValueError for a step that no load can compute."""
+    if step in JUMPING:
+        raise ValueError(
+            f"{step}(...) jumps, and integration steps cannot cross a jump: write a steep tanh(...), or a ramp of "
+            "min(...) and max(...)"
+        )
+    if not isinstance(step, Quantity):
+        return
+    if step.kind not in READ:
+        raise ValueError(
+            f"'{step.name}' depends on more than positions and velocities, so no load can depend on it: use "
+            f"{', '.join(READ)}"
+        )
+    if KINDS[step.kind].owner == "body" and isinstance(scene.body[step.owner], FlexibleBody):
+        raise ValueError(f"'{step.name}' belongs to a flexible body: use the frame_position of one of its frames")
+
+
+def _encoded(steps: list[Any], numbers: list[float], reads: list[tuple[str, str]]) -> str:
+    def leaf(step: Any) -> str:
+        if isinstance(step, tuple):
+            numbers.append(step[0])
+            return f"c{len(numbers) - 1}"
+        if isinstance(step, Local):
+            return step.letter
+        owner, letter = KINDS[step.kind].owner, READ[step.kind]
+        if not owner:
+            return letter
+        if (owner, step.owner) not in reads:
+            reads.append((owner, step.owner))
+        return f"{letter}{reads.index((owner, step.owner))}" + (f".{step.component}" if step.component else "")
+
+    def apply(operator: str, operands: list[str]) -> str:
+        exponent = numbers[-1] if operator == "^" else 0.5
+        if exponent == int(exponent) and 0 < abs(exponent) <= WHOLE:
+            numbers.pop()
+            return f"{operands[0]} ^{int(exponent)}"
+        return " ".join([*operands, operator])
+
+    return fold(steps, leaf, apply)

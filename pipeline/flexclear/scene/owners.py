@@ -1,0 +1,118 @@
+"""Components of a scene that own quantities, by the dimension of the run; a scene is any object with its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from flexclear.scene.drives import PathDrive
+from flexclear.scene.loads import Bushing, Pid, SampledPid
+from flexclear.scene.parts import Ground
+from flexclear.scene.quantity import KINDS
+
+#: joint type -> its coordinates by name, and whether each is an angle, as in the classes of the joints
+COORDINATES: Mapping[str, Mapping[str, bool]] = {
+    "revolute": {"rotation": True},
+    "prismatic": {"translation": False},
+    "cylindrical": {"rotation": True, "translation": False},
+    "planar": {"x": False, "y": False, "rotation": True},
+    "universal": {"first": True, "second": True},
+}
+#: quantities of the whole mechanism that require loads, and one that requires flexible bodies
+_OF_LOADS, _OF_MODES = ("load_work", "load_loss"), ("modal_damping_loss",)
+
+
+def owners(scene: Any) -> dict[str, dict[str, bool]]:
+    """Return names by `quantity.OWNERS`, and whether each acts about an axis, so that forces are torques."""
+    forces, contacts, moving = (
+        scene.forces(),
+        scene.contacts(),
+        _still(name for name, body in scene.body.items() if not isinstance(body, Ground)),
+    )
+    stops = {f"{name}.{end}": turns(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
+    controllers = {name: load for name, load in forces.items() if isinstance(load, (Pid, SampledPid))}
+    modes = {name: body.modes.count for name, body in scene.flexible().items()}
+    return {
+        "body": moving,
+        "frame": _still(_frames(scene)),
+        "joint": _still(scene.joint),
+        "coordinate": _coordinates(scene),
+        "drive": dict(_drives(scene)),
+        "controller": {name: turns(scene, load) for name, load in controllers.items()},
+        "gear": {name: _named(scene, gear.second) for name, gear in scene.gear.items()},
+        "load": {name: _measures_angle(scene, load) for name, load in forces.items()},
+        "bushing": _still(name for name, load in forces.items() if isinstance(load, Bushing)),
+        "contact": _still(contacts) | stops,
+        "rubbing": _still(scene.rubbing()),
+        "worn": _still(scene.worn()),
+        "mode": _still(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
+        "section": _still(scene.output.stress or ()),
+        "gauge": _still(n for body in scene.output.stress or () for n in (body, *scene.output.gauge_names(body))),
+        "": _still(_of_all(scene)),
+    }
+
+
+def _still(names: Any) -> dict[str, bool]:
+    return dict.fromkeys(names, False)
+
+
+def _of_all(scene: Any) -> Iterator[str]:
+    for key, kind in KINDS.items():
+        possible = (key not in _OF_LOADS or scene.forces()) and (key not in _OF_MODES or scene.flexible())
+        if kind.owner == "" and kind.variable and possible:
+            yield key
+
+
+def _frames(scene: Any) -> Iterator[str]:
+    """Yield frames of bodies; of bodies that recipes describe, the frames that the scene names."""
+    for name, body in scene.body.items():
+        yield from (f"{name}.{frame}" for frame in getattr(body, "frames", {}))
+    for part in (*scene.joint.values(), *scene.load.values(), *scene.drive.values()):
+        yield from getattr(part, "between", ())
+        yield from (part.frame,) if hasattr(part, "frame") else ()
+
+
+def _coordinates(scene: Any) -> dict[str, bool]:
+    return {
+        name if len(known) == 1 else f"{name}.{coordinate}": turns
+        for name, joint in scene.joint.items()
+        for known in [COORDINATES.get(joint.type, {})]
+        for coordinate, turns in known.items()
+    }
+
+
+def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
+    for name, drive in scene.drive.items():
+        if isinstance(drive, PathDrive):
+            yield from ((f"{name}.{part}", part.startswith("rotation")) for part, _ in drive.components())
+        else:
+            yield name, turns(scene, drive)
+    for name, event in scene.event.items():
+        if event.kind == "lock":
+            yield from ((held, turning) for held, (_, turning) in locked(scene, name, event).items())
+
+
+def locked(scene: Any, name: str, event: Any) -> dict[str, tuple[str, bool]]:
+    """Return the coordinates that a lock called `name` holds: name of the drive -> coordinate, and whether an angle."""
+    joint = scene.joint.get(event.part[1])
+    known = COORDINATES.get(joint.type, {}) if joint is not None else {}
+    return {f"{name}.{c}" if len(known) > 1 else name: (c, turning) for c, turning in known.items()}
+
+
+def turns(scene: Any, part: Any) -> bool:
+    """Return True when the coordinate of a part with `joint` and `coordinate` is an angle."""
+    joint = scene.joint.get(part.joint)
+    known = COORDINATES.get(joint.type, {}) if joint is not None else {}
+    return known.get(part.coordinate or next(iter(known), ""), False)
+
+
+def _named(scene: Any, text: str) -> bool:
+    """Return True when the coordinate ``A`` or ``A.rotation`` is an angle."""
+    known = _coordinates(scene)
+    return known.get(text, known.get(text.partition(".")[0], False))
+
+
+def _measures_angle(scene: Any, load: Any) -> bool:
+    if getattr(load, "measured", None):
+        return _named(scene, load.measured)
+    return hasattr(load, "joint") and turns(scene, load)

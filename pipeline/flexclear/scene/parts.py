@@ -1,0 +1,343 @@
+"""The parts of a scene: bodies and their appearance, joints, stops and gears. Each effect is a part; an effect without
+its part is absent."""
+
+import math
+import re
+from typing import Annotated, Any, Literal, Self, get_args
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
+
+from flexclear.scene.clearance import (
+    BallOnPlane,
+    ClearanceRevolute,
+    ClearanceSlot,
+    ClearanceSpherical,
+    JointFriction,
+    NormalLaw,
+    require_fitting,
+)
+from flexclear.scene.fields import (
+    AngularVelocity,
+    FrameName,
+    Inertia,
+    Length,
+    Mass,
+    Number,
+    OnCoordinate,
+    Part,
+    PartName,
+    Pose,
+    Position,
+    Positive,
+    Time,
+    Velocity,
+    given,
+    require_one,
+)
+from flexclear.scene.laws import Value
+from flexclear.scene.units import quantity
+
+#: keys of a body that affect pictures only
+UNSEEN = ("geometry", "color")
+
+
+class BoxShape(Part):
+    """A box about the origin of `pose`."""
+
+    type: Literal["box"]
+    size: Position
+    """lengths of the edges along x, y and z"""
+    pose: Pose = Pose()
+    """pose of the box's centre in the body frame"""
+
+    @model_validator(mode="after")
+    def _extended(self) -> Self:
+        if min(self.size) <= 0.0:
+            raise ValueError(f"the edges of a box must be longer than zero, not {list(self.size)} m")
+        return self
+
+
+class CylinderShape(Part):
+    """A cylinder about the origin of `pose`, its axis along z."""
+
+    type: Literal["cylinder"]
+    radius: Annotated[Length, Positive]
+    """radius of the cylinder"""
+    length: Annotated[Length, Positive]
+    """length of the cylinder along z"""
+    pose: Pose = Pose()
+    """pose of the cylinder's centre in the body frame"""
+
+
+class SphereShape(Part):
+    """A sphere about the origin of `pose`."""
+
+    type: Literal["sphere"]
+    radius: Annotated[Length, Positive]
+    """radius of the sphere"""
+    pose: Pose = Pose()
+    """pose of the sphere's centre in the body frame"""
+
+
+class FileShape(Part):
+    """A surface from a file that meshio reads: STL, VTK, PLY, OBJ; of volume meshes the boundary."""
+
+    type: Literal["file"]
+    file: str
+    """the file, searched for next to the scene"""
+    unit: Annotated[Length, Positive] = 1.0
+    """length of one unit of the file, such as 1 mm"""
+    pose: Pose = Pose()
+    """pose of the file's axes in the body frame"""
+
+
+Shape = Annotated[BoxShape | CylinderShape | SphereShape | FileShape, Field(discriminator="type")]
+
+
+def _color(value: Any) -> Any:
+    if isinstance(value, str) and not re.fullmatch("#[0-9a-fA-F]{6}", value):
+        raise ValueError(f"a colour is written as '#0072B2' (red, green and blue, hexadecimal), not '{value}'")
+    return value
+
+
+Color = Annotated[str, BeforeValidator(_color)]
+
+
+class Seen(Part):
+    """Appearance of a body in pictures, instead of the one that follows from its joints."""
+
+    geometry: tuple[Shape, ...] | None = None
+    """shapes that pictures show, [] for none; default: bars and plates between the joints"""
+    color: Color | None = None
+    """colour of the body in pictures, such as #0072B2"""
+
+
+class Ground(Seen):
+    """The fixed world; listed only to give it frames."""
+
+    type: Literal["ground"]
+    frames: dict[PartName, Pose] = Field(default_factory=dict)
+    """named frames fixed in the world"""
+
+
+class Moving(Seen):
+    """Keys of all bodies that move."""
+
+    pose: Pose | None = None
+    """start pose of the body frame; without it, it follows from a joint"""
+    velocity: Velocity | None = None
+    """start velocity of the centre of mass, world axes"""
+    angular_velocity: AngularVelocity | None = None
+    """start angular velocity of the body frame, world axes"""
+
+
+class RigidBody(Moving):
+    """Mass, centre of mass and inertia about it, all in the body frame."""
+
+    type: Literal["rigid"]
+    mass: Annotated[Mass, Positive]
+    """mass of the body"""
+    com: Position = (0.0, 0.0, 0.0)
+    """centre of mass in the body frame"""
+    inertia: Inertia
+    frames: dict[PartName, Pose] = Field(default_factory=dict)
+    """named points with axes on the body, in the body frame"""
+    frame_tolerance: Annotated[Length, Field(ge=0.0)] = 0.0
+    """distance by which the body's frames may be moved so that the joints fit, where they nearly do; for bodies from a
+    mesh a thousandth of the distance of their frames, since the nodes of a hole determine its centre no better"""
+
+
+def _hertz(value: Any) -> float:
+    """Return a frequency [Hz] from a bare number, or text with a unit."""
+    number = f"{value} Hz" if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+    return quantity(number, "angular velocity") / (2.0 * math.pi)
+
+
+Frequency = Annotated[
+    float, BeforeValidator(_hertz), WithJsonSchema({"type": ["number", "string"], "description": "frequency in Hz"})
+]
+
+
+class Modes(Part):
+    """Elastic coordinates of a flexible body; their number is given by one of count, up_to, compliance and mass."""
+
+    reference: str
+    """name of the reference condition, as docs/structure.md lists them"""
+    count: Annotated[int, Field(ge=0, le=1_000_000)] | Literal["all"] | None = None
+    """number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete basis; 0
+    makes a rigid body with the recipe's mass and inertia"""
+    up_to: Annotated[Frequency, Positive] | None = None
+    """highest frequency of the retained normal modes, such as 5000 Hz"""
+    compliance: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    """least fraction of the static compliance between the interfaces, in each of the six directions"""
+    mass: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    """least fraction of the body's mass that moves with the basis, in each direction"""
+    interfaces: tuple[str, ...] | None = None
+    """the recipe's frames that a basis is built for; default: the recipe's own list"""
+    held: tuple[FrameName, ...] = ()
+    """motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes"""
+    of: str | None = None
+    """reference condition of the shapes on which "mean-axis" is based"""
+
+    @model_validator(mode="after")
+    def _one_choice(self) -> Self:
+        require_one(self, ("count", "up_to", "compliance", "mass"), "says how many modes are retained")
+        return self
+
+
+class RatioPerMode(Part):
+    """Damping ratio of each elastic coordinate, in the order of the bundle's modes."""
+
+    ratios: tuple[Annotated[Number, Field(ge=0.0)], ...]
+    """damping ratio of each mode, as a fraction of critical damping"""
+
+
+class Rayleigh(Part):
+    """Damping matrix alpha M + beta K of the deformation; rigid motion of the body is not damped.
+
+    alpha [1/s], beta [s]: the ratio of a mode with frequency omega is (alpha/omega + beta omega)/2.
+    """
+
+    alpha: Annotated[Number, Field(ge=0.0)] = 0.0
+    """coefficient of the mass matrix [1/s]"""
+    beta: Annotated[Time, Field(ge=0.0)] = 0.0
+    """coefficient of the stiffness matrix [s]"""
+
+
+class Stiffening(Part):
+    """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
+
+
+class FlexibleBody(Moving):
+    """A body reduced from a mesh; its frames are those of the recipe, its body frame is that of the undeformed mesh."""
+
+    type: Literal["flexible"]
+    mesh: str
+    """file of the mesh recipe, relative to the scene"""
+    modes: Modes
+    """elastic coordinates of the body"""
+    damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
+    """one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh damping; default: none"""
+    stiffening: Stiffening | None = None
+    """``{}`` for a beam that rotates fast or carries large axial loads; default: linear shapes"""
+
+
+class MeshedRigidBody(Moving):
+    """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
+
+    ``modes = { count = 0 }`` of a flexible body means the same; damping and stiffening then have no effect.
+    """
+
+    type: Literal["rigid"]
+    mesh: str
+    """file of the mesh recipe, relative to the scene; the body frame is that of the mesh"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_modes(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or table.get("type") != "flexible":
+            return table
+        rest = {key: value for key, value in table.items() if key not in ("modes", "damping", "stiffening")}
+        if isinstance(rest.get("source"), dict):
+            rest["source"] = {key: text for key, text in rest["source"].items() if key in rest}
+        return {**rest, "type": "rigid"}
+
+
+def _which(body: Any) -> str | None:
+    """Return the tag of a body's model: its type, but "meshed" for a body with a recipe and no modes."""
+    if isinstance(body, MeshedRigidBody):
+        return "meshed"
+    if not isinstance(body, dict):
+        return getattr(body, "type", None)
+    modes = body.get("modes")
+    none = isinstance(modes, dict) and modes.get("count") == 0 and not isinstance(modes.get("count"), bool)
+    if (body.get("type") == "rigid" and "mesh" in body) or (body.get("type") == "flexible" and none):
+        return "meshed"
+    return body.get("type")
+
+
+Body = Annotated[
+    Annotated[Ground, Tag("ground")]
+    | Annotated[RigidBody, Tag("rigid")]
+    | Annotated[FlexibleBody, Tag("flexible")]
+    | Annotated[MeshedRigidBody, Tag("meshed")],
+    Discriminator(_which),
+]
+
+
+class IdealJoint(Part):
+    """Two frames; the axes of motion are those of the first, and the axis of the joint is z.
+
+    A free joint constrains nothing, so that a body flies. The motion of each type is in `dynamics.joints`.
+    """
+
+    type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
+    """relative motion that the joint leaves free"""
+    between: tuple[FrameName, FrameName]
+    """first frame, whose axes are those of motion, and second frame, each as body.FRAME"""
+    friction: JointFriction | None = None
+    """friction by the force that the joint carries; default: none"""
+
+    @model_validator(mode="after")
+    def _rubs(self) -> Self:
+        if self.friction is not None:
+            require_fitting(self.type, self.friction)
+        return self
+
+
+#: types of ideal joints
+IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
+Joint = Annotated[
+    IdealJoint | ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane, Field(discriminator="type")
+]
+
+
+class Stop(OnCoordinate):
+    """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint."""
+
+    lower: Value | None = None
+    """ends of the coordinate, one or both; angles count full turns, from within half a turn of zero at the start"""
+    upper: Value | None = None
+    """ends of the coordinate, one or both; angles count full turns, from within half a turn of zero at the start"""
+    normal: NormalLaw
+    """normal law of contacts with its stiffness, for angles in N m and rad"""
+    floor: Value | None = None
+    """least approach speed used as impact rate; default: 1e-6 rad/s, or for lengths as in contacts"""
+    initial_approach_speed: Value | None = None
+    """impact rate of an end that the coordinate has passed at the start; without this key such a start is refused"""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.lower is None and self.upper is None:
+            raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
+        if self.normal.stiffness is None:
+            raise ValueError("the stiffness of a stop is unknown: give normal.stiffness")
+        mass = (self.normal.restitution, self.normal.delivered_restitution) != (None, None)
+        if self.normal.law == "kelvin-voigt" and mass and self.normal.effective_mass is None:
+            raise ValueError(
+                "the mass that meets a stop depends on the pose, so a linear stop needs a damping, "
+                "or a restitution with the effective_mass [kg or kg m^2] for that restitution"
+            )
+        return self
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Names of the given ends."""
+        return tuple(given(self, ("lower", "upper")))
+
+
+class Gear(Part):
+    """A joint coordinate that follows another one: change of `second` = ratio times change of `first`."""
+
+    first: str
+    """joint (``A``), with the coordinate if the joint has several (``A.rotation``)"""
+    second: str
+    """joint (``A``), with the coordinate if the joint has several (``A.rotation``)"""
+    ratio: Value
+    """a number; between a translation and a rotation a length per angle ("10 mm/rad") or an angle per length"""
+
+    @model_validator(mode="after")
+    def _two(self) -> Self:
+        if self.first == self.second:
+            raise ValueError(f"a gear couples two coordinates; first and second are both '{self.first}'")
+        return self

@@ -1,0 +1,95 @@
+"""The start of a run, where it is given by more than the bodies' poses and velocities."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from flexclear.scene.fields import Number, OnCoordinate, Part, PartName, given
+
+#: the keys of one joint coordinate
+KEYS = ("position", "near", "velocity")
+#: configurations in which a run may begin, other than the poses of the bodies
+At = Literal["equilibrium", "ideal"]
+Measure = float | str
+
+
+class JointStart(Part):
+    """Start of one joint coordinate; text has a unit of the coordinate or of its rate."""
+
+    position: Measure | None = None
+    """exact value at the start"""
+    near: Measure | None = None
+    """approximate value at the start, which selects the nearest of several ways to assemble the mechanism; without the
+    poses of bodies the assembly is also searched for from this value"""
+    velocity: Measure | None = None
+    """rate at the start"""
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if not given(self, KEYS):
+            raise ValueError(f"one of {', '.join(KEYS)} must give the start of the coordinate; none is given")
+        if self.position is not None and self.near is not None:
+            raise ValueError("position is the exact start of the coordinate, near an approximate one; give one of them")
+        return self
+
+
+def _coordinates(value: Any) -> Any:
+    """Return the start of a joint's single coordinate, which need not be named, under the empty name."""
+    if isinstance(value, Mapping) and (not value or set(value) & {*KEYS, "source"}):
+        return {"": value}
+    return value
+
+
+class ModalStart(Part):
+    """Deformation of a flexible body at the start, by its modes in the order of the bundle; omitted ones are zero."""
+
+    coordinate: tuple[Number, ...] = ()
+    """modal coordinates [m]"""
+    velocity: tuple[Number, ...] | None = None
+    """modal velocities [m/s]; default: zero, if joints, drives and given velocities allow it, else the least ones"""
+
+
+_ONE_OR_SEVERAL = BeforeValidator(_coordinates, json_schema_input_type=JointStart | dict[str, JointStart])
+JointStarts = Annotated[dict[str, JointStart], _ONE_OR_SEVERAL]
+
+
+class Branch(OnCoordinate):
+    """One way out of a change point: that on which this joint coordinate changes most in the direction of `sign`."""
+
+    sign: Literal[1, -1]
+    """1 for the branch on which the coordinate grows most, or falls least; -1 for that on which it falls most, or grows
+    least"""
+
+
+def _several(value: Any) -> Any:
+    """Return a single choice, written without a list, as a tuple."""
+    return (value,) if isinstance(value, (Mapping, Branch)) else value
+
+
+class Start(Part):
+    """The start of the run."""
+
+    at: At | None = None
+    """"equilibrium", the static equilibrium with the drives where their laws start, and the joint coordinates whose
+    `position` is given held there; or "ideal", where the mechanism without clearance would start, each loose pin
+    resting in its socket on the side to which the joint's force presses it, flexible bodies deformed as the loads of
+    that moment hold them"""
+    joint: dict[PartName, JointStarts] = Field(default_factory=dict)
+    """starts of joints, by name; for joints with several coordinates by the coordinate's name below"""
+    modal: dict[PartName, ModalStart] = Field(default_factory=dict)
+    """starts of flexible bodies, by name"""
+    branch: Annotated[
+        tuple[Branch, ...], BeforeValidator(_several, json_schema_input_type=Branch | tuple[Branch, ...])
+    ] = ()
+    """in a change point, the branch that the motion takes among those that cross there; with several loops a list, each
+    entry chooses among the branches that remain after those before it"""
+
+    @model_validator(mode="after")
+    def _no_two_deformations(self) -> Self:
+        given = [name for name, modal in self.modal.items() if modal.coordinate]
+        if self.at is not None and given:
+            raise ValueError(
+                f"at = '{self.at}' and modal.{given[0]}.coordinate both determine the deformation: give one of them"
+            )
+        return self

@@ -1,0 +1,83 @@
+"""One point of a cost study: a run of an edited scene, its costs, and the quantities that errors are computed from.
+
+The cost of a point is that of its integration: the record has the same number of rows at every tolerance and step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from flexclear.artifacts import quantities
+from flexclear.dynamics import analyses
+from flexclear.scene.quantity import parse
+from flexclear.scene.schema import Scene
+from flexclear.stages.kernels import warm
+from flexclear.stages.simulation import bundles, rebuild
+from flexclear.system.errors import SolverError
+from flexclear.system.platforms import peak_memory
+from flexclear.system.progress import Progress, silent
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Run the scene; return the recorded quantities, ``cpu_repeat(repeat)`` of the integration, and other costs as
+    attributes, among them the median time of the recording.
+
+    params: `simulate`, the parameters of the simulate stage; `quantities` of the study; `brief`, as in `analyses.cost`.
+    inputs: bundles, and `kernels`, the artifact of `stages.kernels`. Where the solver refuses the run, the dataset is
+    empty and its attribute `refused` holds the reason: that, too, is a result of the study.
+    """
+    scene = rebuild(params["simulate"], inputs)
+    reduced = bundles(inputs)
+    warm(scene, reduced, progress)
+    try:
+        cost = analyses.cost(scene, reduced, progress, brief=params["brief"])
+    except SolverError as error:
+        return {"nc": xr.Dataset(attrs={"refused": str(error)})}
+    done = cost.run
+    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
+    recorded = quantities.keep(done, chosen)
+    attributes = {"units": "s", "long_name": "processor time of the integration of a warm run"}
+    recorded["cpu_repeat"] = (("repeat",), list(cost.integration), attributes)
+    costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
+    costs["recording_seconds"] = float(np.median(cost.recording))
+    costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
+    return {"nc": recorded.assign_attrs(**costs, **_growth(done), **_contacts(scene))}
+
+
+def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Run an ensemble; return the contacts' statistics, ``standard_error(quantity)`` of the means of the series, and
+    the attribute ``cpu_seconds``, the processor time of the integration of one run; or the attribute `refused`.
+
+    params: `simulate`, with the ensemble, and `quantities`. inputs: as in `run`.
+    """
+    scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
+    warm(scene, reduced, progress)
+    try:
+        done = analyses.ensemble(scene, reduced, progress)
+        seconds = float(np.median(analyses.cost(scene, reduced, silent, brief=True).integration))
+    except SolverError as error:
+        return {"nc": xr.Dataset(attrs={"refused": str(error)})}
+    recorded = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
+    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
+    errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}
+    recorded = recorded.assign_coords(quantity=list(errors))
+    recorded["standard_error"] = (("quantity",), list(errors.values()))
+    return {"nc": recorded.assign_attrs(cpu_seconds=seconds)}
+
+
+def _growth(run: xr.Dataset) -> dict[str, float]:
+    """Return the largest separation up to the horizon over the initial perturbation; empty without contacts."""
+    if "separation" not in run:
+        return {}
+    before = run["separation_time"].values <= float(run["horizon"])
+    return {"growth": float(run["separation"].values[before].max()) / float(run.attrs["separation_perturbation"])}
+
+
+def _contacts(scene: Scene) -> dict[str, float]:
+    """Return the largest clearance [m] of a scene with contacts; empty without contacts."""
+    clearances = [joint.clearance for joint in scene.contacts().values()]
+    return {"clearance": max(clearances)} if clearances else {}

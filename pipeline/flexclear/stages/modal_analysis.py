@@ -1,0 +1,53 @@
+"""Stage 2: mesh -> frequencies and mass-normalised shapes under one reference condition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.scene.registry import module_of
+from flexclear.stages import meshing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.scene.parts import FlexibleBody
+    from flexclear.system.progress import Progress
+
+CONDITIONS = "flexclear.structure.modes.reference"
+
+
+def params(body: FlexibleBody) -> dict[str, Any]:
+    """Return the selected modal coordinates; nothing else of the body decides its modes."""
+    return body.modes.model_dump(mode="json", exclude={"source"}, exclude_none=True)
+
+
+def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
+    """Return the modules of the reference conditions and of the kind of body; raise InputError for an unknown name."""
+    names = [body.modes.reference, *([body.modes.of] if body.modes.of else [])]
+    return (*(module_of(CONDITIONS, name, where=where) for name in names), *meshing.modules(Path(body.mesh)))
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Compute the modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
+    from flexclear.structure.fe.vtu import of_modes
+    from flexclear.structure.modes.basis import ModeRequest
+    from flexclear.structure.modes.solution import solve
+
+    count = params.get("count")
+    result = solve(
+        inputs["mesh"],
+        params["reference"],
+        interfaces=params.get("interfaces"),
+        requested=ModeRequest(
+            count=None if count == "all" else count,
+            up_to=params.get("up_to"),
+            compliance=params.get("compliance"),
+            mass=params.get("mass"),
+        ),
+        held=params.get("held", ()),
+        of=params.get("of"),
+        progress=progress,
+    )
+    return {"nc": result, "vtu": of_modes(result)}

@@ -1,0 +1,49 @@
+"""Stage 3: mesh and modes -> the reduced modal bundle, which contains all that the dynamics needs of the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from flexclear.scene.registry import lookup, module_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.scene.schema import Scene
+    from flexclear.system.progress import Progress
+
+STRESS = "flexclear.structure.stress"
+SHORTENING = "flexclear.structure.modes.geometric_stiffness"
+WHERE = "[output] stress"
+
+
+def params(scene: Scene, body: str) -> dict[str, Any]:
+    """Return whether and where stresses, and whether shortening by bending, are requested; else no entry."""
+    requested: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
+    if gauges := scene.output.on(body):
+        requested["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
+    return requested | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
+
+
+def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
+    """Return the modules for the requested stresses and shortening; raise InputError when there is none."""
+    requested = params(scene, body)
+    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in requested else ()
+    return (*stress, *((SHORTENING,) if "stiffening" in requested else ()))
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Reduce the body to a bundle (schema BUNDLE)."""
+    from flexclear.structure.modes import bundle
+
+    progress(None, "inertia integrals")
+    mesh, modes = inputs["mesh"], inputs["modes"]
+    extra: dict[str, Any] = {}
+    if params.get("stress"):
+        recover = lookup(STRESS, str(mesh.attrs.get("body_kind", "beam")), where=WHERE)
+        extra |= recover(mesh, modes, params.get("gauges", {}))
+    if params.get("stiffening"):
+        extra |= import_module(SHORTENING).variables(mesh, modes)
+    return {"nc": bundle.build(mesh, modes, extra)}

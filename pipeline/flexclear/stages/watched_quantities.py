@@ -1,0 +1,82 @@
+"""Next to stage 4: a variant of a scene -> its watched quantities, over ensemble members where it has contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from flexclear.scene.load import edited
+from flexclear.scene.quantity import Quantity
+from flexclear.stages import kernels, simulation
+from flexclear.stages.graph import Graph
+from flexclear.system.errors import InputError, SolverError
+from flexclear.workflow.task import Task
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.artifacts.points import Point
+    from flexclear.scene.schema import Scene
+    from flexclear.system.progress import Progress
+
+#: settings of a scene that a watched run ignores
+UNSEEN = ("accuracy", "ensemble", "sections", "view")
+#: number of members of a variant with contacts
+MEMBERS = 4
+
+
+def plain(scene: Scene) -> Scene:
+    """Return the scene without the settings that request more than one run."""
+    return edited(scene, dict.fromkeys(UNSEEN)) if any(getattr(scene, key) for key in UNSEEN) else scene
+
+
+def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
+    """Return the task of a variant; its artifact holds one point, see `points.unpacked`."""
+    variant = plain(scene)
+    graph = Graph(variant, shown=False)
+    return Task(
+        stage="quantities",
+        scene=scene.name,
+        run="flexclear.stages.watched_quantities:run",
+        params={
+            "simulate": simulation.params(variant),
+            "quantities": [q.written() for q in chosen],
+            "members": _members(variant, members),
+        },
+        inputs=graph.bodies(),
+        modules=simulation.modules(variant),
+    )
+
+
+def _members(scene: Scene, members: int) -> int:
+    """Return the number of members: 0 for a scene without contacts and stops, whose motion needs no ensemble."""
+    return members if scene.contacts() or scene.stop else 0
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Return one point as a dataset, refusals of the solver included, since they, too, show an effect.
+
+    Its attributes `compile_seconds` and `cpu_seconds` are the processor time of the kernels and of the runs [s].
+    """
+    from flexclear.artifacts.effect_size import recorded
+    from flexclear.artifacts.points import batch
+
+    scene = simulation.rebuild(params["simulate"], inputs)
+    chosen = [Quantity.read(data) for data in params["quantities"]]
+    progress(None, f"{scene.summary()}")
+    reduced, begun = simulation.bundles(inputs), kernels.processor_time()
+    with suppress(SolverError, InputError):  # which the point reports
+        kernels.warm(scene, reduced, progress)
+    compiled = kernels.processor_time()
+    point = watch(scene, reduced, chosen, params["members"])
+    spent = {"compile_seconds": compiled - begun, "cpu_seconds": kernels.processor_time() - compiled}
+    return {"nc": batch({"point": point}, recorded(scene.owners(), chosen)).assign_attrs(spent)}
+
+
+def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
+    """Run a scene in this process and return its point; without contacts `members` is ignored."""
+    from flexclear.artifacts.effect_size import recorded
+    from flexclear.dynamics.record.point import Runner
+
+    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members)).run(scene)

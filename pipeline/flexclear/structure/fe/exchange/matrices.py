@@ -1,0 +1,294 @@
+"""Bodies given by matrices: check them, convert them to SI units, and build a model from the dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.csgraph
+import xarray as xr
+
+from flexclear.artifacts.schema import MATRICES, conform
+from flexclear.numerics.rotations import skew
+from flexclear.structure.fe import model as models
+from flexclear.structure.fe.exchange import files
+from flexclear.structure.fe.exchange.files import COMPONENTS, Contents, Table
+from flexclear.structure.fe.model import Drawn, Integrals, Model
+from flexclear.structure.fe.recipe import Matrices, MatricesRecipe
+from flexclear.structure.fe.slices import Slices, at_centres, integrate, spread
+from flexclear.structure.fe.solid import ties
+from flexclear.structure.fe.solid.model import families, integrals
+from flexclear.structure.fe.vtu import vtu
+from flexclear.structure.sparse.multifrontal import cholesky
+from flexclear.system.errors import InputError, SolverError
+
+#: units of length [m], mass [kg] and time [s] of each consistent system
+SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
+#: asymmetry of a matrix, relative to its largest entry, that counts as rounding in the file
+SYMMETRIC = 1e-9
+WHERE = "mesh recipe [shape]"
+#: entries of mass matrices are equal when they differ by less, relative to the largest or to the mass (times a length)
+ALIKE = 1e-9
+#: largest strain force of a rigid motion, relative to the largest term of the sum
+UNSTRAINED = 1e-6
+
+
+def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
+    """Build the dataset (schema MATRICES); raise InputError for files that do not fit together."""
+    where = f"{path} [shape]"
+    contents = _read(recipe.shape, folder, where)
+    stiffness, mass, position = _in_si(contents, recipe.shape.units, where)
+    data: dict[str, Any] = {
+        "unknown_node": (("unknown",), contents.table.node),
+        "unknown_component": (("unknown",), np.array(COMPONENTS)[contents.table.component]),
+        "unknown_position": (("unknown", "axis"), position),
+    }
+    for name, matrix in (("stiffness", stiffness), ("mass", mass)):
+        entries = sp.coo_array(_symmetric(matrix, name, where))
+        for part, values in (("row", entries.row), ("column", entries.col), ("value", entries.data)):
+            data[f"{name}_{part}"] = ((f"{name}_entry",), values)
+    data |= {name: (MATRICES[name].dims, values) for name, values in contents.moments.items() if name in MATRICES}
+    data |= _frames(recipe, contents.table, position, path)
+    try:
+        dataset = xr.Dataset(data)
+    except ValueError as error:  # integrals in a file have other sizes than its unknowns
+        raise InputError(where, f"the arrays do not fit together: {error}") from None
+    kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "matrices")
+    return conform(dataset, MATRICES, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
+
+
+def _read(shape: Matrices, folder: Path, where: str) -> Contents:
+    if shape.file is not None:
+        return files.read_npz(folder / shape.file, where)
+    stiffness, mass, unknowns = (folder / str(name) for name in (shape.stiffness, shape.mass, shape.unknowns))
+    return files.read_matrix_market(stiffness, mass, unknowns, where)
+
+
+def _in_si(contents: Contents, system: str, where: str) -> tuple[sp.csr_array, sp.csr_array, np.ndarray]:
+    length, mass, time = SYSTEMS[system]
+    if system != "m-kg-s" and (contents.moments or np.any(contents.table.component == COMPONENTS.index("internal"))):
+        raise InputError(where, "internal unknowns and integrals have no units of their own", 'units = "m-kg-s"')
+    energy = mass * length**2 / time**2
+    # with u = S u' the matrices are K = e S^-1 K' S^-1 and M likewise, times the square of the unit of time
+    per_unit = sp.diags_array(np.where(contents.table.component < 3, 1.0 / length, 1.0))
+    K, M = (sp.csr_array(per_unit @ matrix @ per_unit) for matrix in (contents.stiffness, contents.mass))
+    return sp.csr_array(energy * K), sp.csr_array(energy * time**2 * M), length * contents.table.position
+
+
+def _symmetric(matrix: sp.csr_array, name: str, where: str) -> sp.csr_array:
+    if matrix.nnz == 0 or not np.isfinite(matrix.data).all():
+        raise InputError(where, f"the {name} matrix is empty or has entries that are not finite")
+    away = abs(matrix - matrix.T).max() / abs(matrix).max()
+    if away > SYMMETRIC:
+        raise InputError(where, f"the {name} matrix is not symmetric: entries differ by {away:.2g} of the largest")
+    return models.symmetric(matrix)
+
+
+def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: str) -> dict[str, Any]:
+    tied, origins = [], []
+    for name, frame in recipe.frames.items():
+        chosen, where = frame.nodes or (frame.node,), f"{path} [frames.{name}]"
+        needed, remedy = (6, "tie the frame to the mean of `nodes`") if frame.node is not None else (3, "name others")
+        for node in chosen:
+            own = np.bincount(table.component[table.node == node], minlength=6)
+            if not own.any():
+                raise InputError(where, f"unknown node {node}", "use numbers from the table of unknowns")
+            if not own[:needed].all():
+                lacks = ", ".join(COMPONENTS[c] for c in np.flatnonzero(own[:needed] == 0))
+                raise InputError(where, f"node {node} has no {lacks}", remedy)
+            if own[:needed].max() > 1:
+                twice = COMPONENTS[int(np.argmax(own[:needed]))]
+                problem = f"node {node} has {own[:needed].max()} unknowns {twice}"
+                raise InputError(where, problem, "write each unknown once")
+        if needed == 3 and len(chosen) < 3:
+            raise InputError(where, f"{len(chosen)} nodes cannot carry a frame's rotation", "name at least three")
+        tied.append(np.array(chosen))
+        origins.append(np.mean([position[table.node == node][0] for node in chosen], axis=0))
+    nodes, frames = models.grouped(tied)
+    return {
+        "frame": (("frame",), list(recipe.frames)),
+        "frame_position": (("frame", "axis"), np.array(origins)),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array([f.orientation() for f in recipe.frames.values()])),
+        "tie_node": (("tie",), nodes),
+        "tie_frame": (("tie",), frames),
+    }
+
+
+def as_vtu(mesh: xr.Dataset) -> bytes:
+    """Return the nodes as points in a VTU file, for ParaView."""
+    node, first = np.unique(mesh["unknown_node"].values, return_index=True)
+    points = mesh["unknown_position"].values[first]
+    return vtu(points, "vertex", np.arange(len(points))[:, None], of_points={"node": node})
+
+
+def assemble(mesh: xr.Dataset) -> Model:
+    """Build the model of a dataset (schema MATRICES); raise InputError unless the matrices are those of a free body."""
+    component = np.array([COMPONENTS.index(name) for name in mesh["unknown_component"].values])
+    positions, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
+    K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
+    rigid = models.rigid_motions(positions, component, positions.mean(axis=0))
+    _check(K, M, rigid, positions)
+    frames = models.interfaces(mesh, partial(_motion, mesh, component))
+    names = mesh.attrs["interfaces"].split()
+    return Model(
+        stiffness=K,
+        mass=M,
+        rigid=rigid,
+        position=positions,
+        interfaces=frames,
+        ends=tuple(frame for name in names[:2] for frame in frames if frame.name == name),
+        integrate=_integrate(mesh, M, component),
+        families=families(positions, component),
+        drawn=_drawn(mesh, component),
+    )
+
+
+def _matrix(mesh: xr.Dataset, name: str, n: int) -> sp.csr_array:
+    row, column, value = (mesh[f"{name}_{part}"].values for part in ("row", "column", "value"))
+    return sp.csr_array(sp.coo_array((value, (row, column)), shape=(n, n)))
+
+
+def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positions: np.ndarray) -> None:
+    left = np.abs(K @ rigid).max(axis=0) / (abs(K) @ np.abs(rigid)).max(axis=0)
+    if left.max() > UNSTRAINED:
+        worst = COMPONENTS[int(np.argmax(left))]
+        problem = f"a rigid motion along {worst} strains the body ({left.max():.2g} of the largest term)"
+        remedy = "export the free body, without supports; check the units and the table of unknowns"
+        raise InputError(WHERE, problem, remedy)
+    # unknowns of one node are connected, even where axial, bending and torsion do not couple
+    _, node = np.unique(positions, axis=0, return_inverse=True)
+    linked = sp.coo_array(K)
+    pairs = (np.ones(linked.nnz), (node.ravel()[linked.row], node.ravel()[linked.col]))
+    pieces, _ = scipy.sparse.csgraph.connected_components(sp.coo_array(pairs).tocsr(), directed=False)
+    if pieces > 1:
+        problem = f"the stiffness matrix describes {pieces} bodies without common nodes"
+        raise InputError(WHERE, problem, "define each as a separate body")
+    try:
+        cholesky(M, positions)
+    except SolverError:
+        raise InputError(WHERE, "the mass matrix is not positive definite", "give every unknown a mass") from None
+
+
+def _integrate(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Callable[[np.ndarray], Integrals]:
+    if "pair_value" in mesh:
+        return partial(_from_moments, mesh)
+    node = mesh["unknown_node"].values
+    rows = [np.flatnonzero(component == k) for k in range(3)]
+    rows = [row[np.argsort(node[row], kind="stable")] for row in rows]
+    same = sum(len(row) for row in rows) == len(node) and all(np.array_equal(node[rows[0]], node[row]) for row in rows)
+    if same:
+        line = sp.csr_array(M[rows[0]][:, rows[0]])
+        alike = ALIKE * abs(line).max()
+        blocks = [(k, l, M[rows[k]][:, rows[l]]) for k in range(3) for l in range(3)]
+        same = all(abs(block - line if k == l else block).max() <= alike for k, l, block in blocks)
+    if not same:
+        rigid = _lumped(M, node, component, mesh["unknown_position"].values)
+        if rigid is None:
+            raise InputError(
+                WHERE,
+                "the mass matrix differs for motion along x, y and z and is not lumped at the nodes, so that it does "
+                "not determine the volume integrals",
+                "lump the mass, use nodes with three displacements, or give an npz with the integrals",
+            )
+        return partial(integrate, rigid)
+    order = np.stack(rows, axis=1).ravel()
+    spread = sp.csr_array(sp.eye_array(len(node), format="csr")[order])
+    return partial(integrals, line, mesh["unknown_position"].values[rows[0]], spread)
+
+
+def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
+    n, count = mesh.sizes["unknown"], vectors.shape[1]
+    pair = np.empty((3, 3, count, count))
+    axes, row, column, value = (mesh[f"pair_{name}"].values for name in ("axes", "row", "column", "value"))
+    for k in range(3):
+        for l in range(k, 3):
+            at = axes == 3 * k + l
+            matrix = sp.csr_array(sp.coo_array((value[at], (row[at], column[at])), shape=(n, n)))
+            pair[k, l] = vectors.T @ (matrix @ vectors)
+            pair[l, k] = pair[k, l].T
+    return Integrals(
+        mass=float(mesh["body_mass"]),
+        first_moment=mesh["first_moment"].values,
+        second_moment=mesh["second_moment"].values,
+        modal_first_moment=mesh["unknown_first_moment"].values @ vectors,
+        position_mode_moment=mesh["unknown_position_moment"].values @ vectors,
+        mode_mode_moment=pair,
+    )
+
+
+def _motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_array:
+    """Return the motion of frame k, that of its node or the mean motion of its nodes, shape (6, ndof)."""
+    tied, node = mesh["tie_node"].values[mesh["tie_frame"].values == k], mesh["unknown_node"].values
+    count = 6 if len(tied) == 1 else 3
+    rows = np.array([[np.flatnonzero((node == t) & (component == c))[0] for c in range(count)] for t in tied])
+    pick = models.selection(rows.ravel(), len(component))
+    if len(tied) == 1:
+        return pick
+    x = mesh["unknown_position"].values[rows[:, 0]]
+    return sp.csr_array(ties.mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x)) @ pick)
+
+
+def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
+    """Return the nodes as points to draw; components that a node lacks are drawn at rest."""
+    numbers, first, index = np.unique(mesh["unknown_node"].values, return_index=True, return_inverse=True)
+    count, position = len(numbers), mesh["unknown_position"].values[first]
+    motion = models.node_motion(index.ravel(), component, count)
+    return Drawn(position, np.arange(count)[:, None], np.zeros(count), motion)
+
+
+def _lumped(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions: np.ndarray) -> Slices | None:
+    r"""Return the nodes as slices of mass, or None where the mass matrix is not that of rigid nodes.
+
+    Most programs have every node of beams and shells as a small rigid body. A node's block of such a matrix, with the
+    mass m, its centre c from the node and the inertia J about that centre, is
+
+    .. math:: \begin{bmatrix} m 1 & -m\tilde c \\ m\tilde c & J - m\tilde c\tilde c \end{bmatrix},
+
+    and every volume integral follows from it (`fe.slices`). A consistent mass of nodes that turn does not determine
+    them: the matrix does not hold where in the element each fraction of the mass is.
+
+    M: shape (n, n).  node: number, shape (n,).  component: index of ux uy uz rx ry rz, (n,).  positions: [m], (n, 3).
+    """
+    _, first, index = np.unique(node, return_index=True, return_inverse=True)
+    index = index.ravel()
+    blocks = _blocks(M, index, component, len(first))
+    if blocks is None:
+        return None
+    mass, c = blocks[:, 0, 0], _axial(blocks[:, 3:, :3]) / blocks[:, :1, 0]
+    lever = skew(c)
+    J = blocks[:, 3:, 3:] + mass[:, None, None] * lever @ lever
+    expected = np.zeros_like(blocks)
+    expected[:, range(3), range(3)] = mass[:, None]
+    expected[:, 3:, :3] = mass[:, None, None] * lever
+    expected[:, :3, 3:] = -expected[:, 3:, :3]
+    expected[:, 3:, 3:] = blocks[:, 3:, 3:]
+    size = np.array([1.0] * 3 + [np.ptp(positions, axis=0).max()] * 3)
+    if np.any(np.abs(expected - blocks) > ALIKE * mass[:, None, None] * np.outer(size, size)):
+        return None
+    motion = at_centres(models.node_motion(index, component, len(first)), c)
+    return Slices(mass, positions[first] + c, spread(J), motion)
+
+
+def _blocks(M: sp.csr_array, index: np.ndarray, component: np.ndarray, count: int) -> np.ndarray | None:
+    """Return the mass of each node, (count, 6, 6), zero for missing unknowns; None where nodes couple or lack mass."""
+    if component.max() >= 6:
+        return None
+    entries = sp.coo_array(M)
+    scale = np.sqrt(M.diagonal())
+    mask = np.abs(entries.data) > ALIKE * scale[entries.row] * scale[entries.col]
+    row, column, value = entries.row[mask], entries.col[mask], entries.data[mask]
+    if np.any(index[row] != index[column]):
+        return None
+    blocks = np.zeros((count, 6, 6))
+    blocks[index[row], component[row], component[column]] = value
+    return blocks if blocks[:, range(3), range(3)].all() else None
+
+
+def _axial(matrices: np.ndarray) -> np.ndarray:
+    """Return the axial vectors of the antisymmetric parts, shape (n, 3)."""
+    a = 0.5 * (matrices - matrices.transpose(0, 2, 1))
+    return np.stack([a[:, 2, 1], a[:, 0, 2], a[:, 1, 0]], axis=1)

@@ -1,0 +1,167 @@
+"""Solids as models: displacements of the nodes, and six degrees of freedom of each rigidly tied frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+import xarray as xr
+
+from flexclear.structure.fe import model as models
+from flexclear.structure.fe.model import Drawn, Families, Integrals, Model
+from flexclear.structure.fe.solid import elasticity, ties
+from flexclear.structure.fe.solid.elasticity import Solid
+from flexclear.structure.fe.solid.geometry import Geometry, boundary, face_nodes
+
+#: families by direction, in their order within a cluster of equal frequencies
+FAMILIES = ("y", "z", "x")
+#: components of a frame's motion by family: a rotation about z moves the body along y
+MEMBER = {"y": (1, 5), "z": (2, 4), "x": (0, 3)}
+#: corners of the pieces into which a face is cut, by its number of nodes, in the order of `Element.face_nodes`
+PIECES = {
+    3: [[0, 1, 2]],
+    4: [[0, 1, 2, 3]],
+    6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+    8: [[0, 1, 2, 3]],
+    9: [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]],
+}
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Map from the model's vector to the displacements of all nodes, (3 n, ndof), and the meaning of its unknowns."""
+
+    spread: sp.csr_array
+    position: np.ndarray  #: [m], shape (ndof, 3)
+    component: np.ndarray  #: 0 .. 5, shape (ndof,)
+    first: dict[int, int]  #: first unknown of each rigidly tied frame, by its number
+
+
+def assemble(mesh: xr.Dataset) -> Model:
+    """Build the model of a solid mesh (schema SOLID)."""
+    solid = solid_of(mesh)
+    unknowns = unknowns_of(mesh)
+    T = unknowns.spread
+    line = elasticity.mass(solid)
+    K = T.T @ elasticity.stiffness(solid) @ T
+    M = T.T @ sp.csr_array(sp.kron(line, sp.eye_array(3))) @ T
+    frames = models.interfaces(mesh, partial(_motion, mesh, unknowns))
+    recipe = mesh.attrs["interfaces"].split()
+    ends = tuple(frame for name in recipe[:2] for frame in frames if frame.name == name)
+    return Model(
+        stiffness=models.symmetric(K),
+        mass=models.symmetric(M),
+        rigid=models.rigid_motions(unknowns.position, unknowns.component, unknowns.position.mean(axis=0)),
+        position=unknowns.position,
+        interfaces=frames,
+        ends=ends,
+        integrate=partial(integrals, line, solid.nodes, T),
+        families=families(unknowns.position, unknowns.component),
+        drawn=_drawn(mesh, T),
+    )
+
+
+def integrals(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array, vectors: np.ndarray) -> Integrals:
+    """Return volume integrals from the mass matrix of one axis; its space holds positions as exactly as displacements.
+
+    line: [kg], shape (n, n).  nodes: [m], shape (n, 3).  spread: vector to displacements, shape (3 n, ndof).
+    """
+    n, count = len(nodes), vectors.shape[1]
+    S = (spread @ vectors).reshape(n, 3, count)
+    weighted = (line @ S.reshape(n, -1)).reshape(n, 3, count)
+    moment = line @ nodes
+    pair = np.empty((3, 3, count, count))
+    for k in range(3):
+        for l in range(3):
+            pair[k, l] = S[:, k].T @ weighted[:, l] if l >= k else pair[l, k].T
+    return Integrals(
+        mass=float(line.sum()),
+        first_moment=moment.sum(axis=0),
+        second_moment=nodes.T @ moment,
+        modal_first_moment=weighted.sum(axis=0),
+        position_mode_moment=np.einsum("nk,nlj->klj", nodes, weighted, optimize=True),
+        mode_mode_moment=pair,
+    )
+
+
+def solid_of(mesh: xr.Dataset) -> Solid:
+    """Return nodes, cells and materials of a mesh."""
+    region = mesh["cell_region"].values
+    E, nu, rho = (mesh[name].values[region] for name in ("youngs_modulus", "poisson", "density"))
+    lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu))
+    return Solid(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, lame, shear, rho)
+
+
+def unknowns_of(mesh: xr.Dataset) -> Unknowns:
+    """Build the model's vector: displacements of the free nodes, then six unknowns of each rigidly tied frame."""
+    x, n = mesh["node_position"].values, mesh.sizes["node"]
+    tie_node, tie_frame = mesh["tie_node"].values, mesh["tie_frame"].values
+    rigid = np.flatnonzero(mesh["frame_tie"].values == "rigid")
+    led = np.zeros(n, dtype=bool)
+    led[tie_node[np.isin(tie_frame, rigid)]] = True
+    free = np.flatnonzero(~led)
+    size = 3 * len(free)
+    rows = [(3 * free[:, None] + np.arange(3)).ravel()]
+    columns, values = [np.arange(size)], [np.ones(size)]
+    positions, component, first = [np.repeat(x[free], 3, axis=0)], [np.tile(np.arange(3), len(free))], {}
+    for k in rigid:
+        nodes, position = tie_node[tie_frame == k], mesh["frame_position"].values[k]
+        motion = models.carried(x[nodes] - position)
+        rows.append(np.broadcast_to((3 * nodes[:, None] + np.arange(3))[:, :, None], motion.shape).ravel())
+        columns.append(np.broadcast_to(size + np.arange(6), motion.shape).ravel())
+        values.append(motion.ravel())
+        positions.append(np.tile(position, (6, 1)))
+        component.append(np.arange(6))
+        first[int(k)] = size
+        size += 6
+    where = (np.concatenate(rows), np.concatenate(columns))
+    spread = sp.csr_array(sp.coo_array((np.concatenate(values), where), shape=(3 * n, size)))
+    spread.eliminate_zeros()
+    return Unknowns(spread, np.vstack(positions), np.concatenate(component), first)
+
+
+def _motion(mesh: xr.Dataset, unknowns: Unknowns, k: int) -> sp.csr_array:
+    """Return the motion of frame k: its own unknowns, or the mean motion of its nodes, shape (6, ndof)."""
+    if k in unknowns.first:
+        return models.selection(unknowns.first[k] + np.arange(6), len(unknowns.position))
+    tied = mesh["tie_frame"].values == k
+    nodes, weight = mesh["tie_node"].values[tied], mesh["tie_weight"].values[tied]
+    x, position = mesh["node_position"].values, mesh["frame_position"].values[k]
+    return sp.csr_array(ties.mean(x[nodes], weight, nodes, position, len(x)) @ unknowns.spread)
+
+
+def families(position: np.ndarray, component: np.ndarray) -> Families:
+    """Return the families of unknowns along x, y, z; position [m] (ndof, 3), component 0 .. 5, or more, (ndof,)."""
+    member = np.zeros(len(position), dtype=np.int64)
+    for rank, name in enumerate(FAMILIES):
+        member[np.isin(component, MEMBER[name])] = rank
+    main = tuple(np.flatnonzero(component == MEMBER[name][0]) for name in FAMILIES)
+    extent = np.ptp(position, axis=0)
+    along = position[:, int(np.argmax(extent))]
+    local = sp.csr_array(sp.eye_array(len(position), format="csr"))
+    return Families(FAMILIES, local, member, main, (along - along.min()) / extent.max())
+
+
+def surface(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of the boundary, ascending, and the corners of its faces among them, shape (faces, corners).
+
+    Faces with nodes between their corners are cut into several, where these nodes can be corners of all pieces.
+    """
+    geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, {}, {})
+    faces = face_nodes(geometry, *boundary(geometry))
+    corners = PIECES[faces.shape[1]]
+    pieces = faces[:, corners].reshape(-1, len(corners[0]))
+    used, cell = np.unique(pieces, return_inverse=True)
+    return used, cell.reshape(pieces.shape)
+
+
+def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
+    used, cell = surface(mesh)
+    # nodes of a solid have no rotations
+    unknowns, rows = (
+        (size * np.asarray(nodes)[:, None] + np.arange(3)).ravel() for size, nodes in ((3, used), (6, range(len(used))))
+    )
+    motion = sp.csr_array(models.selection(unknowns, spread.shape[0], rows, 6 * len(used)) @ spread)
+    return Drawn(mesh["node_position"].values[used], cell, np.zeros(len(cell)), motion)

@@ -1,0 +1,169 @@
+r"""Deficits of a reduced body, measured against the full model.
+
+*Compliance*: displacement of a frame under unit static loads while another frame is held (or none is, and the load
+is balanced by the body's inertia), for the full model, and the fraction of it that the basis reaches.
+
+*Error bound*: a force :math:`f e^{i\omega t}` at a frame moves the free body by u, and the reduced one (with its rigid
+motion) by :math:`\hat u`. With :math:`D = K - \omega^2 M` and the residual :math:`r = f - D\hat u`, which the basis and
+the rigid motions do not feel, the error at the frame along the force is :math:`r^T D^{-1} r`. In the elastic modes of
+the full model this is :math:`\sum_j (\phi_j^T r)^2 / (\omega_j^2-\omega^2)`, so below the first frequency
+:math:`\omega_1`
+
+.. math:: 0 \le f^T(u - \hat u) \le \frac{r^T G r}{1 - \omega^2/\omega_1^2},
+
+where :math:`r^T G r = \sum_j (\phi_j^T r)^2/\omega_j^2` needs one static solution of the full model. At rest the bound
+is the missing compliance itself.
+
+*Resolved frequency*: the highest frequency of the free body up to which the basis, with the rigid motions, has every
+frequency within a hundredth.
+
+*Effective mass*: of a mode of unit modal mass, the square of its momentum per unit rigid motion, about the centre of
+mass.
+
+Sources: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 17; Parlett, *The Symmetric Eigenvalue
+Problem* (1998), ch. 11 (residual bounds).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+
+from flexclear.artifacts.compliance import fractions, reduced
+from flexclear.structure.fe.model import DIRECTIONS, Interface, Model
+from flexclear.structure.modes import eigen, normal
+from flexclear.structure.modes.condition import in_own_axes
+from flexclear.structure.modes.statics import Flexibility
+from flexclear.system.progress import Progress
+
+#: frequencies of the error bound, as fractions of the free body's first frequency
+BOUND_AT = (0.0, 0.25, 0.5)
+#: a frequency is resolved when its relative difference from the full model's is at most this
+RESOLVED = 0.01
+#: largest number of frequencies of the full model to compare with; each costs a solution of the full model
+COMPARED = 40
+
+
+def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return deficits (schema BUNDLE) and attributes of a basis of mass-normalised modes, shape (ndof, n)."""
+    model = flexibility.model
+    names = [frame.name for frame in model.interfaces]
+    progress(None, "compliance of the full model")
+    whole = full(flexibility, model.interfaces)
+    fraction = fractions(of_basis(flexibility, model.interfaces, vectors), whole)
+    first, resolved = _frequencies(flexibility, vectors, progress)
+    progress(None, "error bounds")
+    at = first * np.array(BOUND_AT)
+    data = {
+        "frame_held": (("frame_held",), names),
+        "direction": (("direction",), list(DIRECTIONS)),
+        "bound_frequency": (("bound_frequency",), at),
+        "compliance_full": (("frame", "frame_held", "direction"), whole),
+        "compliance_share": (("frame", "frame_held", "direction"), fraction),
+        "error_bound": (("frame", "direction", "bound_frequency"), bounds(flexibility, vectors, at, first)),
+        "effective_mass": (("direction", "mode"), _effective_mass(model, vectors)),
+    }
+    return data, {"first_free_frequency": first, "resolved_frequency": resolved}
+
+
+def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, first: float) -> np.ndarray:
+    """Return error bounds [m/N, rad/(N m)] for unit loads at every frame, shape (p, 6, frequencies).
+
+    hertz: frequencies of the load, below `first`, the free body's first one [Hz].
+    """
+    model = flexibility.model
+    basis = np.hstack([model.rigid, vectors])
+    K, M = model.stiffness @ basis, model.mass @ basis
+    loads = frames(flexibility, model.interfaces)[0].T
+    result = np.empty((loads.shape[1], len(hertz)))
+    for k, value in enumerate(hertz):
+        square = (2.0 * np.pi * value) ** 2
+        if square == 0.0:
+            # at rest an unbalanced load has no equilibrium; the inertia of the free body balances it
+            residual = flexibility.balanced(loads)
+            residual = residual - K[:, 6:] @ _solved(vectors.T @ K[:, 6:], vectors.T @ residual)
+        else:
+            inner = basis.T @ (K - square * M)
+            residual = loads - (K - square * M) @ _solved(inner, basis.T @ loads)
+        energy = np.einsum("ij,ij->j", residual, flexibility.response(flexibility.balanced(residual)))
+        result[:, k] = energy / (1.0 - (value / first) ** 2)
+    # rounding may give negative values where a basis misses nothing
+    return np.maximum(result, 0.0).reshape(len(model.interfaces), 6, len(hertz))
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    scale = 1.0 / np.sqrt(np.abs(np.diag(matrix)))
+    return scale[:, None] * scipy.linalg.solve(scale[:, None] * matrix * scale, scale[:, None] * right)
+
+
+def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -> tuple[float, float]:
+    """Return the free body's first frequency, and the highest one that the basis resolves (zero: none) [Hz]."""
+    model = flexibility.model
+    count = min(vectors.shape[1], COMPARED, model.size - 6)
+    none = sp.csr_array((0, model.size))
+    full = eigen.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
+    shapes = flexibility.relieved(vectors)
+    values, _ = eigen.rediagonalise(model.stiffness, model.mass, shapes)
+    resolved = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
+    whole = count if resolved.all() else int(np.argmin(resolved))
+    return float(full[0]), float(full[whole - 1]) if whole else 0.0
+
+
+def _effective_mass(model: Model, vectors: np.ndarray) -> np.ndarray:
+    """Return the effective mass of each mode [kg, kg m^2], shape (6, n)."""
+    momentum = model.mass @ model.rigid
+    inertia = model.rigid.T @ momentum
+    # rigid rotation about the centre of mass: subtract the translation that cancels its momentum
+    shift = np.eye(6)
+    shift[:3, 3:] = -inertia[:3, 3:] / inertia[0, 0]
+    return (shift.T @ (momentum.T @ vectors)) ** 2
+
+
+def frames(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return motions of p frames in their own axes: functionals (6 p, ndof), and their rigid motions (p, 6, 6)."""
+    motion = np.vstack([in_own_axes(frame).toarray() for frame in interfaces])
+    return motion, (motion @ flexibility.model.rigid).reshape(-1, 6, 6)
+
+
+def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndarray:
+    """Return the compliance [m/N, rad/(N m)] of each frame with each other one held (itself: none), shape (p, p, 6)."""
+    (motion, rigid), p = frames(flexibility, interfaces), len(interfaces)
+    loads = np.hstack([motion.T, flexibility.momentum])
+    gram = loads.T @ flexibility.response(loads)
+    result = np.empty((p, p, 6))
+    for i in range(p):
+        for j in range(p):
+            # the load on i and its reaction: at j, or the inertia of the whole body
+            balance = np.zeros((6 * p + 6, 6))
+            balance[6 * i : 6 * i + 6] = np.eye(6)
+            if i == j:
+                balance[6 * p :] = -np.linalg.solve(flexibility.inertia, rigid[i].T)
+            else:
+                balance[6 * j : 6 * j + 6] = -np.linalg.solve(rigid[j].T, rigid[i].T)
+            result[i, j] = np.einsum("ad,ab,bd->d", balance, gram, balance)
+    return result
+
+
+def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> np.ndarray:
+    """Return the compliance that shapes (ndof, n) represent, as in `full`; any combination and scale of them."""
+    functionals, rigid = frames(flexibility, interfaces)
+    K = vectors.T @ (flexibility.model.stiffness @ vectors)
+    relief = np.linalg.solve(flexibility.inertia, flexibility.momentum.T @ vectors)
+    scale = 1.0 / np.sqrt(np.diag(K))
+    inner = scale[:, None] * (0.5 * (K + K.T)) * scale
+    motion = (functionals @ (vectors * scale)).reshape(len(interfaces), 6, -1)
+    return reduced(motion, rigid, relief * scale, inner)
+
+
+def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
+    """Return the least compliance fraction between interfaces (of a single one: of the free body), and its location."""
+    whole = full(flexibility, interfaces)
+    each = fractions(of_basis(flexibility, interfaces, vectors), whole)
+    if len(interfaces) > 1:
+        each[np.arange(len(each)), np.arange(len(each))] = 1.0
+    i, j, d = np.unravel_index(int(np.argmin(each)), each.shape)
+    held = "with nothing held" if i == j else f"with '{interfaces[j].name}' held"
+    return float(each[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"

@@ -1,0 +1,123 @@
+"""Requests to stop work: by Ctrl-C, by a time limit, by the process that started it.
+
+Work that can leave partial results in good order heeds requests: it checks for them from time to time. All other work
+is ended at once.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from flexclear.system.errors import StoppedError
+
+#: reason of a stop by Ctrl-C
+INTERRUPTED = "interrupted"
+
+_why = ""
+_heeded = 0
+_heeded_lock = threading.Lock()
+_busy = False
+_deadlines: list[tuple[float, str]] = []
+
+
+def request(why: str) -> None:
+    """Ask the work of this process to stop."""
+    global _why
+    _why = _why or why
+
+
+def requested() -> str:
+    """Return the reason why the work must stop; empty while it may go on."""
+    now = time.monotonic()
+    return _why or next((why for end, why in _deadlines if now > end), "")
+
+
+def check() -> None:
+    """Raise StoppedError when the work must stop."""
+    why = requested()
+    if why:
+        raise StoppedError(why, interrupted=why == INTERRUPTED)
+
+
+def heeds() -> bool:
+    """Return True when the running work checks for requests."""
+    return _heeded > 0
+
+
+@contextmanager
+def heeded() -> Iterator[None]:
+    """Declare that the work inside this context checks for requests."""
+    global _heeded
+    with _heeded_lock:  # several threads of a task may integrate at the same time
+        _heeded += 1
+    try:
+        yield
+    finally:
+        with _heeded_lock:
+            _heeded -= 1
+
+
+@contextmanager
+def busy() -> Iterator[None]:
+    """Declare that this worker has a task inside this context."""
+    global _busy
+    _busy = True
+    try:
+        yield
+    finally:
+        _busy = False
+
+
+@contextmanager
+def until(seconds: float | None, why: str) -> Iterator[None]:
+    """Request a stop inside this context after `seconds`; None sets no limit."""
+    if seconds is None:
+        yield
+        return
+    entry = (time.monotonic() + seconds, why)
+    _deadlines.append(entry)
+    try:
+        yield
+    finally:
+        _deadlines.remove(entry)
+
+
+@contextmanager
+def gently(say: Callable[[str], None]) -> Iterator[None]:
+    """Treat the first Ctrl-C inside this context as a request to work that heeds requests; otherwise interrupt."""
+    global _why
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def handle(number: int, frame: Any) -> None:
+        if not heeds() or _why:
+            raise KeyboardInterrupt
+        request(INTERRUPTED)
+        say("stopping after storing finished results; press Ctrl-C again to stop at once")
+
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    before = None if ignored else signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    finally:
+        _why = ""
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
+
+
+def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], unstoppable: Callable[[], None]) -> None:
+    """Let a worker stop when its parent requests it; `unstoppable` reports a task that does not heed requests."""
+
+    def wait() -> None:
+        wait_for_signal()
+        request(why())
+        if _busy and not heeds():
+            unstoppable()
+
+    threading.Thread(target=wait, daemon=True).start()

@@ -1,0 +1,190 @@
+"""Worker processes of this machine: spawned, ended with their parent; Ctrl-C is left to the parent.
+
+`concurrent.futures` starts them and distributes the work. This module adds the request to stop in good order: without
+it each worker would lose all results since its last writing, up to `journal.WRITING_INTERVAL`.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from flexclear.system.errors import ResourceError
+from flexclear.workflow import cores, stopping
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+
+
+#: message about a worker process that was killed
+LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to continue"
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Data shared by the workers of a pool and their parent: the request to stop with its reason, and progress.
+
+    unstoppable: number of workers whose task cannot stop in good order. reports: arguments of `Monitor.update`; a queue
+    without a process or thread of its own, whose writers wait while it is full.
+    """
+
+    stop: Any
+    why: Any
+    unstoppable: Any
+    reports: Any
+
+    @staticmethod
+    def made() -> Channel:
+        """Create a channel for the workers of one pool."""
+        context = _context()
+        return Channel(context.Event(), context.Array("c", 1000), context.Value("i", 0), context.SimpleQueue())
+
+    def request_stop(self, why: str) -> None:
+        """Ask all workers to stop."""
+        self.why.value = why.encode()[:999]
+        self.stop.set()
+
+    def count_unstoppable(self) -> None:
+        """Count this worker as one whose task does not heed requests."""
+        with self.unstoppable.get_lock():
+            self.unstoppable.value += 1
+
+    def received(self) -> list[Any]:
+        """Return, in the parent, the reports of workers since the last call."""
+        news = []
+        while not self.reports.empty():
+            news.append(self.reports.get())
+        return news
+
+
+def pool(width: int, channel: Channel | None = None) -> ProcessPoolExecutor:
+    """Return a pool of at most `width` workers; spawned, because compiled kernels and forks do not mix."""
+    # imported here, because a command whose results are all up to date must start quickly
+    from concurrent.futures import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(channel,))
+
+
+#: in a worker: the channel of its pool
+_channel: Channel | None = None
+
+
+def _begin(channel: Channel | None) -> None:
+    """Prepare a worker: it ends with its parent, and ignores Ctrl-C, which the parent handles."""
+    global _channel
+    _channel = channel
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_watch, daemon=True).start()
+    if channel is not None:
+        stopping.obey(channel.stop.wait, lambda: channel.why.value.decode(errors="replace"), channel.count_unstoppable)
+
+
+def report(name: str, fraction: float | None, text: str) -> None:
+    """Report from a worker to its parent how far the task of this name is."""
+    if _channel is not None:
+        _channel.reports.put((name, fraction, text))
+
+
+def _watch() -> None:
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _context() -> Any:
+    import multiprocessing
+
+    return multiprocessing.get_context("spawn")
+
+
+def kill(workers: ProcessPoolExecutor) -> None:
+    """End the workers at once; a compiled kernel does not react to interrupts."""
+    for process in list((workers._processes or {}).values()):
+        process.kill()
+    workers.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def lost() -> Iterator[None]:
+    """Convert the loss of a worker process, which the system may kill when memory is full, to a ResourceError."""
+    from concurrent.futures.process import BrokenProcessPool
+
+    try:
+        yield
+    except (BrokenProcessPool, ConnectionError):
+        raise ResourceError(LOST) from None
+
+
+@dataclass(frozen=True)
+class Team:
+    """Workers, each started when it is first needed, and the channel that they share with their parent."""
+
+    width: int
+    pool: ProcessPoolExecutor
+    channel: Channel
+
+
+#: the idle team, held for the next call
+_idle: list[Team] = []
+_reusing = 0
+
+
+@contextmanager
+def reused() -> Iterator[None]:
+    """Keep workers alive between calls of `team` inside this context: starting and importing take a second.
+
+    Workers have the environment of their start, so a context is for one command.
+    """
+    global _reusing
+    _reusing += 1
+    try:
+        yield
+    finally:
+        _reusing -= 1
+        while _idle and not _reusing:
+            _idle.pop().pool.shutdown()
+
+
+@contextmanager
+def team(width: int) -> Iterator[Team]:
+    """Yield at least `width` workers; they are killed where the block fails or the work must stop."""
+    with ExitStack() as stack:
+        while _idle and _idle[-1].width < width:
+            _idle.pop().pool.shutdown()
+        # a team for reuse may serve a wider call later; workers that are never needed are never started
+        current = _idle.pop() if _idle else _team(max(width, cores.cores()) if _reusing else width)
+        stack.callback(kill, current.pool)
+        current.channel.received()  # discards reports of the last call
+        yield current
+        if not stopping.requested():
+            stack.pop_all()
+            if _reusing:
+                _idle.append(current)
+            else:
+                current.pool.shutdown()
+
+
+def _team(width: int) -> Team:
+    channel = Channel.made()
+    return Team(width, pool(width, channel), channel)
+
+
+@contextmanager
+def without_main() -> Iterator[None]:
+    """Prevent workers started inside this context from running the caller's script again."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
