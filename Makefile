@@ -15,7 +15,7 @@ PYTHON ?= $(shell for p in $(CANDIDATES); do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { command -v $$p; break; }; done)
 
 all: $(READY) ## Reproduce every figure and table of the paper: results/report/index.html
-	@$(RUN) -m flexclear report
+	@$(RUN) -m papers.wang_wang_2019
 
 help: ## This list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
@@ -67,8 +67,8 @@ docs: $(READY) ## The documentation as a site: results/site/index.html
 	@echo results/site/index.html
 
 clean: ## Remove results and caches; .venv stays
-	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
-	find flexclear papers pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf results build dist pipeline/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find papers pipeline stages tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Made once, and again when the versions that are asked for change. Bytecode is made of what is imported, when it is.
 INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt

@@ -16,12 +16,12 @@ from threading import Lock, local
 from typing import Any
 
 IMPORTS, REST = "imports", "rest"
-_CORE, _RUN = "flexclear.pipeline.core", "flexclear.dynamics"
+_RUN = "flexclear.dynamics"
 #: module -> function -> part to which the function's time counts
 PARTS: Mapping[str, Mapping[str, str]] = {
-    f"{_CORE}.scene.load": {"load_scene": "scene"},
-    f"{_CORE}.workflow.task": {"facts": "keys", "key": "keys"},
-    f"{_CORE}.artifacts.store": {"Store.find": "keys", "_written": "writing"},
+    "flexclear.scene.load": {"load_scene": "scene"},
+    "flexclear.workflow.task": {"facts": "keys", "key": "keys"},
+    "flexclear.artifacts.store": {"Store.find": "keys", "_written": "writing"},
     f"{_RUN}.run.evaluation.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},
     f"{_RUN}.run.trajectory": {"integrate": "integrating"},

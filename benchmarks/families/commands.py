@@ -17,7 +17,7 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, spread, table
 from benchmarks.processes import as_installed
 from benchmarks.timing import Times, interleaved, of_children
-from flexclear.artifacts.paths import TREE, results_root
+from flexclear.artifacts.paths import PROJECT, results_root
 from flexclear.system.platforms import cores
 
 #: number of rounds; single ones take up to a quarter longer on a machine that others use as well
@@ -99,7 +99,7 @@ def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "
     environment = as_installed(folder) | ({"FLEXCLEAR_RESULTS": str(results_root())} if command.own else {})
     done = subprocess.run(
         [sys.executable, *program, *arguments],
-        cwd=TREE,
+        cwd=PROJECT,
         env=environment,
         text=True,
         stdout=subprocess.PIPE,

@@ -14,10 +14,10 @@ from typing import Any
 
 import xarray as xr
 
+from flexclear.artifacts.paths import PROJECT
 from flexclear.post.pages import Part, downloads, figures_of, media, page, prose
 from flexclear.post.plotting.table import Table, as_csv, as_html, from_markdown
 from flexclear.system.progress import Progress
-from flexclear.workflow.fingerprint import TREE
 from papers.wang_wang_2019 import DOCUMENTS, figures
 from papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 
@@ -38,7 +38,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     for scene, path in params["runs"].items():
         with xr.open_dataset(results / path) as one:
             attributes[scene] = {**one.attrs, **params["origins"][scene]}
-    content = collect(results, attributes, params["rendered"], TREE)
+    content = collect(results, attributes, params["rendered"], PROJECT)
     return {"index.html": html_page(content).encode(), "paper.md": paper_markdown(content).encode()}
 
 

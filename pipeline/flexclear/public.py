@@ -25,37 +25,11 @@ from flexclear.scene import load
 from flexclear.scene.schema import Scene
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace, seconds
-from flexclear.system.errors import FlexclearError, InputError, ResourceError, SolverError
 from flexclear.system.version import version
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "FlexclearError",
-    "InputError",
-    "ResourceError",
-    "Scene",
-    "SolverError",
-    "compare",
-    "cost",
-    "edited",
-    "effects",
-    "equilibrium",
-    "frequencies",
-    "load_scene",
-    "open",
-    "plan",
-    "quantity",
-    "render",
-    "report",
-    "run",
-    "sections",
-    "sensitivities",
-    "show",
-    "stability",
-    "sweep",
-]
 __version__ = version()
 
 
