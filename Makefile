@@ -1,7 +1,7 @@
 # Targets are names only: what is up to date is decided by content, by the program itself.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: all help setup check test test-slow interpreters bench atlas chaos docs clean
+.PHONY: all mesh modes bundle simulate post help setup check test test-slow interpreters bench atlas chaos docs clean
 
 VENV := .venv
 # where environments hold their programs: Windows calls that folder otherwise
@@ -16,6 +16,15 @@ PYTHON ?= $(shell for p in $(CANDIDATES); do \
 
 all: $(READY) ## Reproduce every figure and table of the paper: results/report/index.html
 	@$(RUN) -m papers.wang_wang_2019
+
+mesh: $(READY) ## One stage of a scene alone, from its mesh recipes: make mesh SCENE=sps4/far_cb
+modes: $(READY) ## From meshes, the modes of each flexible body
+bundle: $(READY) ## From meshes and modes, the reduced flexible bodies
+simulate: $(READY) ## From reduced bodies, the motion
+post: $(READY) ## From the motion, derived series
+
+mesh modes bundle simulate post:
+	@$(RUN) stages/$@.py $(or $(SCENE),$(error say which scene: make $@ SCENE=sps4/far_cb))
 
 help: ## This list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20

@@ -7,7 +7,6 @@ import inspect
 import flexclear as fc
 from benchmarks.page import DOCS
 from benchmarks.site.keys import table
-from flexclear import public
 from flexclear.artifacts import schema as artifacts
 from flexclear.artifacts.coordinates import COORDINATES
 from flexclear.artifacts.schema import Schema
@@ -182,7 +181,7 @@ and `fc.ResourceError` where the machine lacks memory or disk. The command ends 
 
 def python() -> str:
     """Return docs/reference/python.md: every public function with its signature, docstring and example."""
-    names = [name for name in public.__all__ if inspect.isfunction(getattr(fc, name, None))]
+    names = [name for name in fc.__all__ if inspect.isfunction(getattr(fc, name, None))]
     return PYTHON + "".join(_section(name) for name in names) + PROMISES
 
 

@@ -24,6 +24,7 @@ __all__ = [
     "edited",
     "effects",
     "equilibrium",
+    "exit_code",
     "frequencies",
     "load_scene",
     "open",
@@ -36,6 +37,7 @@ __all__ = [
     "sensitivities",
     "show",
     "stability",
+    "stage",
     "sweep",
 ]
 
