@@ -168,8 +168,8 @@ PROMISES = """## What stays
 Public are the names in `fc.__all__`, the keys of scene files, recipes and sweeps, the commands with their options and
 exit codes, and the variables of [datasets.md](../datasets.md). A release that breaks one of them has a new first
 number. Before that the old name works for at least one release and warns (`DeprecationWarning`, or one line of the
-command), and CHANGELOG.md names what replaces it. Everything else may change with each release, `flexclear.pipeline`
-and `flexclear.stages` included.
+command), and CHANGELOG.md names what replaces it. Everything else may change with each release, the modules below
+`flexclear` included.
 
 ## Errors
 

@@ -23,6 +23,8 @@ from papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 
 #: place, text and scenes
 Assumption = tuple[str, str, tuple[str, ...]]
+#: the command that makes everything on the page
+PROGRAM = "python -m papers.wang_wang_2019"
 #: attributes of a run that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
 
@@ -98,9 +100,9 @@ def paper_markdown(content: Content) -> str:
     """Return docs/paper.md: all figures and tables with scenes and commands, the tables, assumptions, discrepancies."""
     parts = [
         "# The paper, reproduced\n",
-        f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
+        f"{CITATION}. This page is written by `{PROGRAM}`; every number on it was computed by the "
         "commands next to it.\n",
-        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear report` "
+        f"`make all` makes everything below. `flexclear run` brings the named scenes up to date, `{PROGRAM}` "
         "draws every figure and table into `results/figures` and `results/tables`.\n",
         "## Figures and tables\n",
         _index(),
@@ -149,7 +151,7 @@ def scenes_of(name: str) -> tuple[str, ...]:
 def command(name: str) -> str:
     """Return the command that makes one figure or table."""
     scenes = [scene for scene in scenes_of(name) if "/" in scene]
-    return f"flexclear run {' '.join(scenes)} && flexclear report" if scenes else "flexclear report"
+    return f"flexclear run {' '.join(scenes)} && {PROGRAM}" if scenes else PROGRAM
 
 
 def _index() -> str:

@@ -10,7 +10,7 @@ from tests.processes import python
 
 #: a clamped rod, which has all stages, with few modes and a short motion
 SCENE = """extends = "{root}/scenes/checks/clamped_rod.toml"
-set.body.rod.modes.count = 7
+set.body.rod.modes.count = 8
 set.time.end = "0.2 ms"
 """
 #: stage -> the dataset that it writes
@@ -35,7 +35,7 @@ def test_each_stage_runs_alone_on_the_files_of_the_one_before(root: Path, tmp_pa
         assert [path for path in WRITES.values() if (results / path).exists()][-1] == file  # nothing beyond is run
         before = f"results/runs/rod/{file}\n"
     with xr.open_dataset(results / "bundle" / "rod.nc") as bundle:
-        assert f"rod: {float(bundle['mass']):.4g} kg in 7 modes" in run(root, tmp_path, "bundle").stdout
+        assert f"rod: {float(bundle['mass']):.4g} kg in 8 modes" in run(root, tmp_path, "bundle").stdout
 
 
 @pytest.mark.parametrize("stage, missing", [("bundle", "mesh"), ("simulate", "mesh"), ("post", "mesh")])
