@@ -1,7 +1,7 @@
 # Targets are names only: what is up to date is decided by content, by the program itself.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: all help setup check test test-slow interpreters bench atlas chaos docs clean
+.PHONY: all mesh modes bundle simulate post help setup check test test-slow interpreters bench atlas chaos docs clean
 
 VENV := .venv
 # where environments hold their programs: Windows calls that folder otherwise
@@ -15,7 +15,16 @@ PYTHON ?= $(shell for p in $(CANDIDATES); do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { command -v $$p; break; }; done)
 
 all: $(READY) ## Reproduce every figure and table of the paper: results/report/index.html
-	@$(RUN) -m flexclear report
+	@$(RUN) -m papers.wang_wang_2019
+
+mesh: $(READY) ## One stage of a scene alone, from its mesh recipes: make mesh SCENE=sps4/far_cb
+modes: $(READY) ## From meshes, the modes of each flexible body
+bundle: $(READY) ## From meshes and modes, the reduced flexible bodies
+simulate: $(READY) ## From reduced bodies, the motion
+post: $(READY) ## From the motion, derived series
+
+mesh modes bundle simulate post:
+	@$(RUN) stages/$@.py $(or $(SCENE),$(error say which scene: make $@ SCENE=sps4/far_cb))
 
 help: ## This list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
@@ -72,8 +81,8 @@ docs: $(READY) ## The documentation as a site: results/site/index.html
 	@echo results/site/index.html
 
 clean: ## Remove results and caches; .venv stays
-	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
-	find flexclear papers pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf results build dist pipeline/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find papers pipeline stages tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Made once, and again when the versions that are asked for change. Bytecode is made of what is imported, when it is.
 INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt

@@ -12,10 +12,9 @@ from pathlib import Path
 
 from benchmarks import families, log, page, processes
 from benchmarks.family import WRONG, Case, Family, Record
-from flexclear.commands.__main__ import INTERRUPTED
 from flexclear.post.plotting.table import pipe_table
 from flexclear.scene.registry import suggestion
-from flexclear.system.errors import FlexclearError, InputError
+from flexclear.system.errors import INTERRUPTED, FlexclearError, InputError
 from flexclear.workflow.progress import Monitor, duration
 
 

@@ -19,6 +19,7 @@ from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.layouts import ROD_CENTRE, ROD_END, Layout, edits
 from flexclear import dynamics
 from flexclear.artifacts import quantities
+from flexclear.artifacts.paths import PROJECT
 from flexclear.commands.scenes import Workplace, bundles, open_workplace
 from flexclear.dynamics.run.run import engine_of
 from flexclear.scene.integrators import DEFAULT
@@ -28,7 +29,6 @@ from flexclear.scene.schema import Scene
 from flexclear.stages.graph import Graph
 from flexclear.system.errors import FlexclearError, SolverError
 from flexclear.system.progress import silent
-from flexclear.workflow.fingerprint import TREE
 from flexclear.workflow.progress import Monitor
 from flexclear.workflow.task import in_order
 
@@ -127,7 +127,7 @@ def _random(seed: int, count: int) -> Iterator[Case]:
 def scene(p: Parameters, rtol: float | None = None) -> Scene:
     """Return the scene of a point; raise InputError when no valid scene describes the point."""
     moved = edits(layout(p.nearness), flexible=bool(p.modes)) if p.nearness else {}
-    table = compose(TREE / "scenes" / "sps4" / "variants" / "first_csj.toml")
+    table = compose(PROJECT / "scenes" / "sps4" / "variants" / "first_csj.toml")
     _scale_mass(table["body"]["platform"], p.mass)
     joint = _contact(table["joint"]["A1"], p)
     for name in ("A1", "A2", "A3", "A4", "C")[: p.joints]:
@@ -168,7 +168,7 @@ def _flexible(rod: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
     lower = np.array(rod["pose"]["position"]) - (ROD_END - ROD_CENTRE) * z / np.linalg.norm(z)
     return {
         "type": "flexible",
-        "mesh": str(TREE / "meshes" / "actuated_rod.toml"),
+        "mesh": str(PROJECT / "meshes" / "actuated_rod.toml"),
         "modes": {"reference": "craig-bampton", "count": p.modes, "interfaces": ["bottom", "top"]},
         "pose": {"position": lower.tolist(), "axes": {"x": z.tolist(), "y": x.tolist()}},
     } | ({"damping": p.damping} if p.damping else {})

@@ -1,6 +1,6 @@
-"""Processor time of one command, by parts of the work: ``python -m benchmarks.command_parts run SCENE``.
+"""Processor time of one program, by parts of the work: ``python -m benchmarks.command_parts flexclear run SCENE``.
 
-The command runs in a process of its own, since imports are a part. The last line of the output is a table as JSON:
+The program runs in a process of its own, since imports are a part. The last line of the output is a table as JSON:
 part -> seconds. The time of a part excludes the parts nested in it. Threads that run concurrently count separately.
 """
 
@@ -12,16 +12,17 @@ import time
 from collections.abc import Callable, Mapping
 from functools import wraps
 from importlib import _bootstrap
+from runpy import run_module
 from threading import Lock, local
 from typing import Any
 
 IMPORTS, REST = "imports", "rest"
-_CORE, _RUN = "flexclear.pipeline.core", "flexclear.dynamics"
+_RUN = "flexclear.dynamics"
 #: module -> function -> part to which the function's time counts
 PARTS: Mapping[str, Mapping[str, str]] = {
-    f"{_CORE}.scene.load": {"load_scene": "scene"},
-    f"{_CORE}.workflow.task": {"facts": "keys", "key": "keys"},
-    f"{_CORE}.artifacts.store": {"Store.find": "keys", "_written": "writing"},
+    "flexclear.scene.load": {"load_scene": "scene"},
+    "flexclear.workflow.task": {"facts": "keys", "key": "keys"},
+    "flexclear.artifacts.store": {"Store.find": "keys", "_written": "writing"},
     f"{_RUN}.run.evaluation.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},
     f"{_RUN}.run.trajectory": {"integrate": "integrating"},
@@ -81,12 +82,14 @@ def listen() -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command and print the seconds of its parts as JSON."""
+    """Run the program, a package and its arguments, and print the seconds of its parts as JSON."""
     started = time.process_time()
     listen()
-    from flexclear.commands.__main__ import main as command
-
-    code = command(arguments)
+    sys.argv, code = arguments, 0
+    try:
+        run_module(arguments[0], run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        code = int(end.code or 0)
     whole = time.process_time()
     _spent["interpreter"] = started
     _spent[REST] = whole - sum(_spent.values())

@@ -17,12 +17,12 @@ from typing import Any
 from benchmarks import families, log
 from benchmarks.family import Family, Record
 from benchmarks.log import Session
+from flexclear.artifacts.paths import PROJECT
 from flexclear.post.plotting.table import pipe_table
 from flexclear.scene.registry import lookup
 from flexclear.system.errors import InputError
-from flexclear.workflow.fingerprint import TREE
 
-DOCS = TREE / "docs"
+DOCS = PROJECT / "docs"
 #: columns of a table: heading, and the function that returns a record's cell
 Columns = Mapping[str, Callable[[Record], str]]
 #: longest list of a session's cases [characters]; a longer one is replaced by the number of cases

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.artifacts.paths import PROJECT
 from flexclear.commands.new import TEMPLATES
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
-from flexclear.workflow.fingerprint import TREE
 
 #: density [kg/m^3], Young's modulus [Pa], Poisson's ratio
 MATERIALS = {
@@ -72,12 +72,12 @@ def _bent_coupler(table: dict[str, Any], random: np.random.Generator) -> None:
     }
 
 
-SCENES = TREE / "scenes"
+SCENES = PROJECT / "scenes"
 MECHANISMS = {
     "sps4": Mechanism(
         SCENES / "sps4" / "far_csj_cb.toml",
         "A1",
-        {"rod1": TREE / "meshes" / "actuated_rod.toml"},
+        {"rod1": PROJECT / "meshes" / "actuated_rod.toml"},
         {
             "pose": ("platform.position", "platform.orientation"),
             "rate": ("platform.velocity", "platform.angular_velocity"),

@@ -8,19 +8,21 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.fingerprint import TREE, Sources
 
 ROOT = Path(__file__).parent.parent
-#: folders of the program; `flexclear` leads to the others by links
-PACKAGES = ("flexclear", "papers", "pipeline", "stages")
+#: folders of the program and of what stands on it
+PACKAGES = ("pipeline", "papers", "stages")
 
 
 def python(
     *arguments: str | Path, cwd: Path = ROOT, succeeds: bool = True, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python in a folder; unless it may fail, raise an error with its messages where it fails."""
-    command = [sys.executable, *map(str, arguments)]
-    done = subprocess.run(command, cwd=cwd, env=os.environ | environment, capture_output=True, text=True, check=False)
+    """Run Python in a folder, with the sources there; unless it may fail, raise an error with its messages where it
+    fails."""
+    command, own = [sys.executable, *map(str, arguments)], {"PYTHONPATH": str(cwd / "pipeline")}
+    environment = os.environ | own | environment
+    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
     assert not succeeds or done.returncode == 0, done.stderr[-2000:]
     return done
 
@@ -37,7 +39,7 @@ def copied(folder: Path, *more: str) -> Path:
     """
     for name in (*PACKAGES, *more):
         ignored = shutil.ignore_patterns("*.pyc.*")  # half written
-        shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=ignored)
+        shutil.copytree(ROOT / name, folder / name, ignore=ignored)
     shutil.copy(ROOT / "pyproject.toml", folder)
     memo = folder / "results" / "cache" / "imports.json"
     memo.parent.mkdir(parents=True)
@@ -48,9 +50,9 @@ def copied(folder: Path, *more: str) -> Path:
 @cache
 def _imports() -> bytes:
     """The memo of imports of all stages, as commands leave it."""
-    stages = sorted((ROOT / "stages").rglob("*.py"))
-    names = [".".join(("flexclear", *path.relative_to(ROOT).with_suffix("").parts)) for path in stages]
+    stages = sorted((TREE / "flexclear" / "stages").rglob("*.py"))
+    names = [".".join(path.relative_to(TREE).with_suffix("").parts) for path in stages]
     with TemporaryDirectory() as folder:
         memo = Path(folder) / "imports.json"
-        Sources(ROOT, memo).closure([name.removesuffix(".__init__") for name in names])
+        Sources(TREE, memo).closure([name.removesuffix(".__init__") for name in names])
         return memo.read_bytes()

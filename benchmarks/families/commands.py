@@ -17,7 +17,7 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, spread, table
 from benchmarks.processes import as_installed
 from benchmarks.timing import Times, interleaved, of_children
-from flexclear.artifacts.paths import TREE, results_root
+from flexclear.artifacts.paths import PROJECT, results_root
 from flexclear.system.platforms import cores
 
 #: number of rounds; single ones take up to a quarter longer on a machine that others use as well
@@ -36,7 +36,7 @@ print(*(sorted(kind)[4] for kind in zip(*times)))"""
 
 @dataclass(frozen=True)
 class Command:
-    """A command with arguments, in which ``{}`` is a number that changes with each run.
+    """A program with arguments, in which ``{}`` is a number that changes with each run.
 
     value: approximate value of that number.  own: True to use the project's results instead of empty ones.
     loop: True for a loop over `flexclear.run` in Python, of which one point counts.
@@ -46,6 +46,7 @@ class Command:
     value: float = 0.0
     own: bool = False
     loop: bool = False
+    program: str = "flexclear"
 
 
 _CSJ, _IDEAL = "scenes/sps4/csj.toml", "scenes/sps4/ideal.toml"
@@ -55,7 +56,7 @@ COMMANDS: Mapping[str, Command] = {
     "run ideal, a changed number": Command(("run", "-q", _IDEAL, "--set", f"{_MASS[0]}={{}}"), _MASS[1]),
     "run csj, nothing changed": Command(("run", "-q", _CSJ)),
     "check csj": Command(("check", _CSJ)),
-    "report of the paper, nothing changed": Command(("report", "-q"), own=True),
+    "report of the paper, nothing changed": Command(("-q",), own=True, program="papers.wang_wang_2019"),
     "a point of a loop over csj": Command((_CSJ, _CLEARANCE[0], "{}"), _CLEARANCE[1], loop=True),
     "a point of a loop over ideal": Command((_IDEAL, _MASS[0], "{}"), _MASS[1], loop=True),
 }
@@ -70,7 +71,9 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
         times = interleaved(tasks, ROUNDS)
         for case in cases:
             command = COMMANDS[case.name]
-            parts = {} if command.loop else json.loads(_run(command, Path(folder), fresh, "benchmarks.command_parts"))
+            parts = (
+                {} if command.loop else json.loads(_run(command, Path(folder), fresh, ("benchmarks.command_parts",)))
+            )
             fractions = {name: parts.pop(name, 0.0) for name in SHOWN} if parts else {}
             wall = Times(tuple(waits[case.name][-ROUNDS:])).record("s")
             yield case, [{"cpu": times[case.name].record("s"), "wall": wall, "processors": cores(), "parts": fractions}]
@@ -92,14 +95,14 @@ def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[f
     return seconds
 
 
-def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "flexclear") -> str:
+def _run(command: Command, folder: Path, fresh: Iterator[float], around: tuple[str, ...] = ()) -> str:
     """Run a command and return the last line of its output."""
-    program = ["-c", LOOP] if command.loop else ["-m", module]
+    program = ["-c", LOOP] if command.loop else ["-m", *around, command.program]
     arguments = [text.format(repr(command.value * next(fresh))) for text in command.arguments]
     environment = as_installed(folder) | ({"FLEXCLEAR_RESULTS": str(results_root())} if command.own else {})
     done = subprocess.run(
         [sys.executable, *program, *arguments],
-        cwd=TREE,
+        cwd=PROJECT,
         env=environment,
         text=True,
         stdout=subprocess.PIPE,

@@ -15,6 +15,7 @@ import psutil
 
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import percent, table
+from flexclear.artifacts.paths import PROJECT
 from flexclear.commands.scenes import bundles
 from flexclear.dynamics.record.point import Runner
 from flexclear.dynamics.run.evaluation.engine import Engine
@@ -23,7 +24,6 @@ from flexclear.scene.quantity import parse_recorded
 from flexclear.stages.simulation import params
 from flexclear.stages.sweeps.sweep_engine import Job, engine
 from flexclear.stages.sweeps.sweep_points import Family as Points
-from flexclear.workflow.fingerprint import TREE
 
 #: timed points of each kind; two earlier points are not timed
 POINTS = 24
@@ -91,7 +91,7 @@ def _point(kind: Kind) -> Record:
 
 def _runner(kind: Kind) -> Callable[[float], None]:
     """Return a function that runs a point as a worker does."""
-    scene = with_numbers(load_scene(TREE / "scenes" / f"{kind.scene}.toml"), kind.set)
+    scene = with_numbers(load_scene(PROJECT / "scenes" / f"{kind.scene}.toml"), kind.set)
     runner = Runner({}, [parse_recorded(name, scene.owners()) for name in kind.keep])
 
     def run(value: float) -> None:
@@ -123,7 +123,7 @@ def _timed_kernels() -> Iterator[list[float]]:
 def _workers() -> Record:
     """Return the rate of two workers over that of one, measured in turns; both are started and compiled beforehand."""
     kind = KINDS["clearance, peak"]
-    scene = load_scene(TREE / "scenes" / f"{kind.scene}.toml")
+    scene = load_scene(PROJECT / "scenes" / f"{kind.scene}.toml")
     family = Points("family", params(scene), bundles(scene), kind.keep, 0, False)
     packed, ratios = {"family": pickle.dumps(family)}, []
     jobs = [Job(str(k), "family", {kind.place: float(x)}) for k, x in enumerate(np.linspace(*kind.ends, SHARED))]

@@ -10,12 +10,12 @@ from functools import partial
 
 from benchmarks.page import DOCS
 from benchmarks.site import keys, reference
-from flexclear.workflow.fingerprint import TREE
+from flexclear.artifacts.paths import PROJECT
 
 
 def readme() -> str:
     """Return the README as first page, with links relative to docs/."""
-    page = (TREE / "README.md").read_text(encoding="utf-8")
+    page = (PROJECT / "README.md").read_text(encoding="utf-8")
     return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from flexclear.artifacts.paths import PROJECT
 from flexclear.scene.schema import Scene
 from flexclear.scene.sweep import Sweep
 from flexclear.structure.fe.recipe import Recipe
-from flexclear.workflow.fingerprint import TREE
 
 #: unit of a number without unit, by quantity
 SI = {
@@ -207,7 +207,7 @@ def _examples(kind: str) -> dict[str, str]:
     """Return the shortest example of each kind of part among the scenes or recipes of this project, as TOML."""
     found: dict[str, str] = {}
     folders = {"scene": ("scenes",), "recipe": ("meshes", "scenes"), "sweep": ("scenes/sweeps",)}[kind]
-    for path in sorted(path for folder in folders for path in (TREE / folder).rglob("*.toml")):
+    for path in sorted(path for folder in folders for path in (PROJECT / folder).rglob("*.toml")):
         for place, part in _parts(tomllib.loads(path.read_text(encoding="utf-8"))):
             name = next((part[key] for key in ("type", "law", "integrator") if isinstance(part.get(key), str)), "")
             text = _toml(place, part)

@@ -7,7 +7,6 @@ import inspect
 import flexclear as fc
 from benchmarks.page import DOCS
 from benchmarks.site.keys import table
-from flexclear import public
 from flexclear.artifacts import schema as artifacts
 from flexclear.artifacts.coordinates import COORDINATES
 from flexclear.artifacts.schema import Schema
@@ -169,8 +168,8 @@ PROMISES = """## What stays
 Public are the names in `fc.__all__`, the keys of scene files, recipes and sweeps, the commands with their options and
 exit codes, and the variables of [datasets.md](../datasets.md). A release that breaks one of them has a new first
 number. Before that the old name works for at least one release and warns (`DeprecationWarning`, or one line of the
-command), and CHANGELOG.md names what replaces it. Everything else may change with each release, `flexclear.pipeline`
-and `flexclear.stages` included.
+command), and CHANGELOG.md names what replaces it. Everything else may change with each release, the modules below
+`flexclear` included.
 
 ## Errors
 
@@ -182,7 +181,7 @@ and `fc.ResourceError` where the machine lacks memory or disk. The command ends 
 
 def python() -> str:
     """Return docs/reference/python.md: every public function with its signature, docstring and example."""
-    names = [name for name in public.__all__ if inspect.isfunction(getattr(fc, name, None))]
+    names = [name for name in fc.__all__ if inspect.isfunction(getattr(fc, name, None))]
     return PYTHON + "".join(_section(name) for name in names) + PROMISES
 
 

@@ -14,15 +14,17 @@ from typing import Any
 
 import xarray as xr
 
+from flexclear.artifacts.paths import PROJECT
 from flexclear.post.pages import Part, downloads, figures_of, media, page, prose
 from flexclear.post.plotting.table import Table, as_csv, as_html, from_markdown
 from flexclear.system.progress import Progress
-from flexclear.workflow.fingerprint import TREE
 from papers.wang_wang_2019 import DOCUMENTS, figures
 from papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 
 #: place, text and scenes
 Assumption = tuple[str, str, tuple[str, ...]]
+#: the command that makes everything on the page
+PROGRAM = "python -m papers.wang_wang_2019"
 #: attributes of a run that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
 
@@ -38,7 +40,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     for scene, path in params["runs"].items():
         with xr.open_dataset(results / path) as one:
             attributes[scene] = {**one.attrs, **params["origins"][scene]}
-    content = collect(results, attributes, params["rendered"], TREE)
+    content = collect(results, attributes, params["rendered"], PROJECT)
     return {"index.html": html_page(content).encode(), "paper.md": paper_markdown(content).encode()}
 
 
@@ -98,9 +100,9 @@ def paper_markdown(content: Content) -> str:
     """Return docs/paper.md: all figures and tables with scenes and commands, the tables, assumptions, discrepancies."""
     parts = [
         "# The paper, reproduced\n",
-        f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
+        f"{CITATION}. This page is written by `{PROGRAM}`; every number on it was computed by the "
         "commands next to it.\n",
-        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear report` "
+        f"`make all` makes everything below. `flexclear run` brings the named scenes up to date, `{PROGRAM}` "
         "draws every figure and table into `results/figures` and `results/tables`.\n",
         "## Figures and tables\n",
         _index(),
@@ -149,7 +151,7 @@ def scenes_of(name: str) -> tuple[str, ...]:
 def command(name: str) -> str:
     """Return the command that makes one figure or table."""
     scenes = [scene for scene in scenes_of(name) if "/" in scene]
-    return f"flexclear run {' '.join(scenes)} && flexclear report" if scenes else "flexclear report"
+    return f"flexclear run {' '.join(scenes)} && {PROGRAM}" if scenes else PROGRAM
 
 
 def _index() -> str:

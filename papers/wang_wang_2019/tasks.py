@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from flexclear.artifacts.paths import DATA, TREE
+from flexclear.artifacts.paths import PROJECT
 from flexclear.artifacts.store import Record
 from flexclear.scene.load import load_scene
 from flexclear.scene.registry import module_of
@@ -36,7 +36,7 @@ class Scenes:
     def graph(self, name: str) -> Graph:
         """Return the graph of ``scenes/<name>.toml``."""
         if name not in self.graphs:
-            self.graphs[name] = Graph(load_scene(DATA / "scenes" / f"{name}.toml"))
+            self.graphs[name] = Graph(load_scene(PROJECT / "scenes" / f"{name}.toml"))
         return self.graphs[name]
 
     def artifact(self, reference: str) -> Task:
@@ -52,7 +52,7 @@ class Scenes:
         """
         if family in self.times:
             return self.times[family]
-        files = sorted((DATA / "scenes" / family).glob("*.toml"))
+        files = sorted((PROJECT / "scenes" / family).glob("*.toml"))
         if not files:
             raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
         graphs = [self.graph(f"{family}/{path.stem}") for path in files]
@@ -104,7 +104,7 @@ def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
             params={"figure": name},
             inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
             modules=(module_of(figures.__name__, name),),
-            files={file: TREE / file for file in entry["files"]},
+            files={file: PROJECT / file for file in entry["files"]},
             folder="tables" if name.startswith("table") else "figures",
         )
         for name, entry in figure_index(workplace).items()
@@ -141,6 +141,8 @@ def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list
             "rendered": HEADLINE,
             "digests": sorted(record.digest for record in records.values()),
         },
-        files={path.relative_to(TREE).as_posix(): path for pattern in PAGES for path in sorted(TREE.glob(pattern))},
+        files={
+            path.relative_to(PROJECT).as_posix(): path for pattern in PAGES for path in sorted(PROJECT.glob(pattern))
+        },
         folder="report",
     )

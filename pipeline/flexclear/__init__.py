@@ -1,33 +1,55 @@
 """flexclear from Python: ``import flexclear as fc``.
 
-``flexclear.pipeline``, ``stages`` and ``papers`` are the folders of these names at the top of the repository: links in
-a checkout, plain folders where flexclear is installed. Where a checkout has no links, as on Windows, Python also
-searches the top of the repository.
+Its functions are those of `flexclear.public`, which is imported when one of them is first used.
 """
 
-import os
+# ruff: noqa: F403, F405  (names of `public`)
 from importlib import import_module
 from typing import TYPE_CHECKING
-
-if not os.path.isdir(os.path.join(os.path.dirname(__file__), "pipeline")):
-    __path__.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
 from flexclear.system import threads as threads  # isort: skip  (before NumPy is loaded)
 
 if TYPE_CHECKING:
-    from flexclear.public import *  # noqa: F403  (listed there)
+    from flexclear.public import *
+    from flexclear.public import __version__ as __version__
+
+__all__ = [
+    "FlexclearError",
+    "InputError",
+    "ResourceError",
+    "Scene",
+    "SolverError",
+    "compare",
+    "cost",
+    "edited",
+    "effects",
+    "equilibrium",
+    "exit_code",
+    "frequencies",
+    "load_scene",
+    "open",
+    "plan",
+    "quantity",
+    "render",
+    "report",
+    "run",
+    "sections",
+    "sensitivities",
+    "show",
+    "stability",
+    "stage",
+    "sweep",
+]
 
 
 def __getattr__(name: str) -> object:
     """Return a name of `public`, imported at its first use, that module itself, or the version."""
-    listed = name in ("public", "__all__", "__version__")
-    public = import_module("flexclear.public") if listed or not name.startswith("__") else None
     if name == "public":
-        return public
-    if public is not None and (listed or name in public.__all__):
-        return getattr(public, name)
+        return import_module("flexclear.public")
+    if name in __all__ or name == "__version__":
+        return getattr(import_module("flexclear.public"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return [*import_module("flexclear.public").__all__, "__version__"]
+    return [*__all__, "__version__"]

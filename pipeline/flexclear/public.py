@@ -24,38 +24,14 @@ from flexclear.commands import show as show_command
 from flexclear.scene import load
 from flexclear.scene.schema import Scene
 from flexclear.stages.graph import Graph
+from flexclear.stages.single_stage import Step, single_stage
 from flexclear.stages.workplace import open_workplace, seconds
-from flexclear.system.errors import FlexclearError, InputError, ResourceError, SolverError
 from flexclear.system.version import version
+from flexclear.workflow.program import exit_code as exit_code
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "FlexclearError",
-    "InputError",
-    "ResourceError",
-    "Scene",
-    "SolverError",
-    "compare",
-    "cost",
-    "edited",
-    "effects",
-    "equilibrium",
-    "frequencies",
-    "load_scene",
-    "open",
-    "plan",
-    "quantity",
-    "render",
-    "report",
-    "run",
-    "sections",
-    "sensitivities",
-    "show",
-    "stability",
-    "sweep",
-]
 __version__ = version()
 
 
@@ -151,6 +127,17 @@ def sweep(
 def _plain(values: Any) -> Any:
     """Return arrays as lists of Python's own numbers, the form of values in a sweep file."""
     return values.tolist() if hasattr(values, "tolist") else values
+
+
+def stage(scene: Scene | str | Path, name: str) -> list[Step]:
+    """Run one stage alone (mesh, modes, bundle, simulate or post), on the files that the stages before it have written.
+
+    Each step, one for each body where the stage has bodies, has the paths that it `reads` and `writes`, and the dataset
+    in `result`.  Raises FlexclearError: InputError where a file of the stage before is missing or out of date.
+    """
+    one = _loaded(scene)
+    scenes.examine(one)
+    return single_stage(Graph(one, shown=scenes.as_in_its_file(one)), name, open_workplace())
 
 
 def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:

@@ -63,7 +63,7 @@ def tree(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def interpreted(tree: Path, *arguments: str) -> str:
     """What Python prints in the tree."""
-    own = {"PYTHONPATH": str(tree), "FLEXCLEAR_RESULTS": str(tree / "results"), "NUMBA_DISABLE_JIT": "1"}
+    own = {"FLEXCLEAR_RESULTS": str(tree / "results"), "NUMBA_DISABLE_JIT": "1"}
     return python(*arguments, cwd=tree, FLEXCLEAR_KERNELS=str(tree / "kernels"), **own).stdout
 
 
@@ -287,7 +287,7 @@ for solver in ({"rtol": 1e-6}, {"step": 0.004}):
     run = dynamics.simulate(scene, {}, silent)
     ends.append([run.attrs["method"], *run.position.sel(body="bob").values[-1].tolist()])
 designs = [(d.group, d.scene.solver) for d in cost_design.wide(own, ("heun",))]
-closure = Sources(Path.cwd()).closure
+closure = Sources(Path.cwd() / "pipeline").closure
 print(json.dumps({
     "schema": scene_schema()["$defs"]["Solver"]["properties"]["integrator"]["enum"],
     "ends": ends,

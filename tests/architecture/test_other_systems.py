@@ -1,4 +1,4 @@
-"""What other systems lack: modules and functions of POSIX, links in a checkout, consoles that know all characters."""
+"""What other systems lack: modules and functions of POSIX, consoles that know all characters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from flexclear.scene.load import scene_name
 from flexclear.system import file_names, platforms
 from flexclear.system.errors import InputError
 from tests.architecture import windows_rules as rules
-from tests.processes import python
+from tests.processes import copied, python
 
 #: what of `os` and `signal` is not on Windows, or means something else there
 ELSEWHERE = (*rules.MODULES, *rules.FUNCTIONS, "SIGKILL", "link", "kill")
@@ -31,40 +31,28 @@ ONES = ("pipeline/flexclear/system/platforms.py", "benchmarks/processes.py")
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    own = {"PYTHONPATH": str(folder), "FLEXCLEAR_RESULTS": str(folder / "results_of_test"), "NUMBA_DISABLE_JIT": "1"}
+    own = {"FLEXCLEAR_RESULTS": str(folder / "results_of_test"), "NUMBA_DISABLE_JIT": "1"}
     return python(*arguments, cwd=folder, succeeds=False, **(own | environment))
 
 
 @pytest.fixture(scope="module")
-def windows(without_links: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return copied(tmp_path_factory.mktemp("checkout"), "scenes", "meshes")
+
+
+@pytest.fixture(scope="module")
+def windows(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
     """A command in that checkout, and all processes of it, as far as can be under the rules of Windows."""
     hooks = tmp_path_factory.mktemp("hooks")
     shutil.copy(rules.__file__, hooks / "sitecustomize.py")
 
     def command(*arguments: str) -> str:
-        paths = os.pathsep.join([str(hooks), str(without_links)])
-        done = run(without_links, "-m", "flexclear", *arguments, PYTHONPATH=paths)
+        paths = os.pathsep.join([str(hooks), str(checkout / "pipeline")])
+        done = run(checkout, "-m", "flexclear", *arguments, PYTHONPATH=paths)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
     return command
-
-
-@pytest.fixture(scope="module")
-def without_links(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A checkout as git makes it where it must not make links: they are small files that hold a path."""
-    folder = tmp_path_factory.mktemp("checkout")
-    for name in ("papers", "pipeline", "stages", "scenes", "meshes"):
-        shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-    (folder / "flexclear").mkdir()
-    for path in (root / "flexclear").iterdir():
-        if path.is_symlink():
-            (folder / "flexclear" / path.name).write_text(os.readlink(path))
-        elif path.is_file():
-            shutil.copy(path, folder / "flexclear")
-    shutil.copytree(root / "pipeline/flexclear/commands", folder / "pipeline/flexclear/commands")
-    shutil.copy(root / "pyproject.toml", folder)
-    return folder
 
 
 def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
@@ -87,7 +75,7 @@ def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
 
 
 def _sources(root: Path, *more: str) -> list[Path]:
-    folders = ("pipeline/flexclear/commands", "papers", "pipeline", "stages", *more)
+    folders = ("papers", "pipeline", "stages", *more)
     return [path for name in folders for path in sorted((root / name).rglob("*.py"))]
 
 
@@ -133,9 +121,9 @@ def test_workers_are_made_without_fork(root: Path) -> None:
     assert found == []
 
 
-def test_the_pipeline_runs_under_the_rules_of_windows(windows: Callable[..., str], without_links: Path) -> None:
+def test_the_pipeline_runs_under_the_rules_of_windows(windows: Callable[..., str], checkout: Path) -> None:
     windows("run", "checks/pendulum", "checks/spring_pendulum")  # in two workers, which have the same rules
-    shown = without_links / "results_of_test" / "runs" / "checks" / "pendulum" / "run.nc"
+    shown = checkout / "results_of_test" / "runs" / "checks" / "pendulum" / "run.nc"
     before = shown.read_bytes()
     assert windows("why", "checks/pendulum").count("fresh") == 2
     shown.chmod(0o644)
@@ -145,25 +133,6 @@ def test_the_pipeline_runs_under_the_rules_of_windows(windows: Callable[..., str
     assert shown.with_name("run.edited.nc").read_bytes() == b"edited"
     left = [path for path in shown.parents[3].rglob("*") if path.suffix in (".tmp", ".lock", ".part")]
     assert left == []
-
-
-def test_a_flexible_body_is_made_without_links(without_links: Path) -> None:
-    done = run(without_links, "-m", "flexclear", "run", "checks/clamped_rod", "--to", "bundle")
-    assert done.returncode == 0, done.stderr
-
-
-def test_a_checkout_without_links_has_the_keys_of_one_with_links(root: Path, without_links: Path) -> None:
-    """Nothing is run again because of where a source lies."""
-    text = (
-        "from flexclear.commands.scenes import graphs, open_workplace\n"
-        "place = open_workplace()\n"
-        "(graph,) = graphs(['checks/pendulum'])\n"
-        "from flexclear.workflow.execute import key_of\n"
-        "print(key_of(graph.simulate, {}, place.sources))\n"
-    )
-    keys = {run(folder, "-c", text, FLEXCLEAR_RESULTS="/nonexistent").stdout for folder in (root, without_links)}
-    assert len(keys) == 1
-    assert len(keys.pop()) == 33
 
 
 def test_a_console_of_an_old_code_page_shows_what_it_can(root: Path, tmp_path: Path) -> None:

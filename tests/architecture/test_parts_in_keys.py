@@ -83,7 +83,7 @@ JOINTS = [name for name in import_module(effects.JOINTS).NAMES if name not in ("
 def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, name: str, solver: dict) -> None:
     """For each type of joint, driven in part where it has several freedoms: a chain of others may take its place."""
     scene = scene_with({"type": name}, solver=solver)
-    tree = Sources(root)
+    tree = Sources(root / "pipeline")
     known = tree.closure(["flexclear.stages.simulation", *modules(scene)]).keys()
     part = lookup(effects.JOINTS, name, where="here")
     possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
@@ -130,7 +130,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
     reached = {found for text in texts for found in reach.reached(text)}
     scene = scene_with({"type": "cylindrical"}, **tables)
-    known = Sources(root).closure(["flexclear.stages.simulation", *modules(scene)]).keys()
+    known = Sources(root / "pipeline").closure(["flexclear.stages.simulation", *modules(scene)]).keys()
     assert module in reached
     assert reached <= set(known)
     without = modules(scene_with({"type": "cylindrical"}))
@@ -145,7 +145,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
 
 def reached(root: Path, scene: Scene) -> set[str]:
     """Modules in the key of a single run."""
-    return set(Sources(root).closure(["flexclear.stages.simulation", *modules(scene, alone=True)]))
+    return set(Sources(root / "pipeline").closure(["flexclear.stages.simulation", *modules(scene, alone=True)]))
 
 
 DYNAMICS = "flexclear.dynamics"

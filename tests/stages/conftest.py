@@ -126,7 +126,13 @@ class Project:
         """Whatever is said of other places, the copy keeps its compiled modules: without them a start takes twice."""
         elsewhere = ("FLEXCLEAR_RESULTS", "PYTHONDONTWRITEBYTECODE")
         kept = {name: value for name, value in os.environ.items() if name not in elsewhere}
-        return {**kept, "CALLS": str(self.folder / "calls"), "PYTHONWARNINGS": "ignore", **more}
+        return {
+            **kept,
+            "PYTHONPATH": str(self.folder / "pipeline"),
+            "CALLS": str(self.folder / "calls"),
+            "PYTHONWARNINGS": "ignore",
+            **more,
+        }
 
     def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
         """The command, running."""

@@ -25,7 +25,7 @@ def pendulum(folder: Path, count: int, name: str = "lengths") -> Path:
 
 def flexclear(*arguments: str, cwd: Path, results: Path) -> subprocess.Popen[str]:
     """The command in a process of its own."""
-    environment = os.environ | {"FLEXCLEAR_RESULTS": str(results), "PYTHONPATH": str(cwd)}
+    environment = os.environ | {"FLEXCLEAR_RESULTS": str(results), "PYTHONPATH": str(cwd / "pipeline")}
     command = [sys.executable, "-m", "flexclear", *arguments]
     return subprocess.Popen(
         command,

@@ -191,7 +191,7 @@ def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, sce
             heard.append(bool(given[-1]))
             return Future()
 
-    plan, common = schedule._Plan(tasks, tuple(tasks)), (Store(tmp_path), Sources(root), Monitor())
+    plan, common = schedule._Plan(tasks, tuple(tasks)), (Store(tmp_path), Sources(root / "pipeline"), Monitor())
     schedule._submit(plan, {}, Pool(), 4, *common)  # type: ignore[arg-type]
     assert heard == [idle] * len(scenes)
 

@@ -41,7 +41,7 @@ def csj(root: Path) -> Scene:
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Workplace:
     root = Path(__file__).parents[2]
-    return Workplace(Store(tmp_path_factory.mktemp("cost")), Sources(root), jobs=1)
+    return Workplace(Store(tmp_path_factory.mktemp("cost")), Sources(root / "pipeline"), jobs=1)
 
 
 @pytest.fixture(scope="module")

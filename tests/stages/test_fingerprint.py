@@ -23,7 +23,7 @@ from flexclear.workflow.execute import execute
 from flexclear.artifacts.store import Store
 from flexclear.workflow.task import in_order
 from flexclear.stages.graph import Graph
-store, sources, records = Store(Path(root)), Sources(Path.cwd()), {}
+store, sources, records = Store(Path(root)), Sources(Path.cwd() / "pipeline"), {}
 graph = Graph(load_scene(scene, shortened), shown=False)
 for task in [*in_order(graph.up_to("post")), graph.linear()]:
     for name in list(sys.modules):

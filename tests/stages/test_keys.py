@@ -144,7 +144,7 @@ def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: S
 
 def test_a_root_that_does_not_exist_is_an_error(root: Path):
     with pytest.raises(LookupError, match=r"no module flexclear\.stages\.nowhere"):
-        Sources(root).closure(["flexclear.stages.nowhere"])
+        Sources(root / "pipeline").closure(["flexclear.stages.nowhere"])
 
 
 def graph(root: Path, name: str) -> Graph:
@@ -168,7 +168,7 @@ def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
 @pytest.fixture(scope="module")
 def sources(root: Path) -> Sources:
     """The project's own source, read once."""
-    return Sources(root)
+    return Sources(root / "pipeline")
 
 
 @pytest.fixture
@@ -179,7 +179,7 @@ def copy(tmp_path: Path) -> Path:
 
 def read_again(copy: Path) -> Sources:
     """Sources of a copy; only those that were edited are parsed."""
-    return Sources(copy, copy / "results" / "cache" / "imports.json")
+    return Sources(copy / "pipeline", copy / "results" / "cache" / "imports.json")
 
 
 RERUN = {
@@ -331,15 +331,15 @@ def test_the_memo_of_imports_notices_edits(copy: Path):
     """Closures with and without the memo are the same before and after an edit."""
     memo = copy / "imports.json"
     roots = ["flexclear.stages.simulation"]
-    assert Sources(copy, memo).closure(roots) == Sources(copy).closure(roots)
+    assert Sources(copy / "pipeline", memo).closure(roots) == Sources(copy / "pipeline").closure(roots)
     assert memo.is_file()
     path = copy / "pipeline" / "flexclear" / "stages" / "simulation.py"
     path.write_text(path.read_text() + "\nimport flexclear.numerics.rotations\nimport wave\nimport meshio\n")
-    edited = Sources(copy, memo).closure(roots)
-    assert edited == Sources(copy).closure(roots)
+    edited = Sources(copy / "pipeline", memo).closure(roots)
+    assert edited == Sources(copy / "pipeline").closure(roots)
     assert "meshio" in edited["flexclear.stages.simulation"].libraries
     memo.write_text("{ not json")
-    assert Sources(copy, memo).closure(roots) == edited
+    assert Sources(copy / "pipeline", memo).closure(roots) == edited
 
 
 def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -400,7 +400,7 @@ def test_code_for_what_a_run_has_not_met_does_not_count(
         return {"nc": b"result"}
 
     monkeypatch.setattr(rigid_body, "run", run)
-    store, sources = Store(tmp_path / "results"), Sources(root)
+    store, sources = Store(tmp_path / "results"), Sources(root / "pipeline")
     task = Task("s", "scene", "flexclear.stages.rigid_body:run", {}, "runs/scene", met={"chaos": (name,)})
     record = execute(task, {}, store, sources, silent)
     assert (f"module {name}" in record.facts) is meets

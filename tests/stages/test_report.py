@@ -18,7 +18,7 @@ from tests.stages.conftest import Command
 
 def test_every_figure_and_table_of_the_paper_has_its_inputs(root: Path, tmp_path: Path):
     scenes = Scenes()
-    tasks = figure_tasks(Workplace(Store(tmp_path), Sources(root)), scenes)
+    tasks = figure_tasks(Workplace(Store(tmp_path), Sources(root / "pipeline")), scenes)
     names = {task.part for task in tasks}
     assert {"fig03", "fig04", "fig06", "fig08", "fig09"} | {f"fig{n}" for n in range(11, 18)} <= names
     assert {"table04", "table05", "table07", "table08", "table09", "table10"} <= names

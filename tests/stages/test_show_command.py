@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 import flexclear as fc
+from flexclear.artifacts.paths import PROJECT
 from flexclear.post.render import gl, surfaces
 from flexclear.post.render.layout import CLEARANCE_COLOR, LOAD_COLOR, part_pose
 from flexclear.post.render.ruler import pixels_per_metre, project, round_length
 from flexclear.post.render.start_view import AXIS, columns, heights, page_view
-from flexclear.workflow.fingerprint import TREE
 from tests.processes import printed
 from tests.stages.conftest import Command
 
 SCENES = sorted(
-    path.relative_to(TREE).as_posix()
+    path.relative_to(PROJECT).as_posix()
     for folder in ("scenes/checks", "scenes/gallery", "scenes/sps4", "stages/templates")
-    for path in (TREE / folder).rglob("*.toml")
+    for path in (PROJECT / folder).rglob("*.toml")
     if re.search(r"^\[time\]|^extends", path.read_text(encoding="utf-8"), re.MULTILINE)
 )
 

@@ -395,7 +395,11 @@ print(*sorted(name for name in set(sys.modules) - before if name.split(".")[0] =
 
 def test_every_module_that_a_point_runs_is_in_its_key(root: Path, fresh: Path):
     path = root / "scenes/checks/clearance_slider_crank.toml"
-    known = Sources(root).closure(["flexclear.stages.sweeps.sweep_points", STORE, *modules(load_scene(path))]).keys()
+    known = (
+        Sources(root / "pipeline")
+        .closure(["flexclear.stages.sweeps.sweep_points", STORE, *modules(load_scene(path))])
+        .keys()
+    )
     loaded = set(printed(LOADED, path).split())
     assert len(loaded) > 20
     assert loaded <= known

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from flexclear.artifacts.paths import TREE
+from flexclear.artifacts.paths import PROJECT
 from flexclear.post.plotting.table import Table
 from flexclear.scene.output import rows
 from papers.wang_wang_2019 import deviations
@@ -241,9 +241,9 @@ def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
 
 def _becomes_chaotic(data: Data) -> Outcome:
     """Judge whether clearance makes the periodic motion quasi-periodic, and the rod's modes make it chaotic."""
-    if not (TREE / SECTIONS).is_file():
+    if not (PROJECT / SECTIONS).is_file():
         return _one_stroke(data)
-    with (TREE / SECTIONS).open(newline="", encoding="utf-8") as file:
+    with (PROJECT / SECTIONS).open(newline="", encoding="utf-8") as file:
         rows = {row["scene"]: row for row in csv.DictReader(file)}
     requested = {paper.CSJ: "quasi-periodic", **dict.fromkeys(paper.FAR_CSJ, "chaotic")}
     texts = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in requested]

@@ -1,4 +1,4 @@
-"""Folders of results."""
+"""Folders of sources, of shipped data and of results."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from pathlib import Path
 
 from flexclear.system.version import version
 
-#: folder of the packages `pipeline` and `stages`: `flexclear`, or a checkout when they are imported from there directly
-PACKAGES = Path(__file__).absolute().parents[3]
-#: folder that holds the package `flexclear`; sources are read below it
-TREE = PACKAGES if (PACKAGES / "flexclear" / "__init__.py").is_file() else PACKAGES.parent
-#: folder with the scenes and meshes of the project, which are installed with it
-DATA = PACKAGES
+#: folder of the package `flexclear`, and the folder that holds it: `pipeline` of a checkout, or where it is installed
+PACKAGE = Path(__file__).absolute().parents[1]
+TREE = PACKAGE.parent
+#: whether this is a checkout; an installed package has its data inside and no project around it
+_CHECKOUT = (TREE.parent / "pyproject.toml").is_file()
+#: folder of the project: of a checkout, else the one that holds the package
+PROJECT = TREE.parent if _CHECKOUT else TREE
+#: folder with the `scenes` and `meshes` of the project
+DATA = PROJECT if _CHECKOUT else PACKAGE
 
 
 def results_root() -> Path:
@@ -22,8 +25,8 @@ def results_root() -> Path:
     if named:
         return Path(named).resolve()
     here = Path.cwd()
-    inside = (TREE / "pyproject.toml").is_file() and here.resolve().is_relative_to(TREE.resolve())
-    return (TREE if inside else here) / "results"
+    inside = _CHECKOUT and here.resolve().is_relative_to(PROJECT.resolve())
+    return (PROJECT if inside else here) / "results"
 
 
 def kernel_root() -> Path:

@@ -7,26 +7,17 @@ Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machin
 from __future__ import annotations
 
 import argparse
-import atexit
 import gc
-import os
-import signal
 import sys
 from collections.abc import Collection
 from importlib import import_module
-from types import FrameType
 from typing import NoReturn
 
 from flexclear.scene.registry import suggestion
-from flexclear.system.errors import INTERRUPTED, FlexclearError, InputError, ResourceError, shown
-from flexclear.system.platforms import plain_output, reader_has_gone
+from flexclear.system.errors import InputError
 from flexclear.system.version import version
-from flexclear.workflow import workers
+from flexclear.workflow.program import exit_code
 
-CLOSED_PIPE = 141
-#: new objects before Python's garbage collector runs: a short command makes hardly any garbage, and spent a tenth of
-#: its time on collections
-GARBAGE = 200_000
 #: verb -> its help. The module of the same name has `arguments(parser)` and `command(options)`
 COMMANDS = {
     "new": "write a commented scene to start from",
@@ -42,7 +33,7 @@ COMMANDS = {
     "effects": "measure how each part changes each quantity, alone and in pairs",
     "sections": "classify a repeated motion as periodic, quasi-periodic or chaotic",
     "frequencies": "compute an equilibrium and its natural frequencies",
-    "report": "write the page of scenes; without scenes, all figures and tables of the paper",
+    "report": "write the page of scenes: answers, film, figures, assumptions, cost",
     "schema": "print a JSON schema of scenes, recipes or sweeps",
     "cite": "list the sources of the methods and data that a scene uses",
     "completion": "print the completion script for bash or zsh",
@@ -53,46 +44,16 @@ COMMANDS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; errors of the user's input are reported without a traceback."""
-    plain_output()
     own = arguments is None  # True when this process is the command's own
-    if own:
-        signal.signal(signal.SIGTERM, _as_interrupt)
-        gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
-        # at exit Python collects garbage several times over all objects: a sixth of the time of a short command, half a
-        # second where something was compiled. Nobody gains by that, since the system takes all memory back
-        atexit.register(gc.freeze)
-    # pydantic would search all installed packages for plugins of its own
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    try:
+
+    def work() -> int | None:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
         if own:  # imported objects stay: they are garbage neither now nor at the end
             gc.freeze()
-        with workers.reused():
-            return int(options.command(options) or 0)
-    except FlexclearError as error:
-        print(f"flexclear: {error}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt:
-        print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:
-        if not reader_has_gone():
-            print(f"flexclear: {workers.LOST}", file=sys.stderr)
-            return ResourceError.exit_code
-        # the reader (`| head`) has closed the pipe; keep the interpreter from reporting that at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CLOSED_PIPE
-    except (OSError, MemoryError) as error:  # errors of the machine that no other code described better
-        print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
-        return ResourceError.exit_code
+        code: int | None = options.command(options)
+        return code
 
-
-def _as_interrupt(number: int, frame: FrameType | None) -> None:
-    """Stop as Ctrl-C does: schedulers of clusters and services send SIGTERM, and workers must end in good order."""
-    handler = signal.getsignal(signal.SIGINT)
-    if not callable(handler):  # Ctrl-C is ignored by a command in the background
-        raise KeyboardInterrupt
-    handler(number, frame)
+    return exit_code(work, own=own)
 
 
 class Parser(argparse.ArgumentParser):

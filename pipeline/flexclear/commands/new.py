@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flexclear.artifacts.paths import DATA
+from flexclear.artifacts.paths import PACKAGE
 from flexclear.system.errors import InputError, ResourceError
 
-TEMPLATES = DATA / "pipeline" / "flexclear" / "stages" / "templates"
+TEMPLATES = PACKAGE / "stages" / "templates"
 #: kinds of mechanisms -> their descriptions
 KINDS = {
     "four-bar": "planar linkage of rigid bodies with one loose pin",

@@ -1,6 +1,6 @@
-"""``flexclear report``: the page of scenes, or without scenes every figure and table of the paper and their page.
+"""``flexclear report``: the page of scenes.
 
-The page of a scene: the answer, then film, figures, comparison with its ideal mechanism, assumptions, warnings.
+It shows the answer, then film, figures, comparison with its ideal mechanism, assumptions, warnings.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from flexclear.commands.answers import Answers, shown_answer
 from flexclear.commands.export import as_json
 from flexclear.commands.scenes import graphs, in_file, pictures
 from flexclear.post.pages import Part, downloads, figures_of, in_folder, page, prose
-from flexclear.post.render import gl
 from flexclear.scene.output import rows
 from flexclear.scene.provenance import assumed
 from flexclear.scene.variants import loose
@@ -33,7 +32,6 @@ from flexclear.stages.workplace import (
 )
 from flexclear.system.errors import FlexclearError, ResourceError
 from flexclear.workflow.task import Task
-from papers.wang_wang_2019 import tasks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,7 +78,7 @@ PROVENANCE = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
-    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="scenes of the report; without any, the paper's")
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
     parser.add_argument(
         "--folder", action="store_true", help="write a folder with the page and its pictures, not one file"
     )
@@ -107,26 +105,10 @@ def command(options: argparse.Namespace) -> None:
 
 def _pages(options: argparse.Namespace, workplace: Workplace) -> Iterator[tuple[str, Path]]:
     """Yield name and page of every requested report, as soon as it is written."""
-    if not options.scenes:
-        yield "paper", of_paper(workplace, folder=options.folder)
-        return
     budget = None if options.budget is None else seconds(options.budget, "--budget")
     answers = options.answers != "none"
     for graph in graphs(options.scenes, options.set):
         yield graph.scene.name, of_scene(graph, workplace, folder=options.folder, budget=budget, answers=answers)
-
-
-def of_paper(workplace: Workplace, *, folder: bool = False) -> Path:
-    """Bring everything on the page of the paper up to date; return the page, with `folder` one next to its files.
-
-    Parts that fail are left out of the page and raised after the page is written.
-    """
-    outcome = tasks.bring(workplace)
-    if gl.state().endswith("none"):
-        workplace.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
-    check(outcome)
-    target = workplace.store.root / "report" / "index.html"
-    return publish_page(target.parent, "folder", target.read_bytes(), folder=True) if folder else target
 
 
 def of_scene(

@@ -24,7 +24,8 @@ from typing import Any
 from flexclear.artifacts.disk import checked, digest_of, publish, read_checked
 from flexclear.artifacts.paths import TREE as TREE
 
-OWN = ("flexclear", "benchmarks")
+#: packages whose modules count by their code: the program, and applications next to its sources in a checkout
+OWN = ("flexclear", "papers", "benchmarks")
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.scene"
 WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
@@ -163,14 +164,14 @@ def sources_of(root: Path, memo: Path | None = None) -> Sources:
 
 
 def source_file(root: Path, name: str) -> Path | None:
-    """Return the file of the module called `name` in the source tree under `root`; None without such a file."""
-    first, _, rest = name.partition(".")
-    # in a checkout without symbolic links the packages below `flexclear` are next to it
-    places = [name, *([rest] if first == "flexclear" and rest else [])]
+    """Return the file of the module called `name`; None without such a file.
+
+    root: folder with the package `flexclear`; applications such as `papers` are in the folder above it.
+    """
     # every command searches for hundreds of modules: text paths take a fifth of the time of Path objects
-    bases = [f"{root}{os.sep}{place.replace('.', os.sep)}" for place in places]
-    files = (path for base in bases for path in (f"{base}.py", f"{base}{os.sep}__init__.py"))
-    return next((Path(path) for path in files if os.path.isfile(path)), None)
+    folder = root if name.startswith(OWN[0]) else root.parent
+    base = f"{folder}{os.sep}{name.replace('.', os.sep)}"
+    return next((Path(path) for path in (f"{base}.py", f"{base}{os.sep}__init__.py") if os.path.isfile(path)), None)
 
 
 def parents(name: str) -> list[str]:

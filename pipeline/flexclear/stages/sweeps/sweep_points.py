@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
+from flexclear.artifacts.paths import PACKAGE
 from flexclear.artifacts.points import Point
 from flexclear.scene.load import with_numbers
 from flexclear.scene.quantity import parse_recorded
@@ -21,7 +22,6 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress, silent
 from flexclear.workflow import cores
 from flexclear.workflow.cores import side_by_side
-from flexclear.workflow.fingerprint import TREE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -111,8 +111,6 @@ def _point(
 def source_digest() -> str:
     """Return the digest of the sources that a worker runs, to be compared with the caller's."""
     digest = hashlib.sha256()
-    for folder in ("commands", "papers", "pipeline", "stages"):
-        # below the import name, a checkout and an installed flexclear have the same files
-        for path in sorted((TREE / "flexclear" / folder).rglob("*.py")):
-            digest.update(path.relative_to(TREE).as_posix().encode() + path.read_bytes())
+    for path in sorted(PACKAGE.rglob("*.py")):
+        digest.update(path.relative_to(PACKAGE).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()
