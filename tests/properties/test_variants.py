@@ -9,7 +9,6 @@ import pytest
 
 from flexclear.artifacts.effect_size import chance, influence, recorded
 from flexclear.artifacts.points import Point
-from flexclear.commands.cost_design import Setting, neighbours
 from flexclear.commands.new import write
 from flexclear.post.answers.effect_sizes import closed
 from flexclear.post.answers.effect_sizes import variants as needed
@@ -17,6 +16,7 @@ from flexclear.scene import variants
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import KINDS, WORDS, Quantity
 from flexclear.scene.schema import Scene
+from flexclear.study.cost_design import Setting, neighbours
 from flexclear.system.errors import InputError
 
 

@@ -12,7 +12,6 @@ from scipy.special import ellipk
 
 import flexclear as fc
 from flexclear.artifacts.points import variable
-from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation import engine
@@ -24,6 +23,7 @@ from flexclear.scene.sweep import read_sweep
 from flexclear.scene.units import udunits
 from flexclear.stages.simulation import modules
 from flexclear.stages.sweeps import sweep_plan
+from flexclear.study import sweep
 from flexclear.system.errors import InputError, ResourceError
 from flexclear.system.progress import silent
 from flexclear.workflow.fingerprint import Sources

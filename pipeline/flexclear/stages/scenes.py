@@ -19,7 +19,6 @@ from flexclear.artifacts import maintenance
 from flexclear.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.artifacts.paths import DATA, results_root
 from flexclear.artifacts.store import PARTIAL, Store
-from flexclear.commands import export
 from flexclear.post.pages import media
 from flexclear.post.plotting.table import as_html, from_markdown
 from flexclear.scene import lines
@@ -31,7 +30,7 @@ from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.scene.toml_files import read_toml, recipe_frames
 from flexclear.scene.units import quantity
-from flexclear.stages import simulation
+from flexclear.stages import export, simulation
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
 from flexclear.stages.meshing import kind_of
