@@ -20,13 +20,13 @@ from benchmarks.layouts import ROD_CENTRE, ROD_END, Layout, edits
 from flexclear import dynamics
 from flexclear.artifacts import quantities
 from flexclear.artifacts.paths import PROJECT
-from flexclear.commands.scenes import Workplace, bundles, open_workplace
 from flexclear.dynamics.run.run import engine_of
 from flexclear.scene.integrators import DEFAULT
 from flexclear.scene.load import compose, scene_of
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
 from flexclear.stages.graph import Graph
+from flexclear.stages.scenes import Workplace, bundles, open_workplace
 from flexclear.system.errors import FlexclearError, SolverError
 from flexclear.system.progress import silent
 from flexclear.workflow.progress import Monitor

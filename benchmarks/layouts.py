@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.commands.scenes import find_scene
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
+from flexclear.stages.scenes import find_scene
 from papers.wang_wang_2019.deviations import Deviation
 from papers.wang_wang_2019.published import TABLE3, TABLE8
 

@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.timing import once
-from flexclear.commands.scenes import bundles, find_scene
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
@@ -23,6 +22,7 @@ from flexclear.scene.clearance import ClearanceSpherical
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
+from flexclear.stages.scenes import bundles, find_scene
 from flexclear.system.progress import silent
 
 #: the scenes of the paper, from the fewest to the most effects

@@ -14,11 +14,11 @@ from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
 from flexclear.artifacts.paths import results_root
-from flexclear.commands import cost
-from flexclear.commands.scenes import find_scene, open_workplace
 from flexclear.post.cost.answer import Studied, sections
 from flexclear.post.plotting.table import Table, as_markdown, from_markdown
 from flexclear.scene.load import load_scene
+from flexclear.stages.scenes import find_scene, open_workplace
+from flexclear.study import cost
 
 #: processor time of a study [s]
 STUDY = 3600.0

@@ -14,14 +14,15 @@ import numpy as np
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
 from benchmarks.timing import interleaved, once
-from flexclear.commands import effects, scenes
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engines, follow
 from flexclear.post.answers.effect_sizes import written
 from flexclear.scene.load import edited, load_scene
+from flexclear.stages import scenes
 from flexclear.stages.workplace import open_workplace
+from flexclear.study import effects
 from flexclear.system.progress import silent
 
 SCENE, RIGID = "sps4/far_csj_cb", "sps4/csj"

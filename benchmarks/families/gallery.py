@@ -13,12 +13,12 @@ import xarray as xr
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import DOCS
 from flexclear import dynamics
-from flexclear.commands.scenes import bundles, find_scene
 from flexclear.dynamics import analyses
 from flexclear.post.single_run.series import derive
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.stages import rendering
+from flexclear.stages.scenes import bundles, find_scene
 from flexclear.system.progress import silent
 
 PICTURES = DOCS / "gallery"

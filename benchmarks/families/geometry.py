@@ -18,8 +18,8 @@ from benchmarks.family import REFUSED, Case, Family, Record, each
 from benchmarks.layouts import DANGLE, DZ, Layout, answer, deviation_row
 from benchmarks.page import Columns, mean, table
 from flexclear import dynamics
-from flexclear.commands import scenes as stages
 from flexclear.dynamics import analyses
+from flexclear.stages import scenes as stages
 from flexclear.stages.workplace import open_workplace
 from flexclear.system.errors import SolverError
 from flexclear.system.progress import silent

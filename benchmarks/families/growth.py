@@ -18,11 +18,11 @@ from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states,
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, once, slope
 from flexclear import dynamics
-from flexclear.commands.scenes import bundles
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.scene.load import edited
 from flexclear.scene.schema import Scene
+from flexclear.stages.scenes import bundles
 from flexclear.system.progress import silent
 
 LOOPS = (5, 10, 20, 40, 80)

@@ -15,9 +15,9 @@ from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
 from flexclear import dynamics
 from flexclear.artifacts.quantities import IMPACT
-from flexclear.commands.scenes import find_scene
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.load import load_scene
+from flexclear.stages.scenes import find_scene
 from flexclear.system.errors import SolverError
 from flexclear.system.progress import silent
 

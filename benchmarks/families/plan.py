@@ -22,14 +22,14 @@ from benchmarks.plan_scenes import Drawn, drawn
 from flexclear.artifacts import effect_size
 from flexclear.artifacts.effect_size import Agreement
 from flexclear.artifacts.points import Point
-from flexclear.commands import plan
-from flexclear.commands.plan import MEMBERS
 from flexclear.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, dataset, until_decided, verdict
 from flexclear.scene.load import edited
 from flexclear.scene.quantity import Quantity, parse
 from flexclear.scene.schema import Scene
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.workplace import check, open_workplace
+from flexclear.study import plan
+from flexclear.study.plan import MEMBERS
 from flexclear.system.errors import FlexclearError
 from flexclear.system.progress import silent
 

@@ -16,11 +16,11 @@ import psutil
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import percent, table
 from flexclear.artifacts.paths import PROJECT
-from flexclear.commands.scenes import bundles
 from flexclear.dynamics.record.point import Runner
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.scene.load import load_scene, with_numbers
 from flexclear.scene.quantity import parse_recorded
+from flexclear.stages.scenes import bundles
 from flexclear.stages.simulation import params
 from flexclear.stages.sweeps.sweep_engine import Job, engine
 from flexclear.stages.sweeps.sweep_points import Family as Points

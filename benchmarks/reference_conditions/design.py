@@ -11,11 +11,11 @@ from typing import Any
 import xarray as xr
 
 from benchmarks.layouts import FIRST, Layout, by_condition, chosen, edits, family
-from flexclear.commands.scenes import find_scene
 from flexclear.scene.load import load_scene, read_toml
 from flexclear.scene.schema import Scene
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
+from flexclear.stages.scenes import find_scene
 from flexclear.structure.kinds import kind
 from flexclear.structure.modes.solution import solve
 from flexclear.system.errors import InputError

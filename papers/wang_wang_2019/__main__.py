@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from flexclear.commands.report import publish_page
 from flexclear.post.render import gl
 from flexclear.stages.workplace import add_options, check, open_workplace, relative
+from flexclear.study.report import publish_page
 from flexclear.workflow.program import exit_code
 from papers.wang_wang_2019 import tasks
 

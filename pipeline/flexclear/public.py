@@ -15,17 +15,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from flexclear.commands import answers, scenes
-from flexclear.commands import compare as compare_command
-from flexclear.commands import effects as effects_command
-from flexclear.commands import plan as plan_command
-from flexclear.commands import report as report_command
-from flexclear.commands import show as show_command
 from flexclear.scene import load
 from flexclear.scene.schema import Scene
+from flexclear.stages import scenes
+from flexclear.stages import show as start_pose
 from flexclear.stages.graph import Graph
 from flexclear.stages.single_stage import Step, single_stage
 from flexclear.stages.workplace import open_workplace, seconds
+from flexclear.study import answers
+from flexclear.study import compare as comparison
+from flexclear.study import effects as effect_sizes
+from flexclear.study import plan as planning
+from flexclear.study import report as page
 from flexclear.system.version import version
 from flexclear.workflow.program import exit_code as exit_code
 
@@ -117,11 +118,11 @@ def sweep(
     >>> result["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
     [1.954, 0.324]
     """
-    from flexclear.commands import sweep as sweep_command
+    from flexclear.study import sweep as variation
 
     given = {name: _plain(values) for name, values in vary.items()}
     table = {"vary": given, "keep": list(keep), **more}
-    return sweep_command.of_scene(_loaded(scene), table, workers, scheduler)
+    return variation.of_scene(_loaded(scene), table, workers, scheduler)
 
 
 def _plain(values: Any) -> Any:
@@ -241,7 +242,7 @@ def compare(
     Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
-    return compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
+    return comparison.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
 
 
 def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -254,7 +255,7 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
     """
     if budget is not None:
         return answers.dataset("effects", _loaded(scene), budget)
-    return effects_command.bring(_loaded(scene), open_workplace()).dataset()
+    return effect_sizes.bring(_loaded(scene), open_workplace()).dataset()
 
 
 def plan(
@@ -269,7 +270,7 @@ def plan(
     `chance`, the `allowed` error, the `horizon` as a fraction of the run and the `scatter` of single runs. In a
     notebook the dataset shows the answer first.  Raises FlexclearError.
     """
-    return plan_command.dataset(_loaded(scene), accuracy, budget)
+    return planning.dataset(_loaded(scene), accuracy, budget)
 
 
 def render(scene: Scene | str | Path) -> Path:
@@ -290,7 +291,7 @@ def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
     >>> [mark.text for mark in seen.view.marks], seen.refused
     (['bob', 'hinge'], None)
     """
-    return show_command.start(_loaded(scene), None if folder is None else Path(folder))
+    return start_pose.start(_loaded(scene), None if folder is None else Path(folder))
 
 
 def report(scene: Scene | str | Path, budget: str | float | None = None, *, answers: bool = True) -> Path:
@@ -302,7 +303,7 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     given = None if budget is None else seconds(budget, "budget")
     scenes.examine(one := _loaded(scene))
     graph = Graph(one, shown=one.path is None or scenes.as_in_its_file(one))
-    return report_command.of_scene(graph, open_workplace(), budget=given, answers=answers)
+    return page.of_scene(graph, open_workplace(), budget=given, answers=answers)
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

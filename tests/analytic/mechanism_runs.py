@@ -9,11 +9,11 @@ import numpy as np
 import xarray as xr
 
 from flexclear import dynamics
-from flexclear.commands import scenes as stages
 from flexclear.dynamics import analyses
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
+from flexclear.stages import scenes as stages
 from flexclear.stages.workplace import Workplace, open_workplace
 from flexclear.system.progress import silent
 from tests.properties.mechanisms import simulated

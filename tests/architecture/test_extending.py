@@ -240,7 +240,7 @@ QUARTER = 2.367841947576237 / 4.0
 ASKED = """
 import json
 from pathlib import Path
-from flexclear.commands import cost_design
+from flexclear.study import cost_design
 from flexclear import dynamics
 from flexclear.scene.json_schema import scene_schema
 from flexclear.scene.load import load_scene

@@ -16,9 +16,10 @@ from pathlib import Path, PureWindowsPath
 import pytest
 
 import flexclear as fc
-from flexclear.commands import reproduction, scenes
+from flexclear.commands import reproduction
 from flexclear.commands.__main__ import COMMANDS, main
 from flexclear.scene.load import scene_name
+from flexclear.stages import scenes
 from flexclear.system import file_names, platforms
 from flexclear.system.errors import InputError
 from tests.architecture import windows_rules as rules

@@ -20,14 +20,15 @@ import pytest
 from flexclear.artifacts import maintenance
 from flexclear.artifacts.disk import checked, read_checked, sha256
 from flexclear.artifacts.store import Store, read_record
-from flexclear.commands import cost, scenes
 from flexclear.post.render import forms
 from flexclear.scene.load import load_scene
 from flexclear.scene.sweep import read_sweep
+from flexclear.stages import scenes
 from flexclear.stages.graph import Graph
 from flexclear.structure.fe.exchange import files
 from flexclear.structure.fe.solid import imported
 from flexclear.structure.fe.solid.recipe import MeshFile
+from flexclear.study import cost
 from flexclear.system.errors import FlexclearError, InputError
 from flexclear.workflow.journal import Journal, signature
 from tests.properties.test_scene_words import BASE

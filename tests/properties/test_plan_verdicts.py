@@ -8,9 +8,9 @@ import xarray as xr
 
 from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, same_starts
 from flexclear.artifacts.points import Point
-from flexclear.commands import plan
 from flexclear.post.answers.plan import _verdict, until_decided, verdict
 from flexclear.scene.quantity import Quantity
+from flexclear.study import plan
 
 
 @pytest.mark.parametrize(

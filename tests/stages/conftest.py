@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import pytest
 
 from flexclear import dynamics
-from flexclear.commands import scenes
 from flexclear.commands.__main__ import main
 from flexclear.dynamics import analyses
 from flexclear.post.single_run import series
+from flexclear.stages import scenes
 from flexclear.stages.sweeps import sweep_engine
 from flexclear.workflow import cores
 from tests.processes import copied

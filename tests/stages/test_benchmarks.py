@@ -24,11 +24,11 @@ from benchmarks.mechanisms import (
     without_friction,
 )
 from flexclear import dynamics
-from flexclear.commands import cost
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
+from flexclear.study import cost
 from flexclear.system.progress import silent
 from tests.reference import sps4
 from tests.reference.ideal_motion import ideal

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.commands import compare
 from flexclear.commands.new import write
 from flexclear.post import pages
 from flexclear.post.overview import comparison, curves, figures
@@ -22,6 +21,7 @@ from flexclear.stages.workplace import open_workplace
 from flexclear.structure.fe.recipe import read_recipe
 from flexclear.structure.kinds import kind
 from flexclear.structure.modes import bundle
+from flexclear.study import compare
 from flexclear.system.errors import InputError
 from tests.paper import synthetic
 

@@ -14,16 +14,16 @@ import xarray as xr
 from flexclear import dynamics
 from flexclear.artifacts import quantities
 from flexclear.artifacts.store import Store
-from flexclear.commands import cost, cost_design, scenes
-from flexclear.commands.cost_design import Setting
 from flexclear.commands.new import KINDS, write
 from flexclear.post.cost.answer import sentences
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
-from flexclear.stages import graph, simulation
+from flexclear.stages import graph, scenes, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, open_workplace
+from flexclear.study import cost, cost_design
+from flexclear.study.cost_design import Setting
 from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from flexclear.workflow.fingerprint import Sources

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from flexclear.artifacts.table import table
-from flexclear.commands import export
+from flexclear.stages import export
 from flexclear.system.errors import InputError
 
 

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from benchmarks.families.gallery import ENTRIES, scene_of, solved
-from flexclear.commands.scenes import bundles
+from flexclear.stages.scenes import bundles
 
 #: kinds of mechanisms that whoever looks for a beginning expects to find
 EXPECTED = {"four_bar", "clearance_slider_crank", "scott_russell", "stewart", "robot_arm", "universal_shaft"}

@@ -10,10 +10,10 @@ import pytest
 
 from benchmarks import layouts
 from benchmarks.layouts import DANGLE, DZ, Layout, answer, jacobians, poses
-from flexclear.commands.scenes import find_scene
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
+from flexclear.stages.scenes import find_scene
 from papers.wang_wang_2019.published import TABLE8
 
 TREE = Path(__file__).resolve().parents[2]

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from flexclear.artifacts.paths import kernel_root
-from flexclear.commands import scenes
 from flexclear.scene.limits import check_cells
 from flexclear.scene.load import load_scene, with_numbers
-from flexclear.stages import simulation
+from flexclear.stages import scenes, simulation
 from flexclear.stages.graph import Graph
 from flexclear.structure.fe.exchange import files
 from flexclear.system import machine
@@ -169,7 +168,7 @@ def test_a_page_for_which_the_disk_has_no_room_is_named_by_its_folder(tmp_path: 
 
 #: a figure of a run, in this process
 DRAWN = """
-from flexclear.commands.scenes import graphs, open_workplace
+from flexclear.stages.scenes import graphs, open_workplace
 (graph,) = graphs(["checks/pendulum"])
 print([failure.message for failure in open_workplace().bring([graph.overview], jobs=1).failures])
 """

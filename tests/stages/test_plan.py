@@ -13,7 +13,6 @@ import xarray as xr
 
 import flexclear as fc
 from flexclear.artifacts.effect_size import Influence
-from flexclear.commands import plan
 from flexclear.commands.new import write
 from flexclear.dynamics.plan.budget import Chosen, Search
 from flexclear.dynamics.plan.elements import mesh
@@ -25,6 +24,7 @@ from flexclear.scene.variants import uncoupled
 from flexclear.stages import effect_plan
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, open_workplace
+from flexclear.study import plan
 from flexclear.system.errors import InputError
 from tests.properties.mechanisms import frame, joint, rigid
 from tests.stages.conftest import Command

@@ -9,10 +9,10 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from flexclear.commands.report import publish_page
 from flexclear.post.overview.comparison import colors
 from flexclear.scene.load import load_scene
 from flexclear.stages.graph import Graph
+from flexclear.study.report import publish_page
 from tests.stages.conftest import Command
 
 SCENE = "checks/clamped_rod"

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from flexclear.artifacts.store import Store
-from flexclear.commands import report
-from flexclear.commands.answers import Answers
 from flexclear.commands.new import write
 from flexclear.stages.workplace import Workplace
+from flexclear.study import report
+from flexclear.study.answers import Answers
 from flexclear.system.errors import FlexclearError, InputError, ResourceError, SolverError
 from flexclear.workflow.fingerprint import Sources
 from flexclear.workflow.task import in_order

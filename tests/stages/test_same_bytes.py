@@ -10,7 +10,7 @@ from tests.processes import printed, python
 
 FIRST = """
 import numpy, scipy.linalg
-from flexclear.commands.scenes import graphs, open_workplace
+from flexclear.stages.scenes import graphs, open_workplace
 (graph,) = graphs(["checks/clamped_rod"])
 done = open_workplace().bring(list(graph.bundle.values()), jobs=1)
 print(*(done.records[task].digest for task in graph.bundle.values()))

@@ -11,7 +11,6 @@ import xarray as xr
 from scipy.special import ellipk
 
 import flexclear as fc
-from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation import engine
@@ -22,6 +21,7 @@ from flexclear.scene.sweep import read_sweep
 from flexclear.scene.units import udunits
 from flexclear.stages.simulation import modules
 from flexclear.stages.sweeps import sweep_plan
+from flexclear.study import sweep
 from flexclear.system.errors import InputError, ResourceError
 from flexclear.system.progress import silent
 from flexclear.workflow.fingerprint import Sources

@@ -17,10 +17,10 @@ import xarray as xr
 
 import flexclear as fc
 from flexclear.artifacts.points import Point
-from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
 from flexclear.stages.sweeps import sweep_engine, sweep_large, sweep_plan
 from flexclear.stages.workplace import open_workplace
+from flexclear.study import sweep
 from flexclear.system.errors import InputError, ResourceError
 from tests.stages.conftest import PATIENCE, Command
 from tests.stages.sweeps import begun, flexclear, pendulum

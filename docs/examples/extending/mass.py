@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flexclear.commands import scenes
+from flexclear.stages import scenes
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

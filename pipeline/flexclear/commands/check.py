@@ -14,13 +14,12 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import scenes, show
 from flexclear.scene import lines
 from flexclear.scene.limits import Limits
 from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file, read_toml
 from flexclear.scene.references import dangling
 from flexclear.scene.variants import ideal, loose
-from flexclear.stages import meshing, simulation
+from flexclear.stages import meshing, scenes, show, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options
 from flexclear.system.errors import FlexclearError, InputError, InputErrors, ResourceError
@@ -153,8 +152,8 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
 
 def _sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:
     """Check a sweep file and its scene."""
-    from flexclear.commands import sweep
     from flexclear.stages.sweeps import sweep_plan
+    from flexclear.study import sweep
 
     requested, scene = sweep.read(path)
     _examine(str(scene.path), (), findings)

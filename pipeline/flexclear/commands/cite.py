@@ -11,10 +11,10 @@ import ast
 from collections.abc import Collection, Iterator
 from importlib import import_module
 
-from flexclear.commands import scenes
 from flexclear.scene.citations import cited
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.registry import module_name, module_of
+from flexclear.stages import scenes
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options, open_workplace
 from flexclear.workflow.fingerprint import Sources, imported, parents, source_file

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 from flexclear.artifacts.paths import kernel_root, results_root
 from flexclear.artifacts.store import Store
-from flexclear.commands import new, reproduction, scenes
+from flexclear.commands import new, reproduction
 from flexclear.dynamics.compile.folder import writable
 from flexclear.post.render import gl
-from flexclear.stages import simulation
+from flexclear.stages import scenes, simulation
 from flexclear.stages.kernels import warm
 from flexclear.stages.workplace import Workplace, add_options, open_workplace
 from flexclear.system import machine

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.artifacts.disk import disk_limits, publish
-from flexclear.commands import export, scenes
-from flexclear.commands.export import as_json
 from flexclear.scene.units import quantity
+from flexclear.stages import export, scenes
+from flexclear.stages.export import as_json
 from flexclear.stages.workplace import add_options, open_workplace
 from flexclear.system.errors import InputError
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from flexclear.commands import scenes
-from flexclear.commands.export import as_json
+from flexclear.stages import scenes
+from flexclear.stages.export import as_json
 from flexclear.stages.graph import Graph
 from flexclear.stages.rendering import FORMATS
 from flexclear.stages.workplace import check, open_workplace, relative

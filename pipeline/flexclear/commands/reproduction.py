@@ -16,9 +16,8 @@ from typing import Any
 
 from flexclear.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.artifacts.paths import TREE, kernel_root, results_root
-from flexclear.commands import scenes
 from flexclear.scene.load import is_file, overridden, read_toml
-from flexclear.stages import meshing
+from flexclear.stages import meshing, scenes
 from flexclear.stages.sweeps.sweep_points import source_digest
 from flexclear.system.errors import FlexclearError, InputError
 from flexclear.system.external_files import companions, require_file

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flexclear.commands import export, plan
-from flexclear.commands.export import as_json
-from flexclear.commands.scenes import (
+from flexclear.stages import export
+from flexclear.stages.export import as_json
+from flexclear.stages.graph import STAGES, Graph
+from flexclear.stages.scenes import (
     FACTS,
     check_out,
     claim,
@@ -18,9 +19,9 @@ from flexclear.commands.scenes import (
     print_files,
     scene_arguments,
 )
-from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.simulation import check_run
 from flexclear.stages.workplace import Workplace, check, open_workplace
+from flexclear.study import plan
 from flexclear.system.errors import InputError
 from flexclear.workflow.schedule import Outcome
 

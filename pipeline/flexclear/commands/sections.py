@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import scenes
-from flexclear.commands.export import as_json
+from flexclear.stages import scenes
+from flexclear.stages.export import as_json
 from flexclear.stages.workplace import open_workplace
 
 if TYPE_CHECKING:

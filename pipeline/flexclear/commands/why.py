@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Mapping, Sequence
 
 from flexclear.artifacts.store import Record
-from flexclear.commands import scenes
-from flexclear.commands.export import as_json
+from flexclear.stages import scenes
+from flexclear.stages.export import as_json
 from flexclear.stages.graph import STAGES
 from flexclear.stages.workplace import open_workplace
 from flexclear.system.errors import shown

@@ -15,7 +15,6 @@ from flexclear.artifacts import maintenance
 from flexclear.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.artifacts.paths import DATA, results_root
 from flexclear.artifacts.store import PARTIAL, Store
-from flexclear.commands import export
 from flexclear.post.pages import media
 from flexclear.post.plotting.table import as_html, from_markdown
 from flexclear.scene import lines
@@ -24,6 +23,7 @@ from flexclear.scene.plausibility import implausible
 from flexclear.scene.references import dangling
 from flexclear.scene.registry import suggestion
 from flexclear.scene.units import quantity
+from flexclear.stages import export
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative

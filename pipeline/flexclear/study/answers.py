@@ -11,15 +11,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from flexclear.commands import cost, scenes
 from flexclear.post.pages import prose
 from flexclear.scene import variants
 from flexclear.scene.integrators import DEFAULT, VIBRATING
 from flexclear.scene.load import edited
 from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
-from flexclear.stages import effect_study, kernels, watched_quantities
+from flexclear.stages import effect_study, kernels, scenes, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
+from flexclear.study import cost
 from flexclear.system.errors import InputError, SolverError
 from flexclear.workflow.task import Task
 

@@ -1,0 +1,136 @@
+"""``flexclear show``: the start pose of scenes with all names, as a picture and a page; nothing is run or compiled."""
+
+from __future__ import annotations
+
+import html
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.post.pages import viewer, viewer_page
+from flexclear.post.render import gl
+from flexclear.stages import meshing, rendering, scenes, simulation
+from flexclear.stages.workplace import relative
+from flexclear.system.errors import InputError, ResourceError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.post.render.start_view import StartView
+    from flexclear.scene.schema import Scene
+
+
+def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
+    """Write picture and page, and print where they are; return the files, and the start's error or None."""
+    with scenes.in_file(scene.path):
+        view, refused = viewed(scene)
+    files = files_of(scene, view, Path.cwd() if folder is None else folder, quiet=quiet)
+    if not quiet:
+        print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
+    for gap in view.gaps:
+        print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.words}", file=sys.stderr)
+    return files, None if refused is None else scenes.placed(refused, scene.path)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Result of `flexclear.show`: the view, the error that refuses the start, and the page."""
+
+    view: StartView
+    refused: InputError | None
+    page: bytes
+
+    @property
+    def gaps(self) -> dict[str, str]:
+        """Description of each joint's gap, by name; empty where all joints fit."""
+        return {gap.joint: gap.words for gap in self.view.gaps}
+
+    def _repr_html_(self) -> str:
+        """Return the page for a notebook, in a frame of its own so that its style stays there."""
+        text = html.escape(self.page.decode(), quote=True)
+        return f'<iframe srcdoc="{text}" width="100%" height="760" style="border:0"></iframe>'
+
+
+def start(scene: Scene, folder: Path | None = None) -> Start:
+    """Return the start pose of a scene; write picture and page where a folder is given.  Raises InputError."""
+    scenes.require_names(scene)
+    with scenes.in_file(scene.path):
+        view, refused = viewed(scene)
+    if folder is not None:
+        files_of(scene, view, folder)
+    return Start(view, refused, _page(scene, view))
+
+
+def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
+    """Return the start pose with its names, and the error that refuses it.  Raises InputError if none can be drawn."""
+    from flexclear.dynamics.model.start_pose import start_pose
+    from flexclear.dynamics.run.run import placed
+    from flexclear.post.render.mechanism import Looks
+    from flexclear.post.render.start_view import Missing, start_view
+
+    bodies = {name: _body(Path(recipe)) for name, recipe in scene.recipes().items()}
+    looks = rendering.params(scene, "motion", "pvd")
+    filled = _filled(scene, bodies, lone := _unplaced(scene))
+    pose = start_pose(placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
+    gaps = [Missing(gap.joint, gap.start, gap.end, gap.angle) for gap in pose.gaps]
+    view = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
+    if lone:
+        note = f"drawn at the origin, since they have neither pose nor joint: {', '.join(lone)}"
+        view = replace(view, notes=(*view.notes, note))
+    return view, pose.refused
+
+
+def files_of(scene: Scene, view: StartView, folder: Path, *, quiet: bool = False) -> list[Path]:
+    """Write the page, and the picture where this machine can draw.  Raises ResourceError."""
+    stem = Path(scene.name).name
+    content = {f"{stem}_start.html": _page(scene, view)}
+    if gl.works():
+        from flexclear.post.render.pictures import png
+        from flexclear.post.render.start_view import picture
+
+        content[f"{stem}_start.png"] = png(picture(view, scene.title or stem))
+    elif not quiet:
+        print(f"flexclear: warning: no picture, only the page: {gl.remedy()}", file=sys.stderr)
+    try:
+        for name, data in content.items():
+            (folder / name).write_bytes(data)
+    except OSError as error:
+        raise ResourceError(f"{folder}: cannot be written: {error.strerror}") from None
+    return [folder / name for name in content]
+
+
+def _page(scene: Scene, view: StartView) -> bytes:
+    from flexclear.post.render.start_view import page_view
+
+    title = scene.title or Path(scene.name).name
+    return viewer_page(f"{title}: start", [viewer(page_view(view), title)])
+
+
+def _body(recipe: Path) -> xr.Dataset:
+    """Return rigid-body data and drawn surface of a mesh."""
+    from flexclear.structure.kinds import kind
+    from flexclear.structure.modes import bundle
+
+    table: dict[str, Any] = meshing.params(recipe)["recipe"]
+    return bundle.drawn(kind.build(table, recipe.parent))
+
+
+def _unplaced(scene: Scene) -> list[str]:
+    """Return the bodies that neither a pose nor a joint places, as in scenes about a body's modes alone."""
+    joined = {frame.partition(".")[0] for joint in scene.joint.values() for frame in joint.between}
+    paths = {drive.frame.partition(".")[0] for drive in scene.drive.values() if hasattr(drive, "frame")}
+    return [n for n, b in scene.body.items() if getattr(b, "pose", b) is None and n not in joined | paths]
+
+
+def _filled(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Scene:
+    """Return the scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
+
+    lone: bodies that are put at the origin.
+    """
+    table = scene.model_dump(mode="python", exclude_none=True)
+    table["body"] = simulation.filled(table["body"], {f"{simulation.RIGID}{n}": bodies[n] for n in scene.meshed()})
+    table.get("start", {}).pop("modal", None)
+    for name in lone:
+        table["body"][name]["pose"] = {}
+    return type(scene).model_validate(table)

@@ -1,0 +1,98 @@
+"""``flexclear compare``: scenes next to each other or their ideal mechanisms: differences, and each run's own error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from flexclear.artifacts.store import publish
+from flexclear.post.pages import Part, page
+from flexclear.scene.schema import Scene
+from flexclear.scene.variants import EFFECTS, ideal, loose
+from flexclear.stages.graph import Graph
+from flexclear.stages.scenes import joined, pictures, tables
+from flexclear.stages.workplace import Made, Workplace, check
+from flexclear.system.errors import InputError, of_trial
+from flexclear.workflow.task import Task
+
+#: what `--ideal` removes: everything at once, one effect, or one after the other
+IDEAL = ("both", *EFFECTS, "each")
+#: files that the page of a comparison shows: pictures with their captions, then tables
+PICTURES = {
+    "compare.png": ("Watched quantities, and their distance from the reference",),
+    "compare_contacts.png": ("Orbits",),
+}
+TABLES = ("differences.md", "costs.md")
+
+
+def bring(
+    scenes: list[Scene], workplace: Workplace, without: str | None = None, alongside: Sequence[Task] = ()
+) -> Made:
+    """Run scenes, their ideal mechanisms, and all of these at tighter tolerances; return the comparison and its page.
+
+    without: one of IDEAL, or None for the scenes alone.  alongside: tasks for a processor that the runs leave idle;
+    they may fail.  Raises InputError.
+    """
+    sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
+    if len(sides) < 2:
+        raise InputError(
+            sides[0].name if sides else "compare",
+            "a single scene has no other to compare with",
+            "name several, or compare it with its ideal mechanism: --ideal",
+        )
+    names = [side.name for side in sides]
+    labels = [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]
+    graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(labels, sides, strict=True)}
+    runs = workplace.bring([*(graph.simulate for graph in graphs.values()), *alongside])
+    check(replace(runs, failures=tuple(failure for failure in runs.failures if failure.task not in alongside)))
+    # the runs have compiled the kernels, so that the tighter runs need not compile them concurrently
+    tight = {
+        label: graph.tighter(workplace.store.load(runs.records[graph.simulate]).attrs)
+        for label, graph in graphs.items()
+        if graph.has_tighter
+    }
+    outcome = workplace.bring(list(tight.values()))
+    for failure in outcome.failures:
+        workplace.monitor.say(f"no error can be determined: {of_trial(failure.message)}")
+    (made,) = workplace.made(_task(graphs, {label: task for label, task in tight.items() if task in outcome.records}))
+    title = f"Compared: {', '.join(graphs)}"
+    publish(made.folder / "index.html", page(title, "The first run is the reference.", parts(made)))
+    return made
+
+
+def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
+    """Return the scene without the effects of `without`, the most ideal one first; InputError where nothing can go."""
+    sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
+    ideals: list[Scene] = []
+    for effects in sets.get(without, ((without,),)):
+        present = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
+        if present or not ideals:
+            made = ideal(scene, effects)
+            same = any(made.model_dump() == other.model_dump() for other in ideals)
+            made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
+            ideals += [] if same else [made]
+    return ideals
+
+
+def parts(made: Made) -> list[Part]:
+    """Return the sections of a page that show a comparison."""
+    return [
+        Part("differences", "Differences and errors", tables(made, *TABLES)),
+        Part("runs", "Side by side", pictures(made, PICTURES)),
+    ]
+
+
+def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
+    quantities = {q.name: q.written() for graph in graphs.values() for q in graph.scene.watched()}
+    labels = list(graphs)
+    inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
+    inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}
+    return Task(
+        stage="comparison",
+        scene=labels[-1],
+        run="flexclear.stages.evaluation:comparison",
+        params={"labels": labels, "quantities": list(quantities.values())},
+        inputs=inputs,
+        folder=f"compare/{joined(labels)}",
+        names={"nc": "compare.nc"},
+    )

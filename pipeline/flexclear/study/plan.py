@@ -1,0 +1,246 @@
+"""``flexclear plan``: effects, modes and tolerance that a scene's requested accuracy requires, with the evidence."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.artifacts.store import publish
+from flexclear.post.plotting.table import as_html, as_markdown
+from flexclear.scene import variants
+from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import parse
+from flexclear.scene.variants import pruned
+from flexclear.stages import effect_plan, scenes, watched_quantities
+from flexclear.stages.workplace import FailedTasksError, Made, Workplace, open_workplace, seconds
+from flexclear.system.errors import InputError, SolverError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.scene.schema import Scene
+
+#: ending of a planned scene's file, after the scene's name
+SUFFIX = ".planned.toml"
+#: members that `--verify` runs of scenes with contacts, up to a verdict or to the budget [s]
+MEMBERS, BUDGET = (4, 8, 16, 32, 64), 60.0
+#: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
+LEVELS = ("10 %", "1 %", "0.1 %")
+
+
+def levels(scene: Scene, workplace: Workplace) -> str:
+    """Return a table of the plans for three accuracies of all watched quantities.
+
+    Raises InputError for a scene without effects or watched quantities, and the last refusal when no accuracy has a
+    plan.
+    """
+    from flexclear.post.answers.plan import levels as shown
+
+    plans: dict[str, xr.Dataset | str] = {}
+    for level in LEVELS:
+        try:
+            plans[level] = bring(scene, workplace, level).made.dataset()
+        except (InputError, FailedTasksError) as error:
+            if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
+                raise
+            plans[level] = str(error)
+    return as_markdown(shown(plans))
+
+
+def with_accuracy(scene: Scene, level: str) -> Scene:
+    """Return the scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
+    chosen = {quantity.name: level for quantity in scene.watched()}
+    if not chosen:
+        raise InputError(str(scene.path or scene.name), "watches no quantity", "name quantities in [view] watch")
+    asked = edited(scene, {"accuracy": chosen})
+    asked._name, asked._path = f"{scene.name} to {level.replace(' ', '')}", None
+    return asked
+
+
+def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
+    """Return the planned scene, and the plan as a dataset that shows its answer in a notebook.
+
+    level: accuracy of all watched quantities, where the scene requests none.  budget: time for `errors_of` [s], or
+    text; None leaves the errors out.
+    """
+    from flexclear.post.answers.answered import answered
+    from flexclear.post.answers.plan import verified, words
+
+    workplace = open_workplace()
+    planned = bring(scene, workplace, level if scene.accuracy is None else None)
+    result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
+    if budget is not None:
+        compared = errors_of(planned, workplace, seconds(budget, "budget"))
+        result = result.assign(
+            {name: compared[name] for name in ("requested", "error", "chance", "allowed", "horizon", "scatter")}
+        )
+        table = as_html(verified(compared)) + table
+    return planned.planned, answered(result, words(result), planned.made.read("plan.png"), table)
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A plan that is up to date. scene: the full one.  planned: the scene with the plan's decisions.
+
+    made: effect sizes, decisions and evidence (`post.answers.plan.dataset`), and the table ``plan.md``.
+    """
+
+    scene: Scene
+    planned: Scene
+    made: Made
+
+    @property
+    def target(self) -> Path:
+        """Path of the planned scene's file."""
+        return self.made.folder / f"{self.scene.name.rpartition('/')[2]}{SUFFIX}"
+
+    def file(self, target: Path) -> bytes:
+        """Return the planned scene's file for a given path; it extends the full scene's."""
+        assert self.scene.path is not None
+        head = (
+            "written by flexclear plan",
+            "omitted: effects that the requested accuracy of the full scene does not require",
+        )
+        base = load_scene(self.scene.path)
+        return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
+
+
+def _example(scene: Scene) -> str:
+    """Return an entry that this scene's `[accuracy]` could have."""
+    watched = next((quantity for quantity in scene.watched() if quantity.kind == "position"), None)
+    body = watched.owner if watched is not None else next(iter(scene.rigid()), "body")
+    return f'{body}.position = "10 um"'
+
+
+def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Planned:
+    """Bring the plan of a scene up to date, and write the planned scene's file and the page next to it.
+
+    level: accuracy of all watched quantities that change, in place of the scene's `[accuracy]`, as in `with_accuracy`.
+    Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy no plan or every plan meets, and
+    the errors of its runs.
+    """
+    scene = scene if level is None else with_accuracy(scene, level)
+    where = f"{scene.path or scene.name}"
+    if scene.accuracy is None or not scene.accuracy.quantities:
+        raise InputError(
+            f"{where} [accuracy]",
+            "the scene requests no accuracy",
+            f"request one in [accuracy], such as {_example(scene)}",
+        )
+    if not variants.effects(scene):
+        raise InputError(
+            where, "has no effect that could be omitted: no clearance, flexible body, friction, gravity or stop"
+        )
+    (made,) = workplace.made(effect_plan.task(scene, watched=level is not None))
+    planned = Planned(scene, of(scene, made.dataset()), made)
+    if scene.path is not None:
+        publish(planned.target, planned.file(planned.target))
+        publish(made.folder / "index.html", page(planned))
+    return planned
+
+
+def of(scene: Scene, plan: xr.Dataset) -> Scene:
+    """Apply a plan to a scene: replace and remove parts, set solver and watched quantities."""
+    decided = json.loads(plan.attrs["planned"])
+    bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
+    fewer = pruned(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
+    owners = fewer.owners()
+    watch = [q.name for q in scene.watched() if q.is_there(owners)]
+    view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
+    solver: dict[str, Any] = {key: decided[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in decided}
+    if "evaluations" in scene.solver.model_fields_set:
+        solver["evaluations"] = scene.solver.evaluations  # a limit that the scene sets itself
+    result = edited(
+        fewer,
+        {
+            "title": f"{scene.title}, as planned",
+            "accuracy": None,
+            "ensemble": None,
+            **({"solver": solver} if "integrator" in decided else {}),  # without a decision the solver stays
+            "view": view | {"watch": watch},
+        },
+    )
+    result._name, result._path = f"{scene.name}-planned", None
+    return result
+
+
+def page(planned: Planned) -> bytes:
+    """Return the page of a plan: its answer in words, the chart, the table, the planned scene."""
+    import html
+
+    from flexclear.post.answers.plan import words
+    from flexclear.post.pages import Part
+    from flexclear.post.pages import page as made
+
+    picture = scenes.pictures(planned.made, {"plan.png": ("Estimated size of each effect, at most",)})
+    text = html.escape(planned.file(planned.target).decode())
+    parts = [
+        Part("chart", "Effect sizes", picture),
+        Part("decisions", "Decisions", scenes.tables(planned.made, "plan.md")),
+        Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
+    ]
+    return made(f"Plan: {planned.scene.title}", words(planned.made.dataset()), parts)
+
+
+def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:
+    """Run the full and the planned scene, print their differences, and return a sentence for each missed accuracy.
+
+    budget: time for members that decide the verdicts [s].
+    """
+    from flexclear.post.answers.plan import agreement_of, verified
+
+    compared = errors_of(planned, workplace, budget)
+    print(as_markdown(verified(compared)))
+    if planned.scene.accuracy is not None and planned.scene.accuracy.allow_missed:
+        return []
+    verdicts = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
+    columns = zip(compared["quantity"].values, compared["unit"].values, verdicts, strict=True)
+    return [
+        f"{planned.scene.name}: the plan misses {name}: {one.error:.3g} instead of {one.allowed:.3g} {unit}"
+        for name, unit, one in columns
+        if one.missed
+    ]
+
+
+def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
+    """Return the distance of the planned run from the full one by quantity, over members where the scene has contacts.
+
+    Members are added until every verdict is decided, as far as the budget [s] allows.
+    """
+    from flexclear.artifacts import effect_size
+    from flexclear.post.answers.plan import until_decided
+
+    assert planned.scene.accuracy is not None
+    asked, begun = planned.scene.accuracy.quantities, time.monotonic()
+    full = edited(planned.scene, {"accuracy": None})
+    result, first = planned.made.dataset()[["requested"]].copy(), list[float]()
+    chosen = [parse(str(name), planned.scene.owners()) for name in result["quantity"].values]
+
+    def compared(members: int) -> list[effect_size.Agreement]:
+        both = full, planned.planned
+        stored = workplace.datasets(*(watched_quantities.task(scene, chosen, members) for scene in both))
+        one, two = (effect_size.watched(d, scene.owners(), chosen) for d, scene in zip(stored, both, strict=True))
+        for point, what in ((one, "full"), (two, "planned")):
+            if point.refused:
+                raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")
+        for k, q in enumerate(chosen):
+            relative = asked[q.name].relative
+            if relative is not None:  # the size of the quantity is known now
+                result["requested"][k] = relative * effect_size.size(one, q)
+        result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
+        result.attrs |= {"full_evaluations": one.evaluations, "planned_evaluations": two.evaluations}
+        first.append(time.monotonic() - begun)
+        requested = result["requested"].values
+        return [effect_size.agreement(two, one, q, members, float(r)) for q, r in zip(chosen, requested, strict=True)]
+
+    def affordable(members: int) -> bool:
+        return time.monotonic() - begun + first[0] * members / MEMBERS[0] <= budget
+
+    loose = planned.scene.contacts() or planned.scene.stop
+    verdicts, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
+    for name in ("error", "chance", "allowed", "horizon"):
+        result[name] = (("quantity",), [getattr(one, name) for one in verdicts])
+    return result.assign_attrs(members=members if loose else 0)
