@@ -15,7 +15,7 @@ from papers.wang_wang_2019 import tasks
 def main() -> None:
     """Bring everything on the page up to date and print where the page is.
 
-    Parts that fail are left out of the page and raised (FailedTasksError) after the page is written.
+    Parts that fail are left out of the page and raised after the page is written.
     """
     parser = argparse.ArgumentParser(prog="python -m papers.wang_wang_2019", description=__doc__)
     parser.add_argument("--folder", action="store_true", help="write a folder with the page and its pictures")
