@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 
+import flexclear as fc
 from flexclear.post.render import gl
 from flexclear.stages.workplace import add_options, check, open_workplace, relative
 from flexclear.study.report import publish_page
-from flexclear.workflow.program import exit_code
 from papers.wang_wang_2019 import tasks
 
 
@@ -33,4 +33,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(exit_code(main))
+    sys.exit(fc.exit_code(main))

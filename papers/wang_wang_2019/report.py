@@ -14,10 +14,10 @@ from typing import Any
 
 import xarray as xr
 
-from flexclear.artifacts.paths import PROJECT
 from flexclear.post.pages import Part, downloads, figures_of, media, page, prose
 from flexclear.post.plotting.table import Table, as_csv, as_html, from_markdown
 from flexclear.system.progress import Progress
+from papers import PROJECT
 from papers.wang_wang_2019 import DOCUMENTS, figures
 from papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 

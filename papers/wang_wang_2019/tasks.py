@@ -7,16 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from flexclear.artifacts.paths import PROJECT
+import flexclear as fc
 from flexclear.artifacts.store import Record
-from flexclear.scene.load import load_scene
 from flexclear.scene.registry import module_of
 from flexclear.stages import derived_series, kernels, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, check
-from flexclear.system.errors import InputError
 from flexclear.workflow.schedule import Outcome
 from flexclear.workflow.task import Task
+from papers import PROJECT
 from papers.wang_wang_2019 import DOCUMENTS, figures, timing
 
 #: files with parts that the page shows, below the folder of the sources: pages, their pictures, variants of scenes
@@ -36,7 +35,7 @@ class Scenes:
     def graph(self, name: str) -> Graph:
         """Return the graph of ``scenes/<name>.toml``."""
         if name not in self.graphs:
-            self.graphs[name] = Graph(load_scene(PROJECT / "scenes" / f"{name}.toml"))
+            self.graphs[name] = Graph(fc.load_scene(PROJECT / "scenes" / f"{name}.toml"))
         return self.graphs[name]
 
     def artifact(self, reference: str) -> Task:
@@ -54,7 +53,7 @@ class Scenes:
             return self.times[family]
         files = sorted((PROJECT / "scenes" / family).glob("*.toml"))
         if not files:
-            raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
+            raise fc.InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
         graphs = [self.graph(f"{family}/{path.stem}") for path in files]
         self.times[family] = Task(
             stage="timing",

@@ -27,6 +27,10 @@ from flexclear.study import compare as comparison
 from flexclear.study import effects as effect_sizes
 from flexclear.study import plan as planning
 from flexclear.study import report as page
+from flexclear.system.errors import FlexclearError as FlexclearError
+from flexclear.system.errors import InputError as InputError
+from flexclear.system.errors import ResourceError as ResourceError
+from flexclear.system.errors import SolverError as SolverError
 from flexclear.system.version import version
 from flexclear.workflow.program import exit_code as exit_code
 

@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -59,6 +60,8 @@ VIOLATIONS = [
     ("pipeline/flexclear/scene/units.py", "papers.wang_wang_2019.deviations", "three towers"),
     ("pipeline/flexclear/scene/units.py", "flexclear.artifacts.store", "three towers"),
     ("pipeline/flexclear/dynamics/memory.py", "flexclear.stages.graph", "three towers"),
+    ("pipeline/flexclear/public.py", "flexclear.commands.run", "three towers"),
+    ("papers/wang_wang_2019/deviations.py", "flexclear.dynamics.memory", "papers import the public functions"),
     ("papers/wang_wang_2019/deviations.py", "meshio", "finite elements"),
     ("pipeline/flexclear/stages/graph.py", "skfem", "finite elements"),
     ("pipeline/flexclear/dynamics/memory.py", "matplotlib", "plots"),
@@ -185,6 +188,20 @@ def test_the_lowest_versions_are_those_that_are_declared(root: Path):
         name, _, bounds = requirement.lower().partition(">=")
         bound = bounds.partition(",")[0]
         assert lowest[name] == bound or lowest[name].startswith(f"{bound}."), requirement
+
+
+def test_wheels_hold_scenes_and_meshes_next_to_the_code(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """What setup.py adds to the packages that setuptools finds; nothing else is built here."""
+    setuptools = pytest.importorskip("setuptools")
+    monkeypatch.chdir(root)
+    monkeypatch.setattr(setuptools, "setup", lambda **_: None)
+    step = runpy.run_path("setup.py")["BuildWithData"](setuptools.Distribution({"packages": []}))
+    step.build_lib, step.editable_mode = str(tmp_path / "wheel"), False
+    step.finalize_options()
+    step.run()
+    data = {p.relative_to(root) for top in ("scenes", "meshes") for p in (root / top).rglob("*") if p.is_file()}
+    assert len(data) > 60
+    assert {p.relative_to(tmp_path / "wheel/flexclear") for p in tmp_path.rglob("*") if p.is_file()} == data
 
 
 def test_there_is_one_script_and_it_is_the_command(root: Path) -> None:

@@ -170,7 +170,7 @@ def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
 
 
 def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:
-    assert set(fc.__all__) == set(fc.public.__all__) == set(dir(fc)) - {"__version__"}
+    assert set(fc.__all__) == set(dir(fc)) - {"__version__"}
     assert all(getattr(fc, name) is getattr(fc.public, name) for name in fc.__all__)
 
 

@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from flexclear.artifacts.paths import PROJECT
 from flexclear.post.plotting.table import Table
 from flexclear.scene.output import rows
+from papers import PROJECT
 from papers.wang_wang_2019 import deviations
 from papers.wang_wang_2019 import models as paper
 from papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
