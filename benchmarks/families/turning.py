@@ -17,6 +17,7 @@ import xarray as xr
 
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
+from flexclear.artifacts.paths import PROJECT
 from flexclear.dynamics import analyses
 from flexclear.scene.schema import Scene
 from flexclear.structure.kinds import kind
@@ -24,7 +25,6 @@ from flexclear.structure.modes import bundle
 from flexclear.structure.modes.basis import ModeRequest
 from flexclear.structure.modes.solution import solve
 from flexclear.system.progress import silent
-from flexclear.workflow.fingerprint import TREE
 
 Table = dict[str, Any]
 STEEL, ALUMINIUM = (
@@ -214,7 +214,7 @@ CASES: dict[str, Callable[[], Body]] = {
 @cache
 def known() -> dict[str, Any]:
     """Return title and values (quantity, speed [rad/s or rpm], value, unit) of each case."""
-    return json.loads((TREE / "tests" / "reference" / "turning_bodies.json").read_text(encoding="utf-8"))
+    return json.loads((PROJECT / "tests" / "reference" / "turning_bodies.json").read_text(encoding="utf-8"))
 
 
 def values(case: str, speed: float) -> tuple[float, np.ndarray, float]:

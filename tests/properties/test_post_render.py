@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
+from flexclear.artifacts.paths import PROJECT
 from flexclear.post.render import gl, gltf, player
 from flexclear.post.render.forms import equivalent
 from flexclear.post.render.layout import part_pose
@@ -21,7 +22,6 @@ from flexclear.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scal
 from flexclear.post.shapes.body_shape import rod_surface as surface
 from flexclear.post.single_run.series import derive
 from flexclear.system.errors import SolverError
-from flexclear.workflow.fingerprint import TREE
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
@@ -130,7 +130,7 @@ def test_zoom_enlarges_stills_and_the_page_alike():
 
 def test_a_spring_reaches_from_end_to_end_at_all_times():
     """A mass that swings on its spring: the coil is stretched to the distance of its ends, in pages and files, too."""
-    run = fc.run(fc.load_scene(TREE / "scenes/checks/oscillator.toml", override={"time.end": 0.3}))
+    run = fc.run(fc.load_scene(PROJECT / "scenes/checks/oscillator.toml", override={"time.end": 0.3}))
     drawn = mechanism(run, {})
     coil = next(part for part in drawn.parts if part.length is not None)
     mass = run["position"].sel(body="mass").values
@@ -155,7 +155,7 @@ def test_a_body_that_moves_far_is_in_the_first_picture_of_its_film():
     """A ball that falls by a metre from above the origin, where parts are before they are put in place."""
     from flexclear.post.render import film
 
-    run = fc.run(fc.load_scene(TREE / "pipeline/flexclear/stages/templates/empty/scene.toml"))
+    run = fc.run(fc.load_scene(PROJECT / "pipeline/flexclear/stages/templates/empty/scene.toml"))
     drawn = mechanism(run, {})
     first = next(iter(film.frames(drawn, derive(run), 12)))[:, : film.VIEW]
     # the ball is blue; background, floor and words are grey
