@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -366,44 +367,29 @@ def _as_heavier(scene: Scene) -> float:
 
 
 #: the cases by name
-CASES = {
+LONG, UNBALANCED = {"integrator": "exponential"}, ("refusal", _ledger, 0.0, "the energy balance does not close")
+CASES: dict[str, HardCase] = {
     "unbalanced rotor above its critical speed": HardCase(
-        lambda: rotor(150.0, 1e-5), "deflection, closed form", _deflection, 1e-3
+        partial(rotor, 150.0, 1e-5), "deflection, closed form", _deflection, 1e-3
     ),
     "oblique rotor": HardCase(lambda: rotor(150.0, 0.0, OBLIQUE), "frequencies, upright rotor", _as_upright, 1e-7),
     "driven into a stop": HardCase(driven_into_a_stop, "peak forces, closed form", _peak, 1e-6),
     "multistep across impacts": HardCase(
-        lambda: bounce(integrator="adams-bashforth-moulton", step=1e-3, events="at step ends"),
-        "refusal",
-        _ledger,
-        refused="the energy balance does not close",
+        lambda: bounce(integrator="adams-bashforth-moulton", step=1e-3, events="at step ends"), *UNBALANCED
     ),
-    "steps longer than an impact": HardCase(
-        lambda: bounce(integrator="rk4", step=0.05, events="located"),
-        "refusal",
-        _ledger,
-        refused="the energy balance does not close",
-    ),
+    "steps longer than an impact": HardCase(lambda: bounce(integrator="rk4", step=0.05, events="located"), *UNBALANCED),
     "1 nm next to 100 m": HardCase(stage_next_to_a_crane, "vibration, closed form", _vibration, 1e-8),
     "bushing beyond half a turn": HardCase(wound_bushing, "spin, closed form", _spin, 1e-7),
     "graze, 1e-7 of the amplitude": HardCase(
-        lambda: graze(1e-8, 1e-10), "speeds of closings, closed form", _graze_speed(1e-8), 1e-2
+        partial(graze, 1e-8, 1e-10), "closings, closed form", _graze_speed(1e-8), 1e-2
     ),
-    "graze at rtol 1e-4": HardCase(
-        lambda: graze(1e-3, 1e-4), "speeds of closings, closed form", _graze_speed(1e-3), 1e-2
-    ),
+    "graze at rtol 1e-4": HardCase(partial(graze, 1e-3, 1e-4), "closings, closed form", _graze_speed(1e-3), 1e-2),
     "diverging sampled controller": HardCase(fast_sampler, "refusal", _ledger, refused="the motion diverges"),
-    "impacts of 0.1 um": HardCase(
-        lambda: small_bounce(1e-6), "speeds of closings, the same in metres", _as_in_metres(1e-6), 1e-6
-    ),
+    "impacts of 0.1 um": HardCase(partial(small_bounce, 1e-6), "closings, as in metres", _as_in_metres(1e-6), 1e-6),
     "loop of a meshed body": HardCase(meshed_loop, "loops, per length", _opening, 1e-10),
     "pin in a slot without clearance": HardCase(quick_return, "sliding, closed form", _sliding, 1e-9),
-    "vibration with an output per period": HardCase(
-        lambda: strobed({}), "exchanged energy, closed form", _exchange, 0.5
-    ),
-    "the same with long steps": HardCase(
-        lambda: strobed({"integrator": "exponential"}), "exchanged energy, closed form", _exchange, 0.5
-    ),
+    "output once a period": HardCase(partial(strobed, {}), "exchanged energy, closed form", _exchange, 0.5),
+    "the same with long steps": HardCase(partial(strobed, LONG), "exchanged energy, closed form", _exchange, 0.5),
     "at rest on a stop": HardCase(resting_on_a_stop, "torque of the stop, closed form", _torque, 1e-6),
     "block without mass in a loop": HardCase(block_without_mass, "angle, with a block of 1 mg", _as_heavier, 1e-4),
 }

@@ -281,7 +281,7 @@ def _show(records: list[Record]) -> str:
 
 FAMILY = Family(
     what="frequencies and growth rates of flexible bodies that turn fast, next to independent solutions",
-    takes="5 min",
+    takes="3 min",
     page="rotors.md",
     cases=lambda: [Case(name) for name in CASES],
     measure=each(_measured),

@@ -138,9 +138,9 @@ def test_loops_go_round_one_turn_at_a_time() -> None:
 
 
 #: kernels that may be given one array twice, or `d` and a stretch of it, since they write into none
-READERS = {"at_port", "first_moment", "second_moment", "straight", "widest"}
+READERS = {"at_port", "first_moment", "widest"}
 #: what factories call those that they are given
-GIVEN = {"shortening"}
+GIVEN = {"stiffening"}
 
 
 @cache

@@ -232,6 +232,8 @@ def bundle(count: int = 7, nodes: int = 13, frequency: np.ndarray | None = None)
         "modal_first_moment": (("axis", "mode"), np.zeros((3, count))),
         "position_mode_moment": (("axis", "axis2", "mode"), np.zeros((3, 3, count))),
         "mode_mode_moment": (("axis", "axis2", "mode", "mode2"), np.zeros((3, 3, count, count))),
+        "second_order_moment": (("axis", "axis2", "mode", "mode2"), np.zeros((3, 3, count, count))),
+        "untilted_inertia": (("axis", "axis2"), np.zeros((3, 3))),
         "modal_mass": (("mode", "mode2"), eye), "modal_stiffness": (("mode", "mode2"), eye),
         "frequency": (("mode",), frequency),
         "frame_position": (("frame", "axis"), x[[0, -1]]),

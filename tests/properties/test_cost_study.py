@@ -175,7 +175,7 @@ def test_what_cannot_be_had_is_explained(made: dict[str, Any], words: str):
 @pytest.mark.parametrize(
     "error, own, words",
     [
-        (2e-15, {"own_rtol": 1e-10}, "time integration (2e-15 of a quantity's size), which is rounding."),
+        (2e-15, {"own_rtol": 1e-10}, "time integration (2.0e-15 of a quantity's size), which is rounding."),
         (1e-6, {"own_rtol": 1e-10}, "; remedy: a tighter tolerance."),
         (1e-6, {"own_step": 1e-4}, "; remedy: shorter steps."),
     ],

@@ -76,8 +76,8 @@ def test_what_a_run_depends_on_is_the_content_of_the_table_not_its_place(tmp_pat
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("time,angel\n0,0\n1000,1\n", ("no column 'angle'", "time, angel")),
-        ("time,angle\n0,0\n1000,x\n", ("row 3", "'x'", "not two numbers")),
+        ("time,angel\n0,0\n1000,1\n", ("no column 'angle'", "did you mean 'angel'")),
+        ("time,angle\n0,0\n1000,x\n", ("row 3", "no numbers in columns 1 and 2")),
         ("time,angle\n0,0\n", ("at least 2 points",)),
         ("time,angle\n0,0\n500,1\n500,2\n", ("times must increase", "point 3")),
         ("", ("no column 'time'",)),

@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.commands.new import write
+from flexclear.scene.load import edited, load_scene
+from flexclear.stages.scenes import unrecorded
 from tests.stages.conftest import Command
 from tests.stages.typical_mistakes import LOAD
 
@@ -85,12 +88,15 @@ WRONG = {
             "load.d.between": ('between = ["rod.A", "crank.A"]', "its two ends coincide at the start"),
         },
     ),
-    "pin outside of its slot": (
-        {},
+    "pins outside of journal and slot": (
+        {'at = "ideal"\n': ""},  # with an ideal slot nothing could be assembled
         '[joint.slot]\ntype = "clearance-slot"\nbetween = ["ground.O", "crank.A"]\ntravel = "300 mm"\n'
         'clearance = "0.1 mm"\npin_radius = "8 mm"\nlength = 0.01\nnormal = { law = "hertz", stiffness = 1e9 }\n',
-        # 50 mm sin 40 deg
-        {"joint.slot.between": ('between = ["ground.O", "crank.A"]', "the pin ('crank.A') starts 32.14 mm from")},
+        # 50 mm sin 40 deg; the slider is at the guide's zero
+        {
+            "joint.slot.between": ('between = ["ground.O", "crank.A"]', "the pin ('crank.A') starts 32.14 mm from"),
+            "joint.B.between": ('between = ["rod.B", "slider.B"]', "the pin ('slider.B') starts"),
+        },
     ),
     "wrong units": (
         {},
@@ -186,3 +192,21 @@ def test_a_load_on_a_flexible_body_that_is_clamped_to_the_ground_is_no_error(tmp
         f'[load.tip]\ntype = "point-force"\nframe = "rod.{end[-1]}"\nforce = [0, 0, -1]\n'
     )
     assert "no error" in command("check", tmp_path / "own.toml").out
+
+
+@pytest.mark.parametrize(
+    "recipe, asked, lacks",
+    [
+        ("[shape]\ntype = 'mesh-file'", "rod.section_force", "a solid, which has no sections"),
+        ("[shape]\ntype = 'mesh-file'", "rod.peak_von_mises", ""),
+        ("[shape]\ntype = 'straight-beam'\n[section]\ntype = 'general'", "rod.peak_axial_stress", "unknown outline"),
+        ("[shape]\ntype = 'straight-beam'\n[section]\ntype = 'general'", "rod.section_force", ""),
+    ],
+)
+def test_a_watched_stress_that_a_body_does_not_have_is_refused(tmp_path: Path, recipe: str, asked: str, lacks: str):
+    path = write("slider-crank", tmp_path)[0]
+    scene = edited(load_scene(path), {"output.stress": ["rod"], "view": {"watch": [asked]}})
+    (tmp_path / "rod.toml").write_text(recipe)
+    said = [str(error) for error in unrecorded(scene)]
+    assert len(said) == bool(lacks)
+    assert all(f"[view.watch]: '{asked}' is not recorded: 'rod' is" in one and lacks in one for one in said)

@@ -69,7 +69,7 @@ def test_the_version_is_known_in_a_checkout_on_the_path(tmp_path: Path, monkeypa
 def test_every_library_that_the_code_imports_is_a_fact(name: str, root: Path):
     """Also where functions import it: SciPy solves the eigenproblems of modes, for instance. Locks, folders and the
     machine's resources change no result."""
-    stage, sources = f"flexclear.stages.{name}", Sources(root)
+    stage, sources = f"flexclear.stages.{name}", Sources(root / "pipeline")
     used = {library for module in sources.closure([stage]).values() for library in module.libraries}
     found = facts(Task("s", "scene", f"{stage}:run", {}, ""), {}, sources)
     assert {f"library {one}" for one in used - {"filelock", "platformdirs", "psutil"}} <= found.keys()

@@ -17,12 +17,10 @@ from flexclear.commands.check import examined
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.scene import lines
 from flexclear.scene.json_schema import scene_schema
-from flexclear.scene.load import edited, load_scene
 from flexclear.scene.plausibility import implausible
 from flexclear.scene.schema import Scene
 from flexclear.stages import scenes, show
 from flexclear.stages.export import as_json
-from flexclear.stages.scenes import unrecorded
 from flexclear.system.errors import InputError
 from tests.properties import mechanisms
 from tests.properties.mechanisms import frame, ground, joint, rigid
@@ -440,21 +438,3 @@ def test_a_ball_that_starts_in_its_plane_is_refused_with_its_depth(tmp_path: Pat
     assert "the ball starts with a penetration of 3 mm into the plane" in said
     assert "hint: move a body, lower the plane, or declare" in said
     assert "clearance" not in said
-
-
-@pytest.mark.parametrize(
-    "recipe, asked, lacks",
-    [
-        ("[shape]\ntype = 'mesh-file'", "rod.section_force", "a solid, which has no sections"),
-        ("[shape]\ntype = 'mesh-file'", "rod.peak_von_mises", ""),
-        ("[shape]\ntype = 'straight-beam'\n[section]\ntype = 'general'", "rod.peak_axial_stress", "unknown outline"),
-        ("[shape]\ntype = 'straight-beam'\n[section]\ntype = 'general'", "rod.section_force", ""),
-    ],
-)
-def test_a_watched_stress_that_a_body_does_not_have_is_refused(tmp_path: Path, recipe: str, asked: str, lacks: str):
-    path = write("slider-crank", tmp_path)[0]
-    scene = edited(load_scene(path), {"output.stress": ["rod"], "view": {"watch": [asked]}})
-    (tmp_path / "rod.toml").write_text(recipe)
-    said = [str(error) for error in unrecorded(scene)]
-    assert len(said) == bool(lacks)
-    assert all(f"[view.watch]: '{asked}' is not recorded: 'rod' is" in one and lacks in one for one in said)

@@ -231,11 +231,9 @@ DRIVES = topology("book")  # index in the ledger of each drive's work
 #: and a bound of their polar moment about its origin
 LINK_NUMBERS = numbers("mass com:3 inertia:6 borne reaching")
 SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
-#: untilted: inertia of sections that twist but do not tilt (xx yy zz xy xz yz), without gyroscopic effect
-FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3 untilted:6")
+FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3 untilted:6")  # untilted: of sections that only twist
 FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness, damping (n); stiffening 3 (n n)
-#: rate: F of `bodies.flexible`, int rho S_ki S_lj; position: F + L, with int rho X_k G_lij of the second-order motion
-MOMENT_VALUES = numbers("position rate")
+MOMENT_VALUES = numbers("position rate")  # F + L and F of `bodies.flexible`
 BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed

@@ -236,7 +236,7 @@ def _energy_roots(model: Model, motion: Motions, y: np.ndarray, speeds: np.ndarr
         return np.concatenate(parts)
 
     drives = roots(None)
-    return drives, np.array([roots(k) - drives for k in speeds]).T
+    return drives, np.array([roots(k) - drives for k in speeds]).reshape(len(speeds), len(drives)).T
 
 
 def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:
