@@ -79,7 +79,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
         frame=list(bench.model.mechanism.frames),
     )
     facts = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
-    axes = "turning" if moving and not small.fixed else "fixed"
+    axes = "coordinates" if moving and not small.fixed else "fixed"
     return conform(
         result, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth, frequency_axes=axes
     )

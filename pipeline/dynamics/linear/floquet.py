@@ -108,7 +108,7 @@ def _frames_after(bench: Bench, at: Tangent, along: np.ndarray, duration: float)
 
 def _differ(one: Instant, other: Instant, scale: np.ndarray) -> bool:
     (A, wrong), (B, _) = one.first_order(scale), other.first_order(scale)
-    return bool(np.any(np.abs(A - B) > _negligible(A, wrong)))
+    return not np.all(np.abs(A - B) <= _negligible(A, wrong))
 
 
 def _negligible(A: np.ndarray, wrong: np.ndarray) -> np.ndarray:
@@ -137,13 +137,13 @@ def _turn(bench: Bench, at: Tangent, here: Equations, period: float) -> tuple[li
         instants = [known[j // 2] if known and j % 2 == 0 else _after(bench, at, here, step * j) for j in range(count)]
         A, wrong = (np.array(of) for of in zip(*(each.first_order(here.scale) for each in instants), strict=True))
         limit = _negligible(A, wrong).max(axis=0)
-        harmonics = {k: part for k, part in _harmonics(A).items() if k == 0 or np.any(np.abs(part) > limit)}
+        harmonics = {k: part for k, part in _harmonics(A).items() if k == 0 or not np.all(np.abs(part) <= limit)}
         if max(map(abs, harmonics)) <= count // 4:
             return instants, harmonics
         count *= 2
     raise SolverError(
         f"at t = {bench.time:.6g} s: {MOST_ANGLES} angles do not resolve how the equations of small motions change in "
-        "a turn of the drives; hold the drives instead"
+        "a turn of the drives; a bushing in which a shaft turns may resist its displacement, not its rotation"
     )
 
 
