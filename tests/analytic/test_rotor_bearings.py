@@ -22,6 +22,7 @@ from flexclear.pipeline.core.system import threads
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import analyses
+from flexclear.pipeline.dynamics.linear import floquet
 from flexclear.pipeline.dynamics.linear.campbell import campbell
 from tests.analytic.mechanism_runs import frequencies
 from tests.properties.mechanisms import Table, joint, rigid, scene
@@ -225,6 +226,18 @@ def test_a_bearing_that_resists_the_rotation_of_its_shaft_is_refused() -> None:
     tilting = {"load.bearing.stiffness": [4e5, 3e5, 0, 1e2, 1e2, 0]}
     with pytest.raises(SolverError, match="may resist its displacement, not its rotation"):
         steady(supported(100.0, (3e5, 3e5), 4e5, 3e5, **tilting))
+
+
+def test_slow_drives_need_many_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A flat shaft vibrates many times in a turn, each time about other axes."""
+    slow, of = 20.0, ((3e5, 1e5), (4e5, 3e5))
+    found = steady(supported(slow, of[0], *of[1]))
+    period = 2.0 * np.pi / slow
+    K = multipliers(lambda t: ((np.diag(of[1]) + turned(slow * t, of[0])) / MASS, np.zeros((2, 2))), period)
+    assert_contained(K, found, period)
+    monkeypatch.setattr(floquet, "LARGEST", 100)
+    with pytest.raises(SolverError, match="fewer modes or a higher speed"):
+        steady(supported(slow, of[0], *of[1]))
 
 
 def test_a_rotor_without_joint_is_told_the_frames_of_the_bushing_that_turns() -> None:

@@ -4,11 +4,11 @@ turns in bearings of unequal stiffness.
 The equations :math:`\dot y = A(t)y` have the period of a turn, so their solutions are :math:`e^{\lambda t}p(t)` with
 :math:`p(t) = \sum_k p_k e^{ik\Omega t}` (Floquet). The harmonics are an eigenvector of Hill's matrix with blocks
 :math:`A_{k-m} - ik\Omega\delta_{km}`, cut off where they are negligible. A solution has a copy for each shift of its
-harmonics. The copy that counts has displacements of frames, in world axes, that are largest without a harmonic:
-its :math:`\lambda` then contains the frequency in fixed axes.
+harmonics, with another :math:`\lambda`. All have the same :math:`\lambda + ik\Omega` where k is the harmonic with the
+largest displacements of frames in world axes: its imaginary part is the frequency in fixed axes. One copy of each is
+taken, by its k. Slow drives need many harmonics.
 
-Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 6.1 (linearised motion); Xu & Gasch (1995), Archive of Applied
-Mechanics 65, 178-193 (rotors by Hill's matrix).
+Source: Genta (2005), Dynamics of Rotating Systems, ch. 6; Xu & Gasch (1995), Archive of Applied Mechanics 65, 178-193.
 """
 
 from __future__ import annotations
@@ -41,8 +41,10 @@ from flexclear.pipeline.dynamics.model.driving import prescribed
 PROBE = 0.1
 #: largest fraction of a motion's energy outside the motions that loops leave free
 LEAVING = 1e-9
-#: first and largest number of angles in a turn, and of harmonics in each direction
-FEWEST_ANGLES, MOST_ANGLES, FEWEST_HARMONICS, MOST_HARMONICS = 8, 128, 2, 16
+#: first and largest number of angles in a turn
+FEWEST_ANGLES, MOST_ANGLES = 8, 128
+#: first number of harmonics in each direction, and largest size of Hill's matrix with more
+FEWEST_HARMONICS, LARGEST = 2, 2000
 #: fraction of the squared amplitudes in the outermost harmonics that is negligible
 EDGE = 1e-12
 #: relative difference of squared amplitudes below which two harmonics are equally large
@@ -171,10 +173,10 @@ def _floquet(bench: Bench, at: Tangent, first: Instant) -> Vibrations:
         if edge <= EDGE and len(value) == len(wrong):
             break
         reach *= 2
-        if reach > MOST_HARMONICS:
+        if (2 * reach + 1) * len(wrong) > LARGEST:
             raise SolverError(
-                f"at t = {bench.time:.6g} s: {MOST_HARMONICS} harmonics do not separate the {len(wrong)} exponents of "
-                f"the periodic equations ({len(value)} found, {edge:.3g} of a motion in the last harmonic)"
+                f"at t = {bench.time:.6g} s: {reach // 2} harmonics do not resolve small motions whose equations vary "
+                f"with the drives: a fraction of {edge:.2g} is in the last; choose fewer modes or a higher speed"
             )
     real, lasting = (np.abs(part) <= np.maximum(REAL * np.abs(value), error) for part in (value.imag, value.real))
     value = np.where(real, value.real, np.where(lasting, 1j * value.imag, value))
