@@ -254,7 +254,8 @@ modal_shape? | vibration part mode | 1 | modal coordinates of the flexible bodie
 
 #: Campbell diagram: vibrations about steady motion over the speed of a drive
 CAMPBELL: Schema = table("""
-frequency~ | speed branch | Hz | frequency of the vibration in the axes of the mechanism, which turn
+frequency~ | speed branch | Hz | frequency of the vibration in the axes of the mechanism, which turn; in fixed axes
+    where the equations vary with the angle of the drive
 whirl_frequency~ | speed branch | Hz | frequency in fixed axes, negative for backward whirls; NaN for what does not
     whirl
 decay_rate~ | speed branch | s-1 | rate at which the vibration decays; negative when it grows

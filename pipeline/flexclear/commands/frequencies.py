@@ -139,6 +139,8 @@ def text(linear: xr.Dataset) -> str:
         )
     if not linear.sizes["vibration"]:
         return "\n".join([*lines, "nothing vibrates: joints and drives hold all bodies"]) + "\n"
+    if a["drives"] == "moving" and a["frequency_axes"] == "fixed":
+        lines.append("frequencies in fixed axes: the equations vary with the angle of the drives")
     lines += [
         f"{'':>4} {'frequency':>14} {'damping':>10}  most kinetic energy in",
         f"{'':>4} {'Hz':>14} {'ratio':>10}",

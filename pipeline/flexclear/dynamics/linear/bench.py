@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -142,6 +143,18 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
         arrays.table(m.PIECES)[first : first + count] = straight
         arrays.table(m.PIECE_HARMONICS, bench.engine.h)["n_harmonics"][first : first + count] = 0
     bench.engine.select_pieces_after(bench.time)
+
+
+@contextmanager
+def moved_on(bench: Bench, duration: float) -> Iterator[Bench]:
+    """Yield the bench with its drives as they are after a duration [s] at constant speed."""
+    drives = bench.drives.copy()
+    drives[:, 0] += duration * drives[:, 1]
+    set_drives(bench, drives)
+    try:
+        yield replace(bench, drives=drives)
+    finally:
+        set_drives(bench, bench.drives)
 
 
 def move_drives(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:

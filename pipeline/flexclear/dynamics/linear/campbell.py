@@ -3,6 +3,8 @@ r"""Vibrations over the speed of a drive: a Campbell diagram whose branches foll
 A vibration of frequency nu in axes that turn at Omega has the frequency Omega + nu in fixed axes where it whirls with
 them, Omega - nu where it whirls against them: a backward whirl where that is negative. With the displacements
 (x, y) across the axis of turning, in complex numbers, the first has the part x + i y alone, the second x - i y.
+Where the equations vary with the drive (`floquet`), nu is in fixed axes already and whirls are ellipses: unbalance
+drives those against the turning, too.
 
 Source: Genta (2005), Dynamics of Rotating Systems, sec. 2.4 and 4.5.
 """
@@ -19,8 +21,9 @@ from scipy.optimize import linear_sum_assignment
 from flexclear.artifacts.labelled import Labelled
 from flexclear.artifacts.schema import CAMPBELL, conform
 from flexclear.dynamics.linear.bench import Bench, drive_number, hold, observe, set_drives, state
-from flexclear.dynamics.linear.dataset import equilibrium, motions
+from flexclear.dynamics.linear.dataset import equilibrium
 from flexclear.dynamics.linear.equilibrium import Equilibrium, steady_near
+from flexclear.dynamics.linear.shapes import motions
 from flexclear.dynamics.linear.vibrations import Vibrations
 from flexclear.dynamics.record.dataset import attributes, subject
 from flexclear.scene.schema import Scene
@@ -36,8 +39,8 @@ WHIRLS = ("backward", "", "forward")
 class Point:
     """Vibrations at one speed.
 
-    omega: speed of the turning axes of each vibration [rad/s].  sense: +1, -1 for whirls with or against them; 0
-    for no whirl, NaN where the displacements do not decide.  heavy: mass times shapes, shape (nv, n).
+    omega: speed of the turning axes of each vibration [rad/s].  sense: +1, -1 for whirls with or against them, half
+    where the displacements only lean that way; 0 for no whirl.  heavy: mass times shapes, shape (nv, n).
     parts: body with most of the energy of each.  frames: origins of all frames [m], shape (frame, 3).
     """
 
@@ -49,11 +52,11 @@ class Point:
     frames: np.ndarray
 
     def whirls(self, k: int) -> np.ndarray:
-        """Return possible frequencies of vibration k in fixed axes, backward negative [rad/s]; none without whirl."""
-        nu, omega, sense = abs(self.small.value[k].imag), self.omega[k], self.sense[k]
-        return np.array(
-            [] if sense == 0.0 else [omega + s * nu for s in ((1.0, -1.0) if np.isnan(sense) else (sense,))]
-        )
+        """Return possible frequencies of vibration k in fixed axes, the likelier first, backward negative [rad/s]; none
+        without whirl."""
+        nu, sign = abs(self.small.value[k].imag), np.sign(self.sense[k])
+        omega = 0.0 if self.small.fixed else self.omega[k]
+        return omega + nu * np.array([sign, -sign][: 1 if abs(self.sense[k]) == 1.0 else 2] if sign else [])
 
 
 @dataclass
@@ -148,8 +151,8 @@ def _point(bench: Bench, rest: Equilibrium, small: Vibrations, axis: np.ndarray)
     model, heavy = bench.model, rest.at.mass @ small.shape
     energy = np.abs(np.real(small.shape.conj() * heavy))
     # coordinates of a link turn with its inboard link, coordinates of its deformation with the link itself
-    own = np.zeros(len(heavy))
-    for i, link in enumerate(model.links[1:], start=1):
+    own = np.full(len(heavy), turning[np.argmax(np.abs(turning))] if small.fixed else 0.0)
+    for i, link in enumerate(() if small.fixed else model.links[1:], start=1):
         assert link.inboard is not None
         if not link.drives:
             own[list(model.numbering.coordinates[i])] = turning[link.inboard.link]
@@ -157,7 +160,7 @@ def _point(bench: Bench, rest: Equilibrium, small: Vibrations, axis: np.ndarray)
             own[list(model.numbering.modal_coordinates[i])] = turning[i]
     omega = np.array([own[int(np.argmax(e))] for e in energy.T])
     same = np.array([e[np.isclose(own, w)].sum() / e.sum() for e, w in zip(energy.T, omega, strict=True)])
-    translation, rotation, fractions = motions(bench, rest, small.shape)
+    translation, rotation, fractions = motions(bench, rest.at.q, small.shape)
     sense = _sense(np.concatenate([translation, model.length * rotation], axis=1), axis)
     sense[same < DECISIVE] = 0.0
     parts = list(fractions)
@@ -177,7 +180,8 @@ def _sense(moved: np.ndarray, axis: np.ndarray) -> np.ndarray:
         np.sum(np.abs(v) ** 2, axis=1) for v in (right + 1j * up, right - 1j * up, np.sqrt(2.0) * (moved @ z))
     )
     whole = np.maximum(forward + backward + along, np.finfo(float).tiny)
-    sense = np.where(forward > DECISIVE * whole, 1.0, np.where(backward > DECISIVE * whole, -1.0, np.nan))
+    sense = np.where(forward >= backward, 1.0, -1.0)
+    sense[np.maximum(forward, backward) <= DECISIVE * whole] *= 0.5
     return np.where(along > (1.0 - DECISIVE) * whole, 0.0, sense)
 
 
@@ -198,7 +202,8 @@ def _followed(points: Sequence[Point | None]) -> list[Branch]:
             if k in taken:
                 continue
             whirls = point.whirls(k)
-            branches.append(Branch([(s, point, k)], [float(whirls[0]) if len(whirls) == 1 else np.nan]))
+            known = len(whirls) == 1 or (len(whirls) > 0 and point.small.fixed)
+            branches.append(Branch([(s, point, k)], [float(whirls[0]) if known else np.nan]))
     return sorted(branches, key=lambda b: (abs(b.lowest), b.whirls[-1]))
 
 
@@ -227,7 +232,8 @@ def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Poin
         for (s, point, k), omega in zip(branch.places, branch.whirls, strict=True):
             value = point.small.value[k]
             frequency[s, b], decay[s, b] = abs(value.imag) / (2.0 * np.pi), 0.0 - value.real
-            whirl[s, b], over[s, b] = omega / (2.0 * np.pi), omega - point.omega[k]
+            whirl[s, b] = omega / (2.0 * np.pi)
+            over[s, b] = (abs(omega) if point.small.fixed else omega) - point.omega[k]
             names.append(point.parts[k])
         dominant.append(max(sorted(set(names)), key=names.count))
         ahead = np.nansum(np.sign(whirl[:, b]))

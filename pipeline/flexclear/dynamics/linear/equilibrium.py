@@ -25,7 +25,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.artifacts.labelled import Labelled
-from flexclear.dynamics.linear.bench import Bench, balance, balancing, close, hold, in_strides, set_drives
+from flexclear.dynamics.linear.bench import (
+    Bench,
+    balance,
+    balancing,
+    close,
+    hold,
+    in_strides,
+    moved_on,
+    set_drives,
+)
+from flexclear.dynamics.linear.floquet import PROBE, small_motions
 from flexclear.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
 from flexclear.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, is_symmetric, vibrations
 from flexclear.dynamics.model.model import Model
@@ -55,8 +65,6 @@ STALLED_CORRECTION = 1e-8
 SHORTEST = 1.0 / 256.0
 #: relative speeds of the loops, and relative change of the forces along the drives' motion, that steady motion may have
 STEADY = 1e-9
-#: motion of the drives that tests whether the forces stay constant, in radians or fractions of the mechanism's size
-PROBE = 0.1
 
 
 @dataclass(frozen=True)
@@ -182,7 +190,8 @@ def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
         bench.internal[:] = internal
         try:
             rest = find(bench, q)
-            reached.append((rest, vibrations(bench, rest.at)))
+            steady = _is_steady(bench, rest.at)
+            reached.append((rest, small_motions(bench, rest.at) if steady else vibrations(bench, rest.at)))
             kept.append(bench.internal.copy())
         except SolverError as error:
             failure = failure or error
@@ -196,7 +205,12 @@ def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
         raise failure
     best = next((k for k, (_, small) in enumerate(reached) if small.stable), 0)
     bench.internal[:] = kept[best]
-    _require_steady(bench, reached[best][0].at)
+    if not _is_steady(bench, reached[best][0].at):
+        _require_turning_frames(bench)
+        raise SolverError(
+            f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
+            "with the drives; hold the drives instead"
+        )
     return reached[best]
 
 
@@ -261,30 +275,22 @@ def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     return motions[:, firm] @ along
 
 
-def _require_steady(bench: Bench, at: Tangent) -> None:
-    """Raise SolverError unless balance and closed loops persist while the drives move on."""
+def _is_steady(bench: Bench, at: Tangent) -> bool:
+    """Return True when balance and closed loops persist while the drives move on."""
     fastest = bench.fastest
     if fastest == 0.0:
-        return
+        return True
     model, before = bench.model, balance(bench, at.q)
     forces = balancing(bench)
     units = row_units(model, bench.engine.h, model.length)
     loops = float(np.max(np.abs(before.slip) / units, initial=0.0))
-    if loops <= STEADY * fastest:
-        set_drives(
-            bench, bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, 0.0 * bench.drives[:, 1]], axis=1)
-        )
-        after = balance(bench, at.q)
-        forces = max(forces, balancing(bench))
-        set_drives(bench, bench.drives)
-        change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
-        if change <= STEADY * forces + _rounding(bench, at):
-            return
-    _require_turning_frames(bench)
-    raise SolverError(
-        f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
-        "with the drives; hold the drives instead"
-    )
+    if loops > STEADY * fastest:
+        return False
+    with moved_on(bench, PROBE / fastest) as later:
+        after = balance(later, at.q)
+        forces = max(forces, balancing(later))
+    change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
+    return change <= STEADY * forces + _rounding(bench, at)
 
 
 def _rounding(bench: Bench, at: Tangent) -> float:
@@ -298,9 +304,12 @@ def _rounding(bench: Bench, at: Tangent) -> float:
 def _require_turning_frames(bench: Bench) -> None:
     """Raise SolverError for a body with bushings only: its coordinates do not move with the drives."""
     loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.placements}
+    fixed = {name for name, body in bench.scene.body.items() if body.type == "ground"}
     for name, load in bench.scene.forces().items():
-        mounted = loose & {frame.partition(".")[0] for frame in load.between} if isinstance(load, Bushing) else ()
-        for body in mounted:
+        if not isinstance(load, Bushing):
+            continue
+        bodies = {frame.partition(".")[0] for frame in load.between}
+        for body in loose & bodies if not bodies & fixed else ():
             raise SolverError(
                 f"at t = {bench.time:.6g} s: {body} has no joint: its coordinates do not follow the drives, so "
                 f"that none of its poses is steady; give it a joint of type `free` with the frames of bushing {name}: "

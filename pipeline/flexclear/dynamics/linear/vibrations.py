@@ -35,12 +35,14 @@ class Vibrations:
 
     value: lambda [1/s], complex, shape (n,).  shape: displacements w of the coordinates, complex, shape (nv, n), with
     w^H M w = 1.  free: number of motions without stiffness.  value_error: estimated errors of lambda [1/s], (n,).
+    fixed: True for frequencies in fixed axes, where the equations vary with the drives (`floquet`).
     """
 
     value: np.ndarray
     shape: np.ndarray
     free: int
     value_error: np.ndarray
+    fixed: bool = False
 
     @property
     def growth(self) -> float:
@@ -55,26 +57,84 @@ class Vibrations:
         return self.growth == 0.0
 
 
+@dataclass(frozen=True)
+class Equations:
+    """Equations z'' + D z' + K z = 0 of small motions; motions: speeds of all coordinates per z', shape (nv, n).
+
+    free: True for motions without stiffness.  error, rate_error: rounding errors of the columns of K and D.
+    """
+
+    motions: np.ndarray
+    K: np.ndarray
+    D: np.ndarray
+    free: np.ndarray
+    error: np.ndarray
+    rate_error: np.ndarray
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Frequency of each motion alone [rad/s], never 0."""
+        return _scale(self.K)
+
+    def first_order(self, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return A of y' = A y with y = (z scale, z'), which change at comparable rates, and the errors of A."""
+        n = len(self.K)
+        A = np.block([[np.zeros_like(self.K), np.diag(scale)], [-self.K / scale[None, :], -self.D]])
+        wrong = EPSILON * np.abs(A)
+        wrong[n:] += np.concatenate([self.error / scale, self.rate_error])
+        return A, wrong
+
+
 def vibrations(bench: Bench, at: Tangent) -> Vibrations:
-    """Compute all small motions about a pose in balance."""
+    """Compute all small motions about a pose in balance, with equations that do not vary with time."""
     if not at.Z.shape[1]:
         return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0, np.zeros(0))
+    return solved(equations(bench, at, principal_motions(bench, at)))
+
+
+def principal_motions(bench: Bench, at: Tangent) -> np.ndarray:
+    """Return the vibrations by stiffness and mass alone, shape (nv, mobility)."""
     first, error = stiffness(bench, at, at.Z)
-    motions = at.Z @ _principal(_symmetric(first, error), _without_stiffness(first, error))[1]
+    return at.Z @ _principal(_symmetric(first, error), _without_stiffness(first, error))[1]
+
+
+def equations(bench: Bench, at: Tangent, motions: np.ndarray) -> Equations:
+    """Return the equations of small motions along `motions`, with zeros in place of rounding."""
     K, error = stiffness(bench, at, motions)
     D, rate_error = damping(bench, at, motions)
     free = _without_stiffness(K, error)
     least = RELATIVE_ZERO * max(float(np.abs(D).max()), float(np.sqrt(np.abs(np.diag(K)).max())))
     D[np.abs(D) <= np.maximum(ZERO_EIGENVALUE * rate_error[None, :], least)] = 0.0
     K[:, free], K[free, :] = 0.0, 0.0
-    if is_symmetric(K, error) and not np.any(D):
-        k, axes = _principal(_symmetric(K, error), free)
+    return Equations(motions, K, D, free, error, rate_error)
+
+
+def solved(of: Equations) -> Vibrations:
+    """Return the small motions of equations that do not vary with time."""
+    if is_symmetric(of.K, of.error) and not np.any(of.D):
+        k, axes = _principal(_symmetric(of.K, of.error), of.free)
         # a falling motion, of negative stiffness, grows as exp(+sqrt(-k) t)
         value, shape, value_error = np.sqrt((-k).astype(complex)), axes.astype(complex), np.zeros(len(k))
     else:
-        value, shape, value_error = _damped(K, D, free, error, rate_error)
-    order = np.lexsort((np.abs(value), np.abs(value.imag)))
-    return Vibrations(value[order], motions @ shape[:, order], int(free.sum()), value_error[order])
+        value, shape, value_error = _damped(of)
+    order = ascending(value)
+    return Vibrations(value[order], of.motions @ shape[:, order], int(of.free.sum()), value_error[order])
+
+
+def ascending(value: np.ndarray) -> np.ndarray:
+    """Return the order of eigenvalues by frequency, then by size."""
+    return np.lexsort((np.abs(value), np.abs(value.imag)))
+
+
+def eigenpairs(A: np.ndarray, wrong: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return eigenvalues and vectors of A, and errors of the eigenvalues by the errors `wrong` of A.
+
+    An error is at most |y^H| |dA| |x| / |y^H x|, to first order, with left and right vectors y and x (Golub & Van Loan
+    (2013), Matrix Computations, sec. 7.2.2).
+    """
+    value, left, vectors = scipy.linalg.eig(A, left=True)
+    sizes = np.sum(np.abs(left) * (wrong @ np.abs(vectors)), axis=0)
+    return value, vectors, sizes / np.maximum(np.abs(np.sum(left.conj() * vectors, axis=0)), np.finfo(float).tiny)
 
 
 def _without_stiffness(K: np.ndarray, error: np.ndarray) -> np.ndarray:
@@ -129,27 +189,14 @@ def _principal(K: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return k, full
 
 
-def _damped(
-    K: np.ndarray, D: np.ndarray, free: np.ndarray, error: np.ndarray, rate_error: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair, and errors of lambda.
-
-    error, rate_error: of the columns of K and D.  The error of lambda is at most |y^H| |dA| |x| / |y^H x|, to first
-    order, with its left and right vectors y and x (Golub & Van Loan (2013), Matrix Computations, sec. 7.2.2).
-    """
-    loose = free & ~np.any(D, axis=0) & ~np.any(D, axis=1)
-    rows = np.ix_(~loose, ~loose)
-    K, D, scale = K[rows], D[rows], _scale(K)[~loose]
-    n = len(K)
-    # coordinates z and z'/scale change at comparable rates
-    A = np.block([[np.zeros_like(K), np.diag(scale)], [-K / scale[None, :], -D]])
-    value, left, vectors = scipy.linalg.eig(A, left=True)
-    wrong = EPSILON * np.abs(A)
-    wrong[n:] += np.concatenate([error[~loose] / scale, rate_error[~loose]])
-    sizes = np.einsum("ik,ij,jk->k", np.abs(left), wrong, np.abs(vectors))
-    value_error = sizes / np.maximum(np.abs(np.sum(left.conj() * vectors, axis=0)), np.finfo(float).tiny)
+def _damped(of: Equations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return eigenvalues lambda and vectors, one of each conjugate pair, and errors of lambda."""
+    loose = of.free & ~np.any(of.D, axis=0) & ~np.any(of.D, axis=1)
+    kept = np.tile(~loose, 2)
+    A, wrong = of.first_order(of.scale)
+    value, vectors, value_error = eigenpairs(A[np.ix_(kept, kept)], wrong[np.ix_(kept, kept)])
     # displacements, not speeds: a creeping motion has hardly any speed
-    inner = vectors[:n] / scale[:, None]
+    inner = vectors[: len(value) // 2] / of.scale[~loose][:, None]
     real = np.abs(value.imag) <= REAL * np.abs(value)
     lasting = np.abs(value.real) <= np.maximum(REAL * np.abs(value), value_error)
     value = np.where(real, value.real, np.where(lasting, 1j * value.imag, value))
