@@ -21,6 +21,7 @@ from flexclear.post.render.vibrations import Vibrations
 from flexclear.post.shapes.body_shape import AROUND, PER_CELL, surface
 from flexclear.scene.load import load_scene
 from flexclear.stages import rendering, simulation
+from flexclear.stages.scenes import require_names
 from flexclear.structure.kinds import kind
 from flexclear.structure.modes.bundle import drawn
 from flexclear.system.errors import InputError
@@ -154,7 +155,7 @@ def test_a_missing_shape_file_is_refused_with_its_key():
         "scenes/checks/pendulum.toml", override={f"body.{name}.geometry": [{"type": "file", "file": "/no/part.stl"}]}
     )
     with pytest.raises(InputError, match=rf"body\.{name}\.geometry\.0.*no/part\.stl"):
-        rendering.params(there, "motion", "png")
+        require_names(there)
 
 
 def test_a_film_is_slow_around_the_strongest_impact_and_even_without():
