@@ -12,14 +12,14 @@ import pytest
 import xarray as xr
 
 from flexclear.artifacts.paths import results_root
-from flexclear.commands import check
+from flexclear.commands import check, show
 from flexclear.commands.check import examined
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.scene import lines
 from flexclear.scene.json_schema import scene_schema
 from flexclear.scene.plausibility import implausible
 from flexclear.scene.schema import Scene
-from flexclear.stages import scenes, show
+from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.system.errors import InputError
 from tests.properties import mechanisms
