@@ -65,7 +65,18 @@ def _still_frame(d, p, j, vector, first):
     return ZERO, ZERO
 
 
-LINEAR = SimpleNamespace(first_moment=_still, at_port=_still_frame)
+@kernel
+def _uncoupled(d):
+    """Leave the forces on the modes."""
+
+
+@kernel
+def _no_energy(d, component):
+    """Return zero: the elastic energy is of second order."""
+    return 0.0
+
+
+LINEAR = SimpleNamespace(first_moment=_still, at_port=_still_frame, couple=_uncoupled, coupling_energy=_no_energy)
 
 
 def of_each(body: Callable) -> Callable:
@@ -86,7 +97,7 @@ def flexible_bodies(stiffening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]
 
 
 def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
-    first_moment = stiffening.first_moment
+    first_moment, couple, coupling_energy = stiffening.first_moment, stiffening.couple, stiffening.coupling_energy
     site, inboard = make_ports(stiffening.at_port, tree)
     carried, body_mass_matrix = make_carrying(tree)
     reference, demand_of = tree.origin, tree.demand_of
@@ -249,7 +260,7 @@ def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
 
     @kernel
     def energies(d, component):
-        kinetic = elastic = 0.0
+        kinetic, elastic = 0.0, coupling_energy(d, component)
         for k in range(d.n_flex):
             if d.links[d.flexes[k].link].component == component:
                 moving, bent = body_energies(d, k)
@@ -257,6 +268,12 @@ def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
                 elastic += bent
         return kinetic, elastic
 
-    inertia, mass_matrix, modal_inertia = map(of_each, (body_inertia, body_mass_matrix, body_modal_inertia))
+    @kernel
+    def inertia(d):
+        for k in range(d.n_flex):
+            body_inertia(d, k)
+        couple(d)
+
+    mass_matrix, modal_inertia = map(of_each, (body_mass_matrix, body_modal_inertia))
     before = (deform, site, inboard, inertia, mass_matrix, modal_inertia)
     return FlexibleBodies(*before, port_load, modal_forces, modal_rates, energies)

@@ -66,7 +66,7 @@ def assemble(mesh: xr.Dataset) -> Beam:
     axes = mesh["rod_rotation"].values
     component, along, order = _unknowns(mesh, basis, kinematics)
     to_fields = order @ _to_rod_axes(axes, mesh.sizes["node"], len(component))
-    K = _in_vector_order(_form(kinematics, _strain_energy).assemble(basis, **_stiffness(mesh)), to_fields)
+    K = _in_vector_order(_form(kinematics, _strain_energy).assemble(basis, **stiffness(mesh)), to_fields)
     M = _in_vector_order(_form(kinematics, _kinetic_energy).assemble(basis, **_inertia(mesh)), to_fields)
     mass = sp.csr_array(M + _lumped(mesh, len(component)))
     return Beam(K, mass, kinematics, basis, to_fields, mesh["node_position"].values, axes, component, along)
@@ -106,7 +106,8 @@ def per_point(mesh: xr.Dataset, name: str) -> np.ndarray:
     return np.repeat(mesh[name].values[:, None], len(POINTS), axis=1)
 
 
-def _stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
+def stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
+    """Return the section's stiffness to each strain at the Gauss points, shape (cells, points)."""
     E, G = per_point(mesh, "youngs_modulus"), per_point(mesh, "shear_modulus")
     area, second = at_points(mesh, "area"), at_points(mesh, "second_moment")
     matrices = {

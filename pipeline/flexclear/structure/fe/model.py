@@ -50,14 +50,17 @@ class Integrals:
 class SecondOrder:
     """Integrals of the displacements that are quadratic in n modal coordinates, 1/2 q^T G q, in axes of the mesh frame.
 
-    They count where they multiply rigid motion, and forces at named frames.  The last three are None where forces and
-    accelerations do not stiffen the body.
+    They count where they multiply rigid motion, and forces at named frames.  All but the first are None where forces
+    and accelerations do not stiffen the body, the last three but for rods.
     """
 
     second_order_moment: np.ndarray  #: int rho X_k G_l [kg], shape (3, 3, n, n)
     second_order_first_moment: np.ndarray | None = None  #: int rho G [kg/m], shape (3, n, n)
     frame_second_translation: np.ndarray | None = None  #: G of the frames' origins [1/m], shape (frames, 3, n, n)
     frame_second_rotation: np.ndarray | None = None  #: of their rotation vectors [1/m^2], shape (frames, 3, n, n)
+    section_rotation: np.ndarray | None = None  #: of a rod's slices, in its axes [rad/m], shape (slices, 3, n)
+    section_curvature: np.ndarray | None = None  #: rates of twist and bending along it [rad/m^2], shape (slices, 3, n)
+    section_stiffness: np.ndarray | None = None  #: to them, times the slice's length [N m^3], shape (slices, 3, 3)
 
 
 @dataclass(frozen=True)

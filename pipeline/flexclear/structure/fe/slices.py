@@ -74,17 +74,22 @@ def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
     )
 
 
-def section_rotation(body: Slices, vectors: np.ndarray) -> np.ndarray:
+def section_rotation(body: Slices, vectors: np.ndarray, axis: np.ndarray | None = None) -> np.ndarray:
     r"""Return :math:`\int\rho X_k G_l` [kg], k < 3, and :math:`\int\rho\,G_l` [kg/m], k = 3, shape (4, 3, n, n).
 
     :math:`\tfrac12 q^T G q = \tfrac12\,\theta\times(\theta\times r)` is the second-order motion of sections that turn
-    by theta; r: from the point that the section turns about.  vectors: shape (ndof, n).
+    by theta; r: from the point that the section turns about.  vectors: shape (ndof, n).  axis: of the rod, where
+    sections twist about their tilted axis, which adds :math:`\tfrac12\theta_1\,(\theta\times e)\times r`.
     """
     _, theta = _moved(body, vectors)
     first = body.mass[:, None] * body.offset
     arms = np.concatenate([body.spread + body.position[:, :, None] * first[:, None], first[:, None]], axis=1)
     along = np.einsum("lpi,pkm,mpj->klij", theta, arms, theta, optimize=True)
     square = np.einsum("pkl,mpi,mpj->klij", arms, theta, theta, optimize=True)
+    if axis is not None:
+        tilt = np.cross(theta, axis, axisa=0, axisc=1)
+        moved = np.cross(tilt[:, None], arms[..., None], axis=2)
+        along += np.einsum("m,mpi,pklj->klij", axis, theta, moved, optimize=True)
     result: np.ndarray = 0.5 * (along + along.swapaxes(2, 3)) - square
     return result
 

@@ -7,13 +7,20 @@ that follow are the geometric stiffness of each load: an acceleration a of the f
 :math:`a\cdot\int\rho\,G`, a force f at a frame :math:`-f\cdot G`, a moment likewise. Rotation of the frame is in the
 moments of every body (`bodies.flexible`).
 
+Rods resist bending in the axes of their twisted sections, and bending across bending twists them: the elastic energy
+has this part beyond that of the modal stiffness (`structure.fe.beam_loads`).
+
 Source: Kane, Ryan & Banerjee (1987), J. Guidance, Control, and Dynamics 10, 139-151; Wallrapp & Schwertassek (1991),
 International Journal for Numerical Methods in Engineering 32, 1833-1850.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
+from flexclear.dynamics.bodies.modal_terms import of_mode
 from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.vectors import ZERO, add, at6, dot, scale, sub, turn_symmetric
 
 
 @kernel
@@ -43,3 +50,54 @@ def at_port(d, p, j, vector, first):
     n = d.flexes[port.flex].n_modes
     forms = port.shapes + (6 + j) * n
     return _rows(d.port_data, forms, n, vector, first), _rows(d.port_data, forms + 3 * n * n, n, vector, first)
+
+
+@kernel
+def _slice(d, s):
+    """Return rotation and curvature of slice s of a rod, the curvature in axes of its section, and sine and cosine."""
+    body, b = d.flexes[d.rod_slices[s].flex], d.rod_slices[s].data
+    n, turned, curved = body.n_modes, ZERO, ZERO
+    for j in range(n):
+        q = d.x[body.q0 + j]
+        turned = add(turned, scale(q, of_mode(d.rod_slice_data, b, n, j)))
+        curved = add(curved, scale(q, of_mode(d.rod_slice_data, b + 3 * n, n, j)))
+    sine, cosine = np.sin(turned[0]), np.cos(turned[0])
+    twist = curved[0] - 0.5 * (turned[1] * curved[2] - turned[2] * curved[1])
+    bent = cosine * curved[1] + sine * curved[2], cosine * curved[2] - sine * curved[1]
+    return turned, curved, (twist, bent[0], bent[1]), sine, cosine
+
+
+@kernel
+def couple(d):
+    """Add the forces of the elastic energy beyond that of the modal stiffness to those on the modes."""
+    for s in range(d.n_rod_slices):
+        body, b = d.flexes[d.rod_slices[s].flex], d.rod_slices[s].data
+        stiffness = at6(d.rod_slice_stiffness[s].matrix, 0)
+        turned, curved, strain, sine, cosine = _slice(d, s)
+        torque, m2, m3 = turn_symmetric(stiffness, strain)
+        linear = turn_symmetric(stiffness, curved)
+        on_rotation = (m2 * strain[2] - m3 * strain[1], -0.5 * torque * curved[2], 0.5 * torque * curved[1])
+        on_bending = (
+            cosine * m2 - sine * m3 + 0.5 * torque * turned[2],
+            sine * m2 + cosine * m3 - 0.5 * torque * turned[1],
+        )
+        on_curvature = sub((torque, on_bending[0], on_bending[1]), linear)
+        n = body.n_modes
+        for j in range(n):
+            force = dot(on_rotation, of_mode(d.rod_slice_data, b, n, j))
+            force += dot(on_curvature, of_mode(d.rod_slice_data, b + 3 * n, n, j))
+            # shapes are eigenmodes where loads stiffen a body
+            d.modal_bias[body.c0 + j] += force
+
+
+@kernel
+def coupling_energy(d, component):
+    """Return this part of the elastic energy [J] of the rods of an independent mechanism."""
+    energy = 0.0
+    for s in range(d.n_rod_slices):
+        if d.links[d.flexes[d.rod_slices[s].flex].link].component == component:
+            stiffness = at6(d.rod_slice_stiffness[s].matrix, 0)
+            _, curved, strain, _, _ = _slice(d, s)
+            energy += 0.5 * dot(strain, turn_symmetric(stiffness, strain))
+            energy -= 0.5 * dot(curved, turn_symmetric(stiffness, curved))
+    return energy
