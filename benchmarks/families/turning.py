@@ -33,8 +33,6 @@ STEEL, ALUMINIUM = (
 #: axes of frames: z along x of the bodies, and those of a blade's hub by the angle between the blade's section and the
 #: plane of rotation [deg]
 ALONG: Table = {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}
-#: frames of a solid blade: name, face, tie
-FACES = (("A", "start", "rigid"), ("B", "end", "mean"))
 #: solid disc of 140 mm diameter and 40 mm length at the end of a shaft: mass [kg], moments of inertia [kg m^2]
 DISC = {"mass": 4.802866848808077, "inertia": [0.01176702377957979, 0.006523894136297639, 0.006523894136297639]}
 
@@ -91,7 +89,8 @@ def reduced(body: Body) -> xr.Dataset:
 
 def turning(body: Body, speed: float) -> Table:
     """Return the scene of a body on a hub that turns at `speed` [rad/s] about an axis through the origin."""
-    length = body.recipe["frames"]["B"].get("x", 0.0)
+    shape = body.recipe["shape"]
+    length = shape["length"] if "length" in shape else shape["size"][0]
     across = [0.0, 1.0, 0.0] if body.axis[0] else [1.0, 0.0, 0.0]
     axle = {"axes": {"z": list(body.axis), "x": across}}
     out = {"z": [-1.0, 0.0, 0.0], "x": [0.0, -1.0, 0.0]} if body.inward else ALONG
@@ -166,19 +165,42 @@ def _disc_at_end(theory: str, *, section: bool) -> Body:
     return Body(rod(0.35, circle(0.012), theory, 20, masses=lump))
 
 
-def _blade(theory: str, pitch: float, *, inward: bool = False) -> Body:
+def _axis(pitch: float) -> tuple[float, float, float]:
     angle = np.radians(pitch)
-    axis = (0.0, float(np.sin(angle)), float(np.cos(angle)))
+    return (0.0, float(np.sin(angle)), float(np.cos(angle)))
+
+
+def _blade(theory: str, pitch: float, *, inward: bool = False) -> Body:
     section, radius = (rectangle(0.02, 0.004), 0.8) if inward else (rectangle(0.04, 0.006), 0.05)
     recipe = rod(0.5, section, theory, 16, ALUMINIUM)
-    return Body(recipe, up_to=1e4, stiffening=True, axis=axis, radius=radius, inward=inward)
+    return Body(recipe, up_to=1e4, stiffening=True, axis=_axis(pitch), radius=radius, inward=inward)
 
 
-def _solid_blade() -> Body:
-    frames = {name: {"on": {"region": region}, "tie": tie, "axes": ALONG} for name, region, tie in FACES}
-    shape = {"type": "block", "size": [0.5, 0.04, 0.006], "element": "hex20", "cells": [25, 4, 1]}
-    recipe = {"interfaces": ["A", "B"], "shape": shape, "material": ALUMINIUM, "frames": frames}
-    return Body(recipe, up_to=3e3, stiffening=True, axis=(0.0, 0.0, 1.0), radius=0.05)
+def _solid(shape: Table, root: str = "rigid", material: Table = STEEL) -> Table:
+    ties = {"A": ("start", root), "B": ("end", "mean")}
+    frames = {name: {"on": {"region": region}, "tie": tie, "axes": ALONG} for name, (region, tie) in ties.items()}
+    return {"interfaces": ["A", "B"], "shape": shape, "material": material, "frames": frames}
+
+
+def _block(*size: float, cells: tuple[int, int, int]) -> Table:
+    return {"type": "block", "size": list(size), "element": "hex20", "cells": list(cells)}
+
+
+def _solid_shaft() -> Body:
+    """Return a shaft whose ends are held across the axis in the mean of their faces."""
+    cells = {"along": 24, "across": 2, "rings": 1}
+    shape = {"type": "cylinder", "radius": 0.02, "length": 0.8, "element": "hex20", "cells": cells}
+    return Body(_solid(shape, "mean"), "pins", up_to=5e3)
+
+
+def _solid_blade(pitch: float) -> Body:
+    recipe = _solid(_block(0.5, 0.04, 0.006, cells=(25, 4, 1)), material=ALUMINIUM)
+    return Body(recipe, up_to=3e3, stiffening=True, axis=_axis(pitch), radius=0.05)
+
+
+def _solid_inward() -> Body:
+    recipe = _solid(_block(0.5, 0.02, 0.004, cells=(34, 4, 1)), material=ALUMINIUM)
+    return Body(recipe, up_to=3e3, stiffening=True, axis=_axis(0.0), radius=0.8, inward=True)
 
 
 def _friswell() -> Body:
@@ -205,7 +227,10 @@ CASES: dict[str, Callable[[], Body]] = {
     **{
         f"5-{t}-pitch{p}": partial(_blade, t, p) for t in ("euler-bernoulli", "rayleigh", "timoshenko") for p in (0, 45)
     },
-    "5-solid-pitch0": _solid_blade,
+    "2-solid": _solid_shaft,
+    "4-clamped-free-solid": lambda: Body(_solid(_block(0.5, 0.03, 0.02, cells=(20, 2, 2))), up_to=1e4),
+    **{f"5-solid-pitch{pitch}": partial(_solid_blade, pitch) for pitch in (0, 45)},
+    "6-solid": _solid_inward,
     **{f"6-{t}": partial(_blade, t, 0, inward=True) for t in ("euler-bernoulli", "rayleigh", "timoshenko")},
     "8-5.9.1": _friswell,
 }

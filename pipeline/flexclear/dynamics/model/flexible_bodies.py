@@ -58,7 +58,7 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
         interface += _interface_data(bundle, basis).tolist()
         data += _data(bundle, _damping(name, bodies[name], bundle)).tolist()
         if any_stiffened:
-            first, _ = stiffening(mechanism, i)
+            first = second_first_moment(mechanism, i)
             data += (np.zeros(3 * len(q) ** 2) if first is None else first.ravel()).tolist()
         ends += (len(value) + row_ends).tolist()
         value += moments.tolist()
@@ -88,19 +88,24 @@ def _body(mechanism: Mechanism, link: int) -> tuple[str, Labelled]:
     return name, bundle
 
 
-def stiffening(
-    mechanism: Mechanism, link: int, frame: str | None = None
-) -> tuple[np.ndarray, np.ndarray] | tuple[None, None]:
+def second_first_moment(mechanism: Mechanism, link: int) -> np.ndarray | None:
+    """Return second derivatives of a flexible link's first moment by modes [kg/m], (axis, mode, mode).
+
+    None without stiffening in the scene.
+    """
+    body, bundle = _body(mechanism, link)
+    stiffened = mechanism.scene.flexible()[body].stiffening is not None
+    return bundle["second_order_first_moment"].values if stiffened else None
+
+
+def second_motion(mechanism: Mechanism, link: int, frame: str) -> tuple[np.ndarray, np.ndarray] | tuple[None, None]:
     """Return second derivatives of a frame's displacement [1/m] and rotation [1/m^2] by modes, (axis, mode, mode).
 
-    link: a flexible one.  frame: its name in the bundle, None for the first moment [kg/m], twice.  None without
-    stiffening in the scene.
+    link: a flexible one.  frame: its name in the bundle.  None without stiffening in the scene.
     """
     body, bundle = _body(mechanism, link)
     if mechanism.scene.flexible()[body].stiffening is None:
         return None, None
-    if frame is None:
-        return (bundle["second_order_first_moment"].values,) * 2
     k = frame_index(bundle, frame)
     return bundle["frame_second_translation"].values[k], bundle["frame_second_rotation"].values[k]
 
@@ -184,7 +189,7 @@ def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
     if frame is None:
         return False
     _, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
-    return any(np.any(shape) for shape in [*shapes, *stiffening(mechanism, link, frame)] if shape is not None)
+    return any(np.any(shape) for shape in [*shapes, *second_motion(mechanism, link, frame)] if shape is not None)
 
 
 def coupled(mechanism: Mechanism, link: int) -> bool:
@@ -208,7 +213,7 @@ def _ports(numbering: Numbering, stiffened: bool) -> tuple[list[Any], list[Any],
             pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
         chunks: list[np.ndarray] = [(shape @ numbering.bases[link].moving).ravel() for shape in shapes]
         if stiffened:
-            forms = (None, None) if frame is None else stiffening(mechanism, link, frame)
+            forms = (None, None) if frame is None else second_motion(mechanism, link, frame)
             chunks += [np.zeros(3 * n * n) if form is None else form.ravel() for form in forms]
         rows.append((numbering.flexible.index(link), column, len(data)))
         reals.append(pose)
@@ -224,6 +229,6 @@ def start_place(mechanism: Mechanism, site: Site) -> Placement:
     label = site.frame.partition(".")[2]
     _, moves, turns = frame_shapes(bundle, label)
     rest = np.zeros((1, len(q)))
-    second = stiffening(mechanism, site.link, label)
+    second = second_motion(mechanism, site.link, label)
     shifted, turned = (shift(S, G, q[None], rest, rest)[0][0] for S, G in zip((moves, turns), second, strict=True))
     return Placement(site.placement.p + shifted, rotation_vector_to_matrix(turned) @ site.placement.R)

@@ -12,7 +12,7 @@ from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model.assembly import chain_positions
 from flexclear.dynamics.model.constraints import outboard_place
 from flexclear.dynamics.model.driving import joint_type
-from flexclear.dynamics.model.flexible_bodies import shift, start_place, stiffening
+from flexclear.dynamics.model.flexible_bodies import second_first_moment, shift, start_place
 from flexclear.dynamics.model.gauges import angles
 from flexclear.dynamics.model.mechanism import Link, Mechanism
 from flexclear.dynamics.model.model import Model
@@ -356,7 +356,7 @@ def centre_of(model: Model, name: str) -> Centre:
         return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
-    (form, _), numbering = stiffening(model.mechanism, i), model.numbering
+    form, numbering = second_first_moment(model.mechanism, i), model.numbering
     second = None if form is None else form / link.mass
     return Centre(i, first, shape, second, numbering.modal_positions[i], numbering.modal_coordinates[i])
 

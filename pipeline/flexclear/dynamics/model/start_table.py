@@ -70,20 +70,19 @@ def _value(path: str, value: object, dimension: str) -> float | None:
 def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coordinate") -> dict[str, np.ndarray]:
     """Return modal coordinates [m], or with key "velocity" modal velocities [m/s], by body; (mode,) each.
 
-    Raises InputError for bodies that are not flexible, and for more numbers than modes.
+    Bodies whose modes are not known have none.  Raises InputError for bodies that are not flexible, and for more numbers
+    than modes.
     """
     given = scene.start.modal if scene.start is not None else {}
-    values = {name: getattr(start, key) for name, start in given.items()}
-    return {name: _padded(scene, bundles, name, key, one) for name, one in values.items() if one is not None}
-
-
-def _padded(
-    scene: Scene, bundles: Mapping[str, Labelled], name: str, key: str, values: tuple[float, ...]
-) -> np.ndarray:
-    if name not in scene.flexible():
+    for name in given.keys() - scene.flexible().keys():
         known = suggestion(name, scene.flexible()) if scene.flexible() else "the scene has no flexible body"
         raise InputError(f"[start.modal.{name}]", f"there is no flexible body '{name}'", known)
-    modes = bundles[name].sizes["mode"]
+    values = {name: getattr(start, key) for name, start in given.items() if "mode" in bundles[name].sizes}
+    return {name: _padded(bundles[name], name, key, one) for name, one in values.items() if one is not None}
+
+
+def _padded(bundle: Labelled, name: str, key: str, values: tuple[float, ...]) -> np.ndarray:
+    modes = bundle.sizes["mode"]
     if len(values) > modes:
         raise InputError(
             f"[start.modal.{name}.{key}]",

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from flexclear.dynamics.equations.observation import Observed, Variables
-from flexclear.dynamics.model.flexible_bodies import shift, stiffening
+from flexclear.dynamics.model.flexible_bodies import second_first_moment, second_motion, shift
 from flexclear.dynamics.model.interface_basis import frame_index
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
@@ -136,7 +136,7 @@ class Motions:
             return self.link(i).at(placement.point(np.array(body.com)), placement.R)
         assert link.bundle is not None
         shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
-        arm, rate, second = self.modal(i).shift(shape, stiffening(self.model.mechanism, i)[0])
+        arm, rate, second = self.modal(i).shift(shape, second_first_moment(self.model.mechanism, i))
         return self.link(i).moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
 
     @cached_property
@@ -155,7 +155,7 @@ class Motions:
             if bundle is not None:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].values[frame_index(bundle, label)]
-                bent = placement.p + self.modal(i).shift(S, stiffening(self.model.mechanism, i, label)[0])[0]
+                bent = placement.p + self.modal(i).shift(S, second_motion(self.model.mechanism, i, label)[0])[0]
                 positions[:, k] = link.p + turned(link.R, bent)
         return positions
 
@@ -172,7 +172,7 @@ class Motions:
             label, state = name.partition(".")[2], self.modal(i)
             at = frame_index(bundle, label)
             S, P = (bundle[f"frame_{k}_shape"].values[at] for k in ("translation", "rotation"))
-            move, turn = stiffening(self.model.mechanism, i, label)
+            move, turn = second_motion(self.model.mechanism, i, label)
             arm, rate, second = state.shift(S, move)
             turning = turned(link.R, _angular_velocity(*state.shift(P, turn)[:2]))
             velocities[name] = link.moving(placement.p + arm, rate, second).v, link.omega + turning

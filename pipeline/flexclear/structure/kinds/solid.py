@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import scipy.sparse as sp
 import xarray as xr
@@ -9,7 +11,7 @@ import xarray as xr
 from flexclear.structure.fe.model import Interface, Model, SecondOrder
 from flexclear.structure.fe.solid import mesh as meshes
 from flexclear.structure.fe.solid import prestress
-from flexclear.structure.fe.solid.model import assemble
+from flexclear.structure.fe.solid.model import assemble, solid_of, unknowns_of
 from flexclear.structure.fe.statics import Flexibility, border, support
 from flexclear.structure.kinds.kind import Kind
 
@@ -47,11 +49,13 @@ def _second_order(
 ) -> SecondOrder:
     """Return the second-order motion under the stresses of a free spin; with stiffening, under those of all loads."""
     flexibility, n = support(model, lambda fraction: None), vectors.shape[1]
-    spread, line, nodal = prestress.inertial(mesh)
+    solid, unknowns = solid_of(mesh), unknowns_of(mesh)
+    spread, (line, nodal) = unknowns.spread, prestress.inertial(solid)
+    forms_of = partial(prestress.forms, mesh, solid, unknowns, vectors)
     if not stiffening:
         pairs = np.stack(np.triu_indices(3), axis=1)
         nodal = np.stack([0.5 * (nodal[:, k, l] + nodal[:, l, k]) for k, l in pairs], axis=1)
-        work = prestress.forms(mesh, vectors, *_relieved(flexibility, spread, line, nodal, spread.T @ nodal))
+        work = forms_of(*_relieved(flexibility, spread, line, nodal, spread.T @ nodal))
         moment = np.empty((3, 3, n, n))
         for (k, l), form in zip(pairs, work, strict=True):
             moment[k, l] = moment[l, k] = -form
@@ -63,7 +67,7 @@ def _second_order(
         response, nodal = _relieved(flexibility, spread, line, nodal, loads)
     else:
         response = border(flexibility, held.motion).solve(loads)
-    forms = -prestress.forms(mesh, vectors, response, nodal)
+    forms = -forms_of(response, nodal)
     moments, at_frames = forms[:12].reshape(4, 3, n, n), forms[12:].reshape(-1, 2, 3, n, n)
     return SecondOrder(moments[:3], moments[3], at_frames[:, 0], at_frames[:, 1])
 

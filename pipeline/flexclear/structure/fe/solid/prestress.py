@@ -14,36 +14,51 @@ International Journal for Numerical Methods in Engineering 32, 1833-1850.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.structure.fe.solid import elasticity
-from flexclear.structure.fe.solid.model import Unknowns, solid_of, unknowns_of
+from flexclear.structure.fe.solid.elasticity import Solid
+from flexclear.structure.fe.solid.model import Unknowns
 
 
-def inertial(mesh: xr.Dataset) -> tuple[sp.csr_array, sp.csr_array, np.ndarray]:
-    """Return the map from the model's vector to the nodes, their mass along one axis, and nodal loads rho X_k e_l.
+def inertial(solid: Solid) -> tuple[sp.csr_array, np.ndarray]:
+    """Return the nodes' mass along one axis, (nodes, nodes), and nodal loads rho X_k e_l.
 
-    Shapes (3 nodes, ndof), (nodes, nodes), and (3 nodes, k, l) with k from 0 to 3 (X_3 = 1).
+    The loads have the shape (3 nodes, k, l) with k from 0 to 3 (X_3 = 1).
     """
-    solid = solid_of(mesh)
     line, place = elasticity.mass(solid), np.column_stack([solid.nodes, np.ones(len(solid.nodes))])
-    loads = np.einsum("nk,li->nikl", line @ place, np.eye(3)).reshape(-1, 4, 3)
-    return unknowns_of(mesh).spread, line, loads
+    return line, np.einsum("nk,li->nikl", line @ place, np.eye(3)).reshape(-1, 4, 3)
 
 
-def forms(mesh: xr.Dataset, vectors: np.ndarray, displacement: np.ndarray, loads: np.ndarray) -> np.ndarray:
+def forms(
+    mesh: xr.Dataset,
+    solid: Solid,
+    unknowns: Unknowns,
+    vectors: np.ndarray,
+    displacement: np.ndarray,
+    loads: np.ndarray,
+) -> np.ndarray:
     """Return the second-order work per pair of vectors, shape (m, n, n), of m loads in equilibrium.
 
     vectors, displacement: model's vectors, the second of the response to each load, (ndof, n) and (ndof, m).
     loads: nodal, inertia forces included, without those on frames, (3 nodes, m).
     """
-    solid, unknowns = solid_of(mesh), unknowns_of(mesh)
     u = unknowns.spread @ displacement
     S = (unknowns.spread @ vectors).reshape(len(solid.nodes), -1)
     result = np.stack([_work(elasticity.stress_stiffness(solid, one.reshape(-1, 3)), S) for one in u.T])
-    return result + _of_rigid_frames(mesh, unknowns, elasticity.stiffness(solid) @ u - loads, vectors)
+    for frame, first in unknowns.first.items():
+        nodes = mesh["tie_node"].values[mesh["tie_frame"].values == frame]
+        # the stiffness of the nodes that the frame leads is that of their cells
+        around = np.isin(solid.cells, nodes).any(axis=1)
+        parts = {name: getattr(solid, name)[around] for name in ("cells", "lame", "shear", "density")}
+        force = (elasticity.stiffness(replace(solid, **parts)) @ u - loads).reshape(len(solid.nodes), 3, -1)[nodes]
+        arm = solid.nodes[nodes] - mesh["frame_position"].values[frame]
+        result += _of_rigid_frame(force, arm, vectors[first + 3 : first + 6])
+    return result
 
 
 def _work(stress: sp.csr_array, S: np.ndarray) -> np.ndarray:
@@ -53,16 +68,9 @@ def _work(stress: sp.csr_array, S: np.ndarray) -> np.ndarray:
     return 0.5 * (form + form.T)
 
 
-def _of_rigid_frames(mesh: xr.Dataset, unknowns: Unknowns, held: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return the work of the forces that hold nodes to rigid frames, (m, n, n); held: (3 nodes, m)."""
-    n, x = vectors.shape[1], mesh["node_position"].values
-    total = np.zeros((held.shape[1], n, n))
-    for frame, first in unknowns.first.items():
-        nodes = mesh["tie_node"].values[mesh["tie_frame"].values == frame]
-        force = held.reshape(len(x), 3, -1)[nodes]
-        virial = np.einsum("nim,nj->mij", force, x[nodes] - mesh["frame_position"].values[frame])
-        theta = vectors[first + 3 : first + 6]
-        turned = np.einsum("ia,mij,jb->mab", theta, virial, theta, optimize=True)
-        total += 0.5 * (turned + turned.swapaxes(1, 2))
-        total -= np.trace(virial, axis1=1, axis2=2)[:, None, None] * (theta.T @ theta)
-    return total
+def _of_rigid_frame(force: np.ndarray, arm: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Return the work of forces (nodes, 3, m) that hold nodes at `arm` to a frame that turns by theta, (m, n, n)."""
+    virial = np.einsum("nim,nj->mij", force, arm)
+    turned = np.einsum("ia,mij,jb->mab", theta, virial, theta, optimize=True)
+    result: np.ndarray = 0.5 * (turned + turned.swapaxes(1, 2))
+    return result - np.trace(virial, axis1=1, axis2=2)[:, None, None] * (theta.T @ theta)
