@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -66,6 +67,18 @@ EDITS = """## Edits of another file
 """
 
 
+#: key, value with default, meaning
+Row = tuple[str, str, str]
+HEADINGS: Row = ("key", "value", "meaning")
+#: sections from which on a common row appears once, in a table of its own
+SEVERAL = 3
+SHARED = """## Keys of several parts
+
+The sections below name these keys without repeating them.
+
+"""
+
+
 def page(kind: str) -> str:
     """Return the page of the keys of scenes, recipes or sweeps."""
     found = _schema(kind)
@@ -73,12 +86,20 @@ def page(kind: str) -> str:
     title, text = HEADS[kind]
     parts = [f"# {title}\n\n{text} {WHERE}"]
     if "properties" in found:
-        parts.append(f"{_table(found, definitions)}\n\n")
+        parts.append(f"{table(HEADINGS, _rows(found, definitions))}\n\n")
     parts += [EDITS] if kind == "scene" else []
-    examples = _examples(kind)
-    for name in _order(found, definitions):
-        parts.append(_section(name, definitions, examples))
+    examples, names = _examples(kind), _order(found, definitions)
+    shared = _shared(row for name in names for row in _rows(definitions[name], definitions))
+    parts += [f"{SHARED}{table(HEADINGS, shared.values())}\n\n"] if shared else []
+    for name in names:
+        parts.append(_section(name, definitions, examples, shared))
     return "".join(parts).rstrip() + "\n"
+
+
+def _shared(rows: Iterable[Row]) -> dict[str, Row]:
+    """Return each row that stands in several sections, by key, the most frequent one of its key."""
+    counted = sorted(Counter(rows).items(), key=lambda one: (one[0][0], one[1]))
+    return {row[0]: row for row, times in counted if times >= SEVERAL}
 
 
 def _schema(kind: str) -> dict[str, Any]:
@@ -111,12 +132,18 @@ def _references(node: Any) -> Iterator[str]:
             yield from _references(item)
 
 
-def _section(name: str, definitions: dict[str, Any], examples: dict[str, str]) -> str:
+def _section(name: str, definitions: dict[str, Any], examples: dict[str, str], shared: dict[str, Row]) -> str:
     part = definitions[name]
     entry = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
-    key = _kind(part)
-    example = f"```toml\n{examples[key]}\n```\n\n" if key in examples else ""
-    return f"## {_heading(name, part)}\n\n{entry}\n\n{_table(part, definitions)}\n\n{example}"
+    rows = _rows(part, definitions)
+    own = [row for row in rows if shared.get(row[0]) != row]
+    known = ", ".join(f"[{row[0]}](#keys-of-several-parts)" for row in rows if row not in own)
+    example = examples.pop(_kind(part), "")  # of two parts of one kind, the first has it
+    texts = [f"## {_heading(name, part)}", entry]
+    texts += [table(HEADINGS, own)] if own else []
+    texts += [f"Also {known}."] if known else []
+    texts += [f"```toml\n{example}\n```"] if example else []
+    return "\n\n".join(texts) + "\n\n"
 
 
 def _heading(name: str, part: dict[str, Any]) -> str:
@@ -141,21 +168,19 @@ def _anchor(name: str, definitions: dict[str, Any]) -> str:
     return words.replace(" ", "-")
 
 
-def _table(part: dict[str, Any], definitions: dict[str, Any]) -> str:
-    required = part.get("required", [])
-    rows = []
-    for key, entry in part.get("properties", {}).items():
-        if key == "source":
-            continue
-        default = "needed" if key in required else _default(entry)
-        meaning = "this kind" if "const" in entry else _meaning(entry)
-        rows.append((f"`{key}`", _value(entry, definitions), default, meaning))
-    return table(("key", "value", "default", "meaning"), rows) if rows else "It has no keys."
+def _rows(part: dict[str, Any], definitions: dict[str, Any]) -> list[Row]:
+    """Return the rows of a part, without its kind, which its heading names, and without `source`, which all have."""
+    needed = part.get("required", [])
+    return [
+        (f"`{key}`", f"{_value(entry, definitions)}{'; needed' if key in needed else _default(entry)}", _meaning(entry))
+        for key, entry in part.get("properties", {}).items()
+        if key != "source" and "const" not in entry
+    ]
 
 
 def _default(entry: dict[str, Any]) -> str:
     value = entry.get("default")
-    return "-" if value in (None, {}, [], "") or isinstance(value, dict) else f"`{json.dumps(value)}`"
+    return "" if value in (None, {}, [], "") or isinstance(value, dict) else f"; default `{json.dumps(value)}`"
 
 
 def _meaning(entry: dict[str, Any]) -> str:
@@ -164,19 +189,18 @@ def _meaning(entry: dict[str, Any]) -> str:
 
 def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
     """Return the permitted values of an entry in words."""
-    if "const" in entry:
-        return f"`{json.dumps(entry['const'])}`"
     if "enum" in entry:
         return ", ".join(f"`{json.dumps(one)}`" for one in entry["enum"])
     if "$ref" in entry:
         name = entry["$ref"].rpartition("/")[2]
-        return f"[{_heading(name, definitions[name])}](#{_anchor(name, definitions)})"
+        shown = f"`{kind}`" if (kind := _kind(definitions[name])) else _heading(name, definitions[name])
+        return f"[{shown}](#{_anchor(name, definitions)})"
     for several in ("anyOf", "oneOf"):
         if several in entry:
             kinds = [_value(one, definitions) for one in entry[several] if one.get("type") != "null"]
             if set(_references(entry)) >= _LAW_KINDS and len(kinds) > 1:
                 return f"[law of time](#{_anchor('Constant', definitions)}), or a constant value"
-            return " or ".join(dict.fromkeys(kinds))
+            return ", ".join(dict.fromkeys(kinds))
     if "format" in entry:
         return _with_unit(entry["format"])
     return _plain(entry, definitions)

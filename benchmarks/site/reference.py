@@ -39,24 +39,19 @@ DATASETS: dict[str, tuple[str, Schema]] = {
 }
 DATASETS_HEAD = """# Datasets
 
-Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Dimensions have coordinates
-with names, so that values are selected by the name of a body, joint, mode or contact. Units are SI, written as UDUNITS
-reads them. This page is written from the schemas that every dataset is checked against (`python -m benchmarks.site`);
-the recipes run as tests.
+Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Values are selected by the
+name of a body, joint, mode or contact. Units are SI, as UDUNITS reads them. The tables are written from the schemas that
+every dataset is checked against (`python -m benchmarks.site`); the recipes run as tests.
 
-- **Units of entries.** Where some entries of a variable slide and others turn, as drives do, the variable has no
-  attribute `units`; the coordinate `<variable>_units` then gives the unit of each entry. Where all are of one kind, the
-  attribute is there and the coordinate is not. The coordinate `<dimension>_motion` says which are which.
-- **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that they have the unit m. (Texts that write
-  sqrt(kg) m for mass-normalised modes mean the same numbers.)
-- **Times.** The rows of a run are the regular outputs, and besides them breaks of drives, events and the deepest points
-  of contacts.
-- **Attributes.** `title`; `source`, the version that made the file; `references`, publications of the methods that
-  the scene's parts represent; `parameters` of the scene as JSON; `versions` of libraries; `warnings`. `sources` and
-  `assumptions`, where the values of the scene and of its recipes come from, are attributes of post.nc and of what
-  `flexclear.run` returns, so that another sentence there runs nothing again. No file holds the time or the machine of
-  its making: equal inputs give equal bytes.
-- **Marked `*`:** variables that are there only when the scene has such a part.
+- **Two units** (`N; N m`): the second belongs to entries that turn. Where a variable has both kinds, the coordinate
+  `<variable>_units` gives the unit of each entry, and `<dimension>_motion` its kind; else the attribute `units` does.
+- **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that their unit is m.
+- **Rows** of a run: the regular outputs, breaks of drives, events, and the deepest points of contacts.
+- **Attributes**: `title`; `source`, the version that made the file; `references`, publications of the methods;
+  `parameters` of the scene as JSON; `versions` of libraries; `warnings`. post.nc, and what `flexclear.run` returns, also
+  have `sources` and `assumptions` of the scene's values. Equal inputs give equal bytes: no time, no machine.
+- **`*`**: variables of parts that a scene may lack.
+
 """
 
 
@@ -67,14 +62,14 @@ def datasets() -> str:
         "## Recipes\n\n",
         *(_recipe(path.read_text(encoding="utf-8")) for path in sorted(RECIPES.glob("*.py"))),
     ]
-    known: set[str] = set()
+    known: Schema = {}
     for heading, (where, schema) in DATASETS.items():
         own = {name: v for name, v in schema.items() if heading != "Vibrations" or name not in artifacts.EQUILIBRIUM}
-        parts.append(f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_table(own)}\n\n")
-        known |= set(schema)
-    parts.append(
-        f"## Coordinates\n\nThe same names mean the same in all datasets.\n\n{_table(COORDINATES, marks=False)}\n"
-    )
+        parts.append(
+            f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_repeated(own, known)}{_table(own, known)}\n\n"
+        )
+        known = {**own, **known}
+    parts.append(f"## Coordinates\n\nThe same names mean the same in all datasets.\n\n{_coordinates()}\n")
     return "".join(parts)
 
 
@@ -83,18 +78,53 @@ def _recipe(source: str) -> str:
     return f"### {title.removesuffix('.')}\n\n```python\n{code.strip()}\n```\n\n"
 
 
-def _table(schema: Schema, *, marks: bool = True) -> str:
-    rows = [
-        (f"`{name}`{'*' if marks and v.optional else ''}", ", ".join(v.dims) or "-", _units(v), v.long_name)
-        for name, v in schema.items()
-    ]
+#: endings of the statistics of a variable over the members of an ensemble
+STATISTICS = ("_mean", "_std", "_quantile")
+
+
+def _table(schema: Schema, known: Schema) -> str:
+    """Return the variables as a table, those of `known` left out, and the statistics of a variable in one row."""
+    rows = []
+    for name, v in schema.items():
+        if _known(name, v, known) or name.endswith(STATISTICS[1:]):
+            continue
+        stem, meaning = name.removesuffix(STATISTICS[0]), v.long_name
+        if stem != name:
+            name = f"{stem}{STATISTICS[0]}, {', '.join(STATISTICS[1:])}"
+            meaning = "mean, standard deviation and (first dimension quantile) quantiles over the members"
+        rows.append((f"`{name}`{'*' if v.optional else ''}", _dims(v) or "-", _units(v), meaning))
     return table(("name", "dimensions", "unit", "meaning"), rows)
+
+
+def _coordinates() -> str:
+    rows = [
+        (
+            f"`{name}`{'' if v.dims == (name,) else f' ({_dims(v)})'}",
+            f"{v.long_name}{f' [{v.units}]' if v.units else ''}",
+        )
+        for name, v in COORDINATES.items()
+    ]
+    return table(("name, and dimension where it differs", "meaning"), rows)
+
+
+def _dims(variable: Variable) -> str:
+    return ", ".join(variable.dims)
+
+
+def _known(name: str, variable: Variable, known: Schema) -> bool:
+    return name in known and known[name].long_name == variable.long_name
+
+
+def _repeated(schema: Schema, known: Schema) -> str:
+    """Return a sentence on the variables that an earlier dataset has, with their dimensions here."""
+    same = [f"`{name}`{f' ({_dims(v)})' if v.dims else ''}" for name, v in schema.items() if _known(name, v, known)]
+    return f"With the meanings above: {', '.join(same)}.\n\n" if same else ""
 
 
 def _units(variable: Variable) -> str:
     if not variable.units:
         return "words"
-    return f"{variable.units}; {variable.turning} where it turns" if variable.turning else variable.units
+    return f"{variable.units}; {variable.turning}" if variable.turning else variable.units
 
 
 QUANTITIES = """# Quantities
