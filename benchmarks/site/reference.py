@@ -40,16 +40,17 @@ DATASETS: dict[str, tuple[str, Schema]] = {
 DATASETS_HEAD = """# Datasets
 
 Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Values are selected by the
-name of a body, joint, mode or contact. Units are SI, as UDUNITS reads them. The tables are written from the schemas that
-every dataset is checked against (`python -m benchmarks.site`); the recipes run as tests.
+name of a body, joint, mode or contact. Units are SI, as UDUNITS reads them. `python -m benchmarks.site` writes the
+tables from the schemas that every dataset is checked against; the recipes run as tests.
 
 - **Two units** (`N; N m`): the second belongs to entries that turn. Where a variable has both kinds, the coordinate
   `<variable>_units` gives the unit of each entry, and `<dimension>_motion` its kind; else the attribute `units` does.
 - **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that their unit is m.
 - **Rows** of a run: the regular outputs, breaks of drives, events, and the deepest points of contacts.
 - **Attributes**: `title`; `source`, the version that made the file; `references`, publications of the methods;
-  `parameters` of the scene as JSON; `versions` of libraries; `warnings`. post.nc, and what `flexclear.run` returns, also
-  have `sources` and `assumptions` of the scene's values. Equal inputs give equal bytes: no time, no machine.
+  `parameters` of the scene as JSON; `versions` of libraries; `warnings`. post.nc, and what `flexclear.run` returns,
+  have `sources` and `assumptions` of the scene's values as well. No file names its time or machine: equal inputs give
+  equal bytes.
 - **`*`**: variables of parts that a scene may lack.
 
 """
