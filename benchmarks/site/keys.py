@@ -6,7 +6,7 @@ import json
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -57,20 +57,15 @@ HEADS = {
 WHERE = "Files are checked against what this page is written from (`python -m benchmarks.site`).\n\n"
 EDITS = """## Edits of another file
 
-| key | value | meaning |
-|---|---|---|
-| `extends` | text | scene file that this one edits, relative to it |
-| `[replace.<family>.<name>]` | a part | replaces the old part completely |
-| `[set.<family>.<name>]` | some keys | keys to change; all others are unchanged |
-| `remove` | list of text | paths to remove, such as `"joint.A1"` |
+- `extends`: scene file that this one edits, relative to it
+- `[replace.<family>.<name>]`: a part that replaces the old one completely
+- `[set.<family>.<name>]`: keys to change; all others are unchanged
+- `remove`: list of paths to remove, such as `"joint.A1"`
 
 """
-
-
 #: key, value with default, meaning
 Row = tuple[str, str, str]
-HEADINGS: Row = ("key", "value", "meaning")
-#: sections from which on a common row appears once, in a table of its own
+#: sections from which on a common row appears once, in a list of its own
 SEVERAL = 3
 SHARED = """## Keys of several parts
 
@@ -86,11 +81,11 @@ def page(kind: str) -> str:
     title, text = HEADS[kind]
     parts = [f"# {title}\n\n{text} {WHERE}"]
     if "properties" in found:
-        parts.append(f"{table(HEADINGS, _rows(found, definitions))}\n\n")
+        parts.append(f"{_list(_rows(found, definitions))}\n\n")
     parts += [EDITS] if kind == "scene" else []
     examples, names = _examples(kind), _order(found, definitions)
     shared = _shared(row for name in names for row in _rows(definitions[name], definitions))
-    parts += [f"{SHARED}{table(HEADINGS, shared.values())}\n\n"] if shared else []
+    parts += [f"{SHARED}{_list(shared.values())}\n\n"] if shared else []
     for name in names:
         parts.append(_section(name, definitions, examples, shared))
     return "".join(parts).rstrip() + "\n"
@@ -137,11 +132,11 @@ def _section(name: str, definitions: dict[str, Any], examples: dict[str, str], s
     entry = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
     rows = _rows(part, definitions)
     own = [row for row in rows if shared.get(row[0]) != row]
-    known = ", ".join(f"[{row[0]}](#keys-of-several-parts)" for row in rows if row not in own)
+    known = ", ".join(row[0] for row in rows if row not in own)
     example = examples.pop(_kind(part), "")  # of two parts of one kind, the first has it
     texts = [f"## {_heading(name, part)}", entry]
-    texts += [table(HEADINGS, own)] if own else []
-    texts += [f"Also {known}."] if known else []
+    texts += [_list(own)] if own else []
+    texts += [f"[Also](#keys-of-several-parts) {known}."] if known else []
     texts += [f"```toml\n{example}\n```"] if example else []
     return "\n\n".join(texts) + "\n\n"
 
@@ -166,6 +161,10 @@ def _kind(part: dict[str, Any]) -> str:
 def _anchor(name: str, definitions: dict[str, Any]) -> str:
     words = re.sub(r"[^\w\- ]", "", _heading(name, definitions[name]).lower())
     return words.replace(" ", "-")
+
+
+def _list(rows: Iterable[Row]) -> str:
+    return "\n".join(f"- {key} ({value}): {meaning}" for key, value, meaning in rows)
 
 
 def _rows(part: dict[str, Any], definitions: dict[str, Any]) -> list[Row]:
@@ -262,9 +261,3 @@ def _inline(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_inline(item) for item in value) + "]"
     return json.dumps(value, ensure_ascii=False)
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a Markdown table of texts; bars in cells are escaped."""
-    lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

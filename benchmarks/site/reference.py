@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterable
 
 import flexclear as fc
 from benchmarks.page import DOCS
-from benchmarks.site.keys import table
 from flexclear.artifacts import schema as artifacts
 from flexclear.artifacts.coordinates import COORDINATES
 from flexclear.artifacts.schema import Schema
@@ -51,7 +51,7 @@ tables from the schemas that every dataset is checked against; the recipes run a
   `parameters` of the scene as JSON; `versions` of libraries; `warnings`. post.nc, and what `flexclear.run` returns,
   have `sources` and `assumptions` of the scene's values as well. No file names its time or machine: equal inputs give
   equal bytes.
-- **`*`**: variables of parts that a scene may lack.
+- **Lines** below: name, (dimensions), [unit] and meaning; texts have no unit. `*`: of parts that a scene may lack.
 
 """
 
@@ -84,7 +84,7 @@ STATISTICS = ("_mean", "_std", "_quantile")
 
 
 def _table(schema: Schema, known: Schema) -> str:
-    """Return the variables as a table, those of `known` left out, and the statistics of a variable in one row."""
+    """Return the variables as a list, those of `known` left out, and the statistics of a variable in one line."""
     rows = []
     for name, v in schema.items():
         if _known(name, v, known) or name.endswith(STATISTICS[1:]):
@@ -93,19 +93,16 @@ def _table(schema: Schema, known: Schema) -> str:
         if stem != name:
             name = f"{stem}{STATISTICS[0]}, {', '.join(STATISTICS[1:])}"
             meaning = "mean, standard deviation and (first dimension quantile) quantiles over the members"
-        rows.append((f"`{name}`{'*' if v.optional else ''}", _dims(v) or "-", _units(v), meaning))
-    return table(("name", "dimensions", "unit", "meaning"), rows)
+        dims = f" ({_dims(v)})" if v.dims else ""
+        rows.append(f"- `{name}`{'*' if v.optional else ''}{dims}{_units(v)}: {meaning}")
+    return _lines(rows)
 
 
 def _coordinates() -> str:
-    rows = [
-        (
-            f"`{name}`{'' if v.dims == (name,) else f' ({_dims(v)})'}",
-            f"{v.long_name}{f' [{v.units}]' if v.units else ''}",
-        )
+    return _lines(
+        f"- `{name}`{'' if v.dims == (name,) else f' ({_dims(v)})'}{_units(v)}: {v.long_name}"
         for name, v in COORDINATES.items()
-    ]
-    return table(("name, and dimension where it differs", "meaning"), rows)
+    )
 
 
 def _dims(variable: Variable) -> str:
@@ -123,9 +120,9 @@ def _repeated(schema: Schema, known: Schema) -> str:
 
 
 def _units(variable: Variable) -> str:
-    if not variable.units:
-        return "words"
-    return f"{variable.units}; {variable.turning}" if variable.turning else variable.units
+    """Return the unit in brackets; nothing for words."""
+    units = "; ".join(unit for unit in (variable.units, variable.turning) if unit)
+    return f" [{units}]" if units else ""
 
 
 QUANTITIES = """# Quantities
@@ -144,7 +141,7 @@ fc.quantity(run, "force(pin) - force(main)")
 
 - `<owner>.<word>` as in `slider.position`; `slider.position.x` is a component along x, y or z of the world.
 - Where a part is a body and a joint at the same time, the word means the first of the owners below that has it.
-  The second word of the table says which one is meant: `guide.joint_position`.
+  The second word of a line says which one is meant: `guide.joint_position`.
 - `force(A1)` is another way to write `A1.force`.
 - What belongs to the whole mechanism has no owner: `kinetic`.
 - Expressions have `+ - * / ^`, parentheses, numbers with units, the time `t` and the functions `max`, `min`, `abs`,
@@ -163,18 +160,23 @@ def quantities() -> str:
     """Return docs/reference/quantities.md: every quantity with its unit, and the reductions of sweeps."""
     parts = [QUANTITIES]
     for dim, owner in OWNERS.items():
-        rows = [
-            (", ".join(f"`{word}`" for word in _words(key)), " or ".join(dict.fromkeys(kind.units)), _meaning(kind))
-            for key, kind in KINDS.items()
-            if kind.owner == dim and kind.variable
-        ]
-        parts.append(f"## {owner[0].upper()}{owner[1:]}\n\n{table(('word', 'unit', 'meaning'), rows)}\n\n")
-    reductions = [(f"`{name}`", meaning) for name, meaning in SERIES.items()]
-    of_contacts = [
-        (f"`{kind}.{name}`", meaning) for kind, few in CONTACT_REDUCTIONS.items() for name, meaning in few.items()
-    ]
-    parts.append(f"## Reductions, of sweeps\n\n{table(('name', 'meaning'), reductions + of_contacts)}\n")
+        shown = _lines(_quantity(key, kind) for key, kind in KINDS.items() if kind.owner == dim and kind.variable)
+        parts.append(f"## {owner[0].upper()}{owner[1:]}\n\n{shown}\n\n")
+    reductions = [(name, meaning) for name, meaning in SERIES.items()]
+    for kind, few in CONTACT_REDUCTIONS.items():
+        reductions += [(f"{kind}.{name}", meaning) for name, meaning in few.items()]
+    shown = _lines(f"- `{name}`: {meaning}" for name, meaning in reductions)
+    parts.append(f"## Reductions, of sweeps\n\n{shown}\n")
     return "".join(parts)
+
+
+def _quantity(key: str, kind: Kind) -> str:
+    words = ", ".join(f"`{word}`" for word in _words(key))
+    return f"- {words} [{' or '.join(dict.fromkeys(kind.units))}]: {_meaning(kind)}"
+
+
+def _lines(rows: Iterable[str]) -> str:
+    return "\n".join(rows)
 
 
 def _words(key: str) -> list[str]:
