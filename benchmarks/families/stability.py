@@ -70,7 +70,7 @@ def _methods(done: Sequence[Record]) -> str:
 
 
 def _reasons(records: Sequence[Record]) -> str:
-    """Return the first part of the messages of the cases that did not finish; parameters and the rest are in the log."""
+    """Return the first part of the messages of the cases that did not finish; the log has the rest."""
     lines = [
         f"- {r['verdict']} ({r['sweep']}): {' '.join(r['reason'].split()).partition('; ')[0]}\n"
         for r in records

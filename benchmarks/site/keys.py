@@ -42,8 +42,8 @@ _MODULE = re.compile(r"^flexclear__.*__(\w+?)__(?:recipe|beam_recipe)__(\w+)$|^f
 HEADS = {
     "scene": (
         "Keys of a scene",
-        'A scene is a TOML file. Numbers are SI, or text with a unit (`"20.5 mm"`). Every part may say where its '
-        "values come from in `source`, either one text or one per key.",
+        'A scene is a TOML file. Numbers are SI, or text with a unit (`"20.5 mm"`). A law of time may be a bare '
+        "constant. Every part may say where its values come from in `source`, either one text or one per key.",
     ),
     "recipe": (
         "Keys of a mesh recipe",
@@ -67,6 +67,8 @@ EDITS = """## Edits of another file
 Row = tuple[str, str, str]
 #: sections from which on a common row appears once, in a list of its own
 SEVERAL = 3
+#: longest default and example that the page shows [characters]
+LONGEST, LONGEST_EXAMPLE = 60, 350
 SHARED = """## Keys of several parts
 
 The sections below name these keys without repeating them.
@@ -83,11 +85,14 @@ def page(kind: str) -> str:
     if "properties" in found:
         parts.append(f"{_list(_rows(found, definitions))}\n\n")
     parts += [EDITS] if kind == "scene" else []
-    examples, names = _examples(kind), _order(found, definitions)
-    shared = _shared(row for name in names for row in _rows(definitions[name], definitions))
+    examples, rows = (
+        _examples(kind),
+        {name: _rows(definitions[name], definitions) for name in _order(found, definitions)},
+    )
+    shared = _shared(row for of in rows.values() for row in of)
     parts += [f"{SHARED}{_list(shared.values())}\n\n"] if shared else []
-    for name in names:
-        parts.append(_section(name, definitions, examples, shared))
+    for name in rows:
+        parts.append(_section(name, definitions, examples, rows, shared))
     return "".join(parts).rstrip() + "\n"
 
 
@@ -127,18 +132,28 @@ def _references(node: Any) -> Iterator[str]:
             yield from _references(item)
 
 
-def _section(name: str, definitions: dict[str, Any], examples: dict[str, str], shared: dict[str, Row]) -> str:
+def _section(
+    name: str, definitions: dict[str, Any], examples: dict[str, str], rows: dict[str, list[Row]], shared: dict[str, Row]
+) -> str:
     part = definitions[name]
     entry = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
-    rows = _rows(part, definitions)
-    own = [row for row in rows if shared.get(row[0]) != row]
-    known = ", ".join(row[0] for row in rows if row not in own)
+    base = _base(name, rows)
+    more = [row for row in rows[name] if base is None or row not in rows[base]]
+    own = [row for row in more if shared.get(row[0]) != row]
+    known = ", ".join(row[0] for row in more if row not in own)
     example = examples.pop(_kind(part), "")  # of two parts of one kind, the first has it
     texts = [f"## {_heading(name, part)}", entry]
+    texts += [f"All keys of [{_heading(base, definitions[base])}](#{_anchor(base, definitions)})."] if base else []
     texts += [_list(own)] if own else []
     texts += [f"[Also](#keys-of-several-parts) {known}."] if known else []
     texts += [f"```toml\n{example}\n```"] if example else []
     return "\n\n".join(texts) + "\n\n"
+
+
+def _base(name: str, rows: dict[str, list[Row]]) -> str | None:
+    """Return the largest other part, of several keys, all of which this part has as well, or None."""
+    inner = [other for other, of in rows.items() if len(of) >= SEVERAL and set(of) < set(rows[name])]
+    return max(inner, key=lambda other: len(rows[other]), default=None)
 
 
 def _heading(name: str, part: dict[str, Any]) -> str:
@@ -179,7 +194,9 @@ def _rows(part: dict[str, Any], definitions: dict[str, Any]) -> list[Row]:
 
 def _default(entry: dict[str, Any]) -> str:
     value = entry.get("default")
-    return "" if value in (None, {}, [], "") or isinstance(value, dict) else f"; default `{json.dumps(value)}`"
+    if value in (None, {}, [], "") or isinstance(value, dict):
+        return ""
+    return f"; default `{json.dumps(value)}`" if len(json.dumps(value)) < LONGEST else "; default zeros"
 
 
 def _meaning(entry: dict[str, Any]) -> str:
@@ -198,7 +215,7 @@ def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
         if several in entry:
             kinds = [_value(one, definitions) for one in entry[several] if one.get("type") != "null"]
             if set(_references(entry)) >= _LAW_KINDS and len(kinds) > 1:
-                return f"[law of time](#{_anchor('Constant', definitions)}), or a constant value"
+                return f"[law of time](#{_anchor('Constant', definitions)})"
             return ", ".join(dict.fromkeys(kinds))
     if "format" in entry:
         return _with_unit(entry["format"])
@@ -206,8 +223,8 @@ def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
 
 
 def _with_unit(quantity: str) -> str:
-    """Return a quantity with the SI unit of its bare numbers."""
-    return f"{quantity} [{SI[quantity]}]" if SI.get(quantity) else quantity
+    """Return the SI unit of a quantity's bare numbers, or the quantity."""
+    return SI.get(quantity, quantity)
 
 
 def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
@@ -215,14 +232,14 @@ def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
     if kind == "array":
         inner = entry.get("items") or (entry.get("prefixItems") or [{}])[0]
         if "format" in inner and entry.get("maxItems") == 3:
-            return f"three components, {_with_unit(inner['format'])}"
+            return f"3 x {_with_unit(inner['format'])}"
         return f"list of {_value(inner, definitions)}" if inner else "list"
     if kind == "object":
         inner = entry.get("additionalProperties")
         return f"by name: {_value(inner, definitions)}" if isinstance(inner, dict) and inner else "table"
     words = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false"}
     if isinstance(kind, list):
-        return "number or text with a unit"
+        return "number with unit"
     return words.get(str(kind), "any value")
 
 
@@ -236,7 +253,7 @@ def _examples(kind: str) -> dict[str, str]:
             text = _toml(place, part)
             if name and place and (name not in found or len(text) < len(found[name])):
                 found[name] = text
-    return {name: text for name, text in found.items() if len(text) < 900}
+    return {name: text for name, text in found.items() if len(text) < LONGEST_EXAMPLE}
 
 
 def _parts(node: Any, place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
