@@ -7,7 +7,7 @@ import html
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -101,11 +101,13 @@ def paper_markdown(content: Content) -> str:
     parts = [
         "# The paper, reproduced\n",
         f"{CITATION}. `make all` computes every number of this page: `flexclear run` brings scenes up to date, "
-        f"`{PROGRAM}` then draws figures and tables into `results/figures` and `results/tables`, and writes this page.\n",
+        f"`{PROGRAM}` then draws figures and tables into `results/figures` and `results/tables`, and writes this "
+        "page.\n",
         "## Figures and tables\n",
         _index(),
         "## Tables\n",
-        *(_table(table) for table in content.tables.values()),
+        "Tables of given parameters, and what could not be integrated: `results/tables`.\n",
+        *_results(content.tables),
         "## Assumptions\n",
         "Values that the paper does not print, without those that follow from others. Each is marked `assumed` in "
         "its scene file.\n",
@@ -156,9 +158,14 @@ def _index() -> str:
     return _pipe(("figure or table", "scenes"), rows)
 
 
-def _table(table: Table) -> str:
-    notes = "".join(f"\n{note}\n" for note in table.notes)
-    return f"### {table.title}\n\n{_pipe(table.columns, table.rows)}{notes}"
+def _results(tables: Mapping[str, Table]) -> Iterator[str]:
+    """Yield the tables of results, each note once."""
+    known: set[str] = set()
+    for table in (table for name, table in tables.items() if name not in PARAMETERS):
+        new = [note for note in table.notes if note not in known and not note.startswith("What could not be")]
+        known |= set(new)
+        notes = "".join(f"\n{note}\n" for note in new)
+        yield f"### {table.title}\n\n{_pipe(table.columns, table.rows)}{notes}"
 
 
 def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -220,6 +227,8 @@ VERDICTS = "table_verdicts"
 GOOD, BAD = ("holds",), ("does not hold",)
 #: tables with the paper's given parameters; the others compare results
 GIVEN = ("table01", "table02", "table03", "table04", "table05", "table06")
+#: those of them that only repeat parameters
+PARAMETERS = ("table01", "table02", "table03", "table06")
 
 
 @dataclass(frozen=True, slots=True)
