@@ -285,6 +285,8 @@ def files(records: Sequence[Row]) -> dict[str, bytes]:
         found["far.csv"] = csv_table(_far_rows(of["far"]), _far_columns(of["far"]))
     if "clearance" in of:
         found["clearance.csv"] = csv_table(sorted(of["clearance"], key=_order), CLEARANCE)
+    if "far" in of and "clearance" in of:
+        found["claims.csv"] = csv_table(*claims.outcomes(of))
     if "layouts" in of:
         found["layouts.csv"] = csv_table(*claims.peaks(of["layouts"]))
     return {f"reference-conditions/{name}": content for name, content in found.items()}

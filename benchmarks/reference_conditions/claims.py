@@ -100,14 +100,27 @@ def numbers_of(groups: dict[str, list[Row]], place: int) -> Rows:
 
 
 def judged(groups: dict[str, list[Row]]) -> str:
-    """Return every claim with its rule and the numbers of each position, as Markdown."""
+    """Return every claim with its outcome, its rule and the numbers of the first position, as Markdown."""
     lines = []
     for claim, outcomes in verdicts(groups):
+        place, (_, numbers) = next(iter(outcomes.items()))
         lines.append(f"**{claim.paper}** {sentence(outcomes)}")
-        lines.append(f"Rule: {claim.rule[0].lower()}{claim.rule[1:]}\n")
-        lines += [f"- {place} mm: {numbers}" for place, (_, numbers) in outcomes.items()]
-        lines.append("")
+        lines.append(f"Rule: {claim.rule[0].lower()}{claim.rule[1:]} At {place} mm: {numbers}.\n")
     return "\n".join(lines)
+
+
+def outcomes(groups: dict[str, list[Row]]) -> tuple[list[Row], Columns]:
+    """Return the rows and the columns of a table of all outcomes, with the numbers of every position."""
+    lines = [
+        {"statement": claim.paper, "joint at [mm]": place, "holds": "yes" if good else "no", "numbers": numbers}
+        for claim, found in verdicts(groups)
+        for place, (good, numbers) in found.items()
+    ]
+    return lines, {name: partial(_cell, name) for name in lines[0]}
+
+
+def _cell(name: str, line: Row) -> str:
+    return str(line[name])
 
 
 def sentence(outcomes: dict[int, tuple[bool, str]]) -> str:
