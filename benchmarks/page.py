@@ -18,7 +18,7 @@ from benchmarks import families, log
 from benchmarks.family import Family, Record
 from benchmarks.log import Session
 from flexclear.artifacts.paths import PROJECT
-from flexclear.post.plotting.table import pipe_table
+from flexclear.post.plotting.table import Table, as_csv, pipe_table
 from flexclear.scene.registry import lookup
 from flexclear.system.errors import InputError
 
@@ -115,6 +115,12 @@ def session_words(session: Session) -> str:
 def table(records: Iterable[Record], columns: Columns) -> str:
     """Return a Markdown table with one row for each record."""
     return pipe_table(tuple(columns), [[cell(record) for cell in columns.values()] for record in records])
+
+
+def csv_table(records: Iterable[Record], columns: Columns) -> bytes:
+    """Return the same table as CSV."""
+    rows = tuple(tuple(cell(record) for cell in columns.values()) for record in records)
+    return as_csv(Table("", tuple(columns), rows)).encode()
 
 
 def spread(time: Mapping[str, float], unit: str, digits: int) -> str:

@@ -48,15 +48,22 @@ def show(records: list[Record]) -> str:
     measured = {r["case"] for r in records}
     for scene in (name for name in SCENES if name in measured):
         mine = [r for r in records if r["case"] == scene]
-        tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r)
+        tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r and _shown(r["table"]))
         pictures = {r["picture"]: r["path"] for r in mine if "picture" in r}
         found.append(Studied(scene, next(r["advice"] for r in mine if "advice" in r), tables, pictures))
     return sections(tuple(found))
 
 
+def _shown(stored: Mapping[str, list]) -> bool:
+    """Return False for costs by quantity, which the pictures show."""
+    return not str(stored["title"]).startswith("What each quantity costs")
+
+
 def _table(stored: Mapping[str, list]) -> Table:
+    """Return a table of the log; its refused runs, and what the page says once of all tables, stay there."""
     rows = tuple(tuple(row) for row in stored["rows"])
-    return Table(str(stored["title"]), tuple(stored["columns"]), rows, tuple(stored["notes"]))
+    notes = tuple(note for note in stored["notes"] if note.startswith(("Reference", "Pointwise")))
+    return Table(str(stored["title"]), tuple(stored["columns"]), rows, notes)
 
 
 def files(records: list[Record]) -> dict[str, bytes]:

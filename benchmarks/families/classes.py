@@ -420,8 +420,12 @@ def examined(name: str) -> Record:
 
 
 def show(records: list[Record]) -> str:
-    """Return a table, and the messages of the cases that did not finish."""
-    messages = [f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split())}" for r in records if r["reason"]]
+    """Return a table, and the first part of the messages of the cases that did not finish."""
+    messages = [
+        f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split()).partition('; ')[0]}"
+        for r in records
+        if r["reason"]
+    ]
     return table(records, COLUMNS) + (
         "\n\nMessages of the cases that did not finish:\n\n" + "\n".join(messages) + "\n" if messages else ""
     )

@@ -25,7 +25,7 @@ from benchmarks.mechanisms import Mechanism, damped, mechanism, without_friction
 from benchmarks.page import short
 from benchmarks.processes import LostError, Worker
 from benchmarks.timing import interleaved
-from flexclear.post.plotting.table import pipe_table
+from flexclear.post.plotting.table import Table, as_csv, pipe_table
 from flexclear.scene.schema import Scene
 
 BODY = "platform"
@@ -289,10 +289,12 @@ def _name(rung: Rung) -> str:
 
 
 def show(records: list[Record]) -> str:
-    """Return the times needed for an accuracy, then every run of Exudyn that counts with ours next to it."""
-    runs, known = _runs(records), {r["case"]: r for r in records if "horizon" in r}
-    heads = {case: known[case] for case in COMPARISONS if case in known}
-    levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
+    """Return the times needed for an accuracy; `files` has every run of Exudyn that counts."""
+    runs, known = (
+        _runs(records),
+        [case for case in COMPARISONS for r in records if r["case"] == case and "horizon" in r],
+    )
+    levels = [_level_row(case, level, runs[case]) for case in known for level in LEVELS]
     head = (
         "velocity error below",
         "Exudyn [s]",
@@ -306,21 +308,19 @@ def show(records: list[Record]) -> str:
         "error of these",
         "integration alone",
     )
-    columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "ours", "ours, no worse [s]", "ratio")
-    texts = [pipe_table(head, levels)]
-    for case, r in heads.items():
-        note = f"error over {1e3 * r['horizon']:g} ms"
-        if "difference_of_laws" in r:
-            d = r["difference_of_laws"]
-            note += (
-                "; each against the converged solution of its own law, which differ by "
-                f"{short(d['position_um'])} um and {short(d['velocity_mm_s'])} mm/s"
-            )
-        done = [run for run in runs[case] if "s" in run]
+    failed = [f"{case}: {text}" for case in known if (text := _unlisted(runs[case]))]
+    return "\n\n".join([pipe_table(head, levels), *failed])
+
+
+def _listed(runs: Mapping[str, list[Record]]) -> Table:
+    """Return every run of Exudyn that counts, with ours that is no worse."""
+    heads = ("case", "method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]")
+    rows = []
+    for case, mine in runs.items():
+        done = [run for run in mine if "s" in run]
         best = [done[k] for k in front([(run["s"], run["position_um"], run["velocity_mm_s"]) for run in done])]
-        listed = pipe_table(columns, [_run_row(run) for run in best if "ours" in run])
-        texts.append(f"{case} ({note}):\n\n{listed}\n\n{_unlisted(runs[case])}".rstrip())
-    return "\n\n".join(texts)
+        rows += [(case, *_run_row(run)) for run in best if "ours" in run]
+    return Table("Runs", (*heads, "ours", "ours, no worse [s]", "ratio"), tuple(rows))
 
 
 def _unlisted(runs: list[Record]) -> str:
@@ -394,8 +394,11 @@ def _tracks(runs: list[Record], program: str, note: str) -> Iterator[dict[str, A
 
 
 def files(records: list[Record]) -> Mapping[str, bytes]:
-    """Return the JSON file of `points`, by path below docs/."""
-    return {"accuracy/exudyn.json": f"{json.dumps(points(records), indent=1)}\n".encode()}
+    """Return the JSON file of `points`, and all runs as a table, by path below docs/."""
+    return {
+        "accuracy/exudyn.json": f"{json.dumps(points(records), indent=1)}\n".encode(),
+        "benchmarks/exudyn.csv": as_csv(_listed(_runs(records))).encode(),
+    }
 
 
 FAMILY = Family(

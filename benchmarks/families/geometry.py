@@ -5,7 +5,7 @@ Runs with rigid rods vary what the paper leaves open; ensembles have flexible ro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from itertools import product
 from typing import Any
@@ -16,7 +16,7 @@ import xarray as xr
 from benchmarks import layouts
 from benchmarks.family import REFUSED, Case, Family, Record, each
 from benchmarks.layouts import DANGLE, DZ, Layout, answer, deviation_row
-from benchmarks.page import Columns, mean, table
+from benchmarks.page import Columns, csv_table, mean, table
 from flexclear import dynamics
 from flexclear.dynamics import analyses
 from flexclear.stages import scenes as stages
@@ -132,13 +132,6 @@ def _velocity(rows: list[Record]) -> str:
     """Return the runs of the family's members, and how near their velocity comes to Table 8."""
     of = [r for r in rows if "first" not in r and "velocity" in r]
     found = [1e3 * r["velocity"] for r in of]
-    columns: Columns = {
-        "layout": lambda r: "first" if r.get("first") else "family",
-        **PLACE,
-        "condition": lambda r: f"{r['condition']:.1f}",
-        **ERRORS,
-        "force, ideal [N]": lambda r: f"{r['ideal_reaction']:.0f}",
-    }
     printed = f"{TABLE8.angle:.3e} rad, {TABLE8.displacement:.4f} mm, {TABLE8.velocity:.2f} mm/s"
     return (
         f"Table 8 prints {printed}. Angle and displacement of the {len(of)} members are "
@@ -146,9 +139,24 @@ def _velocity(rows: list[Record]) -> str:
         f"{1e3 * min(r['displacement'] for r in of) / TABLE8.displacement:.2f} to "
         f"{1e3 * max(r['displacement'] for r in of) / TABLE8.displacement:.2f} times the printed ones, as identified; "
         f"the velocity is {min(found):.0f} to {max(found):.0f} mm/s, {min(found) / TABLE8.velocity:.1f} to "
-        f"{max(found) / TABLE8.velocity:.1f} times the printed "
-        f"one.\n\n{table([r for r in rows if 'velocity' in r], columns)}"
+        f"{max(found) / TABLE8.velocity:.1f} times the printed one."
     )
+
+
+#: columns of the file with all runs of the family's members
+MEMBER: Columns = {
+    "layout": lambda r: "first" if r.get("first") else "family",
+    **PLACE,
+    "condition": lambda r: f"{r['condition']:.1f}",
+    **ERRORS,
+    "force, ideal [N]": lambda r: f"{r['ideal_reaction']:.0f}",
+}
+
+
+def files(records: list[Record]) -> Mapping[str, bytes]:
+    """Return the table of the runs of the family's members, by path below docs/."""
+    rows = [r for r in records if r["case"] == "velocity" and "velocity" in r]
+    return {"geometry/velocity.csv": csv_table(rows, MEMBER)} if rows else {}
 
 
 def _open(rows: list[Record]) -> str:
@@ -241,6 +249,7 @@ FAMILY = Family(
     cases=lambda: [Case(name) for name in ROWS],
     measure=each(lambda case: list(ROWS[case.name]())),
     show=show,
+    files=files,
     quick="members",
     times=False,
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.family import Family
 from benchmarks.family import Record as Row
-from benchmarks.page import Columns, mean, png, table
+from benchmarks.page import Columns, csv_table, mean, png, table
 from benchmarks.reference_conditions import claims, design, runs
 from benchmarks.reference_conditions.claims import Rows, at, far_error
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
@@ -125,16 +125,22 @@ def _share(value: float) -> str:
 
 
 def _frequencies(rows: dict[str, list[Row]]) -> str:
-    """Return the vibrations of the mechanism, and the sets with which they are right."""
-    names = (FULL, *CONDITIONS)
-    found = sorted(rows["frequencies"], key=lambda r: (r["place_mm"], names.index(r["condition"]), r["time"]))
-    most = max(len(r["frequency"]) for r in found)
-    columns = {**SET, "time [s]": lambda r: f"{r['time']:g}", **{f"{k + 1}": _vibration(k) for k in range(most)}}
+    """Return the first vibrations of the mechanism at the start, and the sets with which they are right."""
+    found = _by_condition(rows["frequencies"])
     right = [c for c in CONDITIONS if _frequency_error(found, c) < RESOLVED]
     return (
-        f"{table(found, columns)}\n\n"
+        f"{table([r for r in found if r['time'] == 0.0], _vibrations(3))}\n\n"
         f"The first three within {100.0 * RESOLVED:g} % of the full rod's at every place and time: {_or_none(right)}."
     )
+
+
+def _by_condition(rows: list[Row]) -> list[Row]:
+    names = (FULL, *CONDITIONS)
+    return sorted(rows, key=lambda r: (r["place_mm"], names.index(r["condition"]), r["time"]))
+
+
+def _vibrations(most: int) -> Columns:
+    return {**SET, "time [s]": lambda r: f"{r['time']:g}", **{f"{k + 1}": _vibration(k) for k in range(most)}}
 
 
 def _vibration(k: int) -> Callable[[Row], str]:
@@ -153,32 +159,49 @@ def _frequency_error(rows: list[Row], condition: str) -> float:
 
 
 def _far(rows: dict[str, list[Row]]) -> str:
-    """Return effects of the rod, errors and cost with ideal joints."""
-    shown = [r for r in sorted(rows["far"], key=_order) if r["finer"] == 1 and r["condition"] != RIGID]
-    columns: Columns = {
+    """Return effects of the rod and errors with ideal joints, of the sets from COUNT on."""
+    return table(_from_count(_far_rows(rows["far"])), _far_columns(rows["far"]))
+
+
+def _far_rows(rows: list[Row]) -> list[Row]:
+    return [r for r in sorted(rows, key=_order) if r["finer"] == 1 and r["condition"] != RIGID]
+
+
+def _far_columns(rows: list[Row]) -> Columns:
+    return {
+        **SET,
         "angle [rad]": lambda r: f"{r['angle']:.2e}",
         "z [mm]": lambda r: f"{1e3 * r['displacement']:.2e}",
         "v [mm/s]": lambda r: f"{1e3 * r['velocity']:.3g}",
         "force [N]": lambda r: f"{r['force']:.2f}",
-        "off by": lambda r: f"{100.0 * far_error(rows['far'], r):.3g} %",
+        "off by": lambda r: f"{100.0 * far_error(rows, r):.3g} %",
         "pointwise": lambda r: f"{100.0 * r['velocity_error']:.3g} %",
+        **COST,
     }
-    return table(shown, {**SET, **columns, **COST})
+
+
+def _from_count(rows: list[Row]) -> list[Row]:
+    """Return the rows without a count, and of each set at each position the one with the least count from COUNT on."""
+    return [r for r in rows if r["condition"] in (RIGID, FULL) or r is at(rows, r["place_mm"], r["condition"], COUNT)]
+
+
+CLEARANCE: Columns = {
+    **SET,
+    "members": lambda r: str(r["members"]),
+    "peak force [N]": lambda r: mean(r, "peak_force"),
+    "impacts": lambda r: mean(r, "impacts", digits=1),
+    "angle [mrad]": lambda r: mean(r, "angle", 1e3, 3),
+    "z [mm]": lambda r: mean(r, "displacement", 1e3, 4),
+    "v [mm/s]": lambda r: mean(r, "velocity", 1e3, 2),
+    "acceleration [m/s²]": lambda r: mean(r, "acceleration"),
+    **COST,
+}
 
 
 def _clearance(rows: dict[str, list[Row]]) -> str:
     """Return means and spreads over the members with clearance, and why no ensemble has the complete basis."""
-    columns: Columns = {
-        "members": lambda r: str(r["members"]),
-        "peak force [N]": lambda r: mean(r, "peak_force"),
-        "impacts": lambda r: mean(r, "impacts", digits=1),
-        "angle [mrad]": lambda r: mean(r, "angle", 1e3, 3),
-        "z [mm]": lambda r: mean(r, "displacement", 1e3, 4),
-        "v [mm/s]": lambda r: mean(r, "velocity", 1e3, 2),
-        "acceleration [m/s²]": lambda r: mean(r, "acceleration"),
-    }
     more = f"{' and '.join(map(str, MOST_COMPLETE))} coordinates next to {COUNT} show what more would change."
-    return f"{_why_not_all(rows)}{more}\n\n{table(sorted(rows['clearance'], key=_order), {**SET, **columns, **COST})}"
+    return f"{_why_not_all(rows)}{more}\n\n{table(_from_count(sorted(rows['clearance'], key=_order)), CLEARANCE)}"
 
 
 def _why_not_all(rows: dict[str, list[Row]]) -> str:
@@ -251,12 +274,22 @@ FLOOR = 1e-7
 
 
 def files(records: Sequence[Row]) -> dict[str, bytes]:
-    """Return every figure whose rows exist, by path below docs/."""
-    found = {}
-    for name, (group, draw) in FIGURES.items():
-        if rows := [r for r in records if r["case"] == group]:
-            found[f"reference-conditions/{name}.png"] = png(draw(rows), dpi=110)
-    return found
+    """Return every figure and every complete table whose rows exist, by path below docs/."""
+    of: dict[str, list[Row]] = {}
+    for record in records:
+        of.setdefault(record["case"], []).append(record)
+    found = {f"{name}.png": png(draw(of[group]), dpi=110) for name, (group, draw) in FIGURES.items() if group in of}
+    if "frequencies" in of:
+        found["frequencies.csv"] = csv_table(_by_condition(of["frequencies"]), _vibrations(6))
+    if "far" in of:
+        found["far.csv"] = csv_table(_far_rows(of["far"]), _far_columns(of["far"]))
+    if "clearance" in of:
+        found["clearance.csv"] = csv_table(sorted(of["clearance"], key=_order), CLEARANCE)
+    if "far" in of and "clearance" in of:
+        found["claims.csv"] = csv_table(*claims.outcomes(of))
+    if "layouts" in of:
+        found["layouts.csv"] = csv_table(*claims.peaks(of["layouts"]))
+    return {f"reference-conditions/{name}": content for name, content in found.items()}
 
 
 def _draw_compliance(rows: list[Row]) -> Any:

@@ -70,19 +70,13 @@ def _methods(done: Sequence[Record]) -> str:
 
 
 def _reasons(records: Sequence[Record]) -> str:
-    """Return the messages of the cases that did not finish, with their parameters."""
+    """Return the first part of the messages of the cases that did not finish; the log has the rest."""
     lines = [
-        f"- {r['verdict']} ({_place(r)}): {' '.join(r['reason'].split())}\n"
+        f"- {r['verdict']} ({r['sweep']}): {' '.join(r['reason'].split()).partition('; ')[0]}\n"
         for r in records
         if r["verdict"] != FINISHED
     ]
     return f"Messages of the cases that did not finish:\n\n{''.join(lines)}" if lines else ""
-
-
-def _place(record: Record) -> str:
-    if record["sweep"] != "random":
-        return f"{record['sweep']} {record['parameters'][record['sweep']]:.4g}"
-    return "random: " + ", ".join(f"{name} {value:.4g}" for name, value in record["parameters"].items())
 
 
 def _table(records: Sequence[Record]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.families.geometry import JOINTS
 from benchmarks.family import Record as Row
-from benchmarks.page import Columns, mean, table
+from benchmarks.page import Columns, mean
 from benchmarks.reference_conditions.design import FULL, PLACES, RIGID
 from flexclear.post.plotting.table import pipe_table
 
@@ -100,14 +100,27 @@ def numbers_of(groups: dict[str, list[Row]], place: int) -> Rows:
 
 
 def judged(groups: dict[str, list[Row]]) -> str:
-    """Return every claim with its rule and the numbers of each position, as Markdown."""
+    """Return every claim with its outcome, its rule and the numbers of the first position, as Markdown."""
     lines = []
     for claim, outcomes in verdicts(groups):
+        place, (_, numbers) = next(iter(outcomes.items()))
         lines.append(f"**{claim.paper}** {sentence(outcomes)}")
-        lines.append(f"Rule: {claim.rule[0].lower()}{claim.rule[1:]}\n")
-        lines += [f"- {place} mm: {numbers}" for place, (_, numbers) in outcomes.items()]
-        lines.append("")
+        lines.append(f"Rule: {claim.rule[0].lower()}{claim.rule[1:]} At {place} mm: {numbers}.\n")
     return "\n".join(lines)
+
+
+def outcomes(groups: dict[str, list[Row]]) -> tuple[list[Row], Columns]:
+    """Return the rows and the columns of a table of all outcomes, with the numbers of every position."""
+    lines = [
+        {"statement": claim.paper, "joint at [mm]": place, "holds": "yes" if good else "no", "numbers": numbers}
+        for claim, found in verdicts(groups)
+        for place, (good, numbers) in found.items()
+    ]
+    return lines, {name: partial(_cell, name) for name in lines[0]}
+
+
+def _cell(name: str, line: Row) -> str:
+    return str(line[name])
 
 
 def sentence(outcomes: dict[int, tuple[bool, str]]) -> str:
@@ -289,7 +302,7 @@ def layout_verdicts(rows: list[Row]) -> list[tuple[Claim, dict[int, tuple[bool, 
 
 
 def of_layouts(rows: list[Row]) -> str:
-    """Return the number of identified layouts for which each statement holds, the overall verdict, and example numbers.
+    """Return the number of identified layouts for which each statement holds, and the overall verdict.
 
     Rows marked `first` belong to the layout that was assumed earlier; its outcome has a column of its own.
     """
@@ -301,9 +314,7 @@ def of_layouts(rows: list[Row]) -> str:
         own = next((holds for holds, _ in assumed.values()), None)
         judged.append([claim.paper, _yes(own), f"{good} of {len(outcomes)}", _verdict(good, len(outcomes), own)])
     head = ("statement", "first layout", "identified layouts", "over all of them")
-    examples = "\n".join(_numbers(claim, outcomes) for claim, outcomes in layout_verdicts(identified))
-    shown = "Of each statement one layout for which it holds, and one for which it does not:"
-    return f"{pipe_table(head, judged)}\n\n{_peaks(rows)}\n\n{shown}\n\n{examples}"
+    return pipe_table(head, judged)
 
 
 def _yes(holds: bool | None) -> str:
@@ -318,19 +329,8 @@ def _verdict(good: int, of: int, own: bool | None) -> str:
     return "depends on the layout"
 
 
-def _numbers(claim: Claim, outcomes: dict[int, tuple[bool, str]]) -> str:
-    """Return a claim with its first outcome of either kind, holding and not holding, as examples."""
-    lines = [f"- {claim.paper}"]
-    for holds in (True, False):
-        of = {layout: numbers for layout, (good, numbers) in outcomes.items() if good == holds}
-        if of:
-            layout, numbers = next(iter(of.items()))
-            lines.append(f"  - {'holds' if holds else 'does not hold'}, as for layout {layout}: {numbers}")
-    return "\n".join(lines)
-
-
-def _peaks(rows: list[Row]) -> str:
-    """Return a table of the peak contact forces of each layout."""
+def peaks(rows: list[Row]) -> tuple[list[Row], Columns]:
+    """Return the rows and the columns of a table of the peak contact forces of each layout."""
     layouts = sorted({r["layout"] for r in rows})
 
     def peak(condition: str, count: int | None) -> dict[int, Row]:
@@ -347,8 +347,8 @@ def _peaks(rows: list[Row]) -> str:
         found = [peak(*which)[layout] for which in sets]
         place = {name: found[0][name] for name in PLACE} | ({"first": True} if found[0].get("first") else {})
         lines.append(place | {f"{w[0]} {r['count'] or ''}".strip(): r for w, r in zip(sets, found, strict=True)})
-    peaks: Columns = {f"{name} [N]": partial(_peak, name) for name in lines[0] if name not in (*PLACE, "first")}
-    return "Peak contact forces:\n\n" + table(lines, {**LAYOUT, **peaks})
+    forces: Columns = {f"{name} [N]": partial(_peak, name) for name in lines[0] if name not in (*PLACE, "first")}
+    return lines, {**LAYOUT, **forces}
 
 
 def _peak(name: str, line: Row) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -41,8 +42,8 @@ _MODULE = re.compile(r"^flexclear__.*__(\w+?)__(?:recipe|beam_recipe)__(\w+)$|^f
 HEADS = {
     "scene": (
         "Keys of a scene",
-        'A scene is a TOML file. Numbers are SI, or text with a unit (`"20.5 mm"`). Every part may say where its '
-        "values come from in `source`, either one text or one per key.",
+        'A scene is a TOML file. Numbers are SI, or text with a unit (`"20.5 mm"`). A law of time may be a bare '
+        "constant. Every part may say where its values come from in `source`, either one text or one per key.",
     ),
     "recipe": (
         "Keys of a mesh recipe",
@@ -56,12 +57,21 @@ HEADS = {
 WHERE = "Files are checked against what this page is written from (`python -m benchmarks.site`).\n\n"
 EDITS = """## Edits of another file
 
-| key | value | meaning |
-|---|---|---|
-| `extends` | text | scene file that this one edits, relative to it |
-| `[replace.<family>.<name>]` | a part | replaces the old part completely |
-| `[set.<family>.<name>]` | some keys | keys to change; all others are unchanged |
-| `remove` | list of text | paths to remove, such as `"joint.A1"` |
+- `extends`: scene file that this one edits, relative to it
+- `[replace.<family>.<name>]`: a part that replaces the old one completely
+- `[set.<family>.<name>]`: keys to change; all others are unchanged
+- `remove`: list of paths to remove, such as `"joint.A1"`
+
+"""
+#: key, value with default, meaning
+Row = tuple[str, str, str]
+#: sections from which on a common row appears once, in a list of its own
+SEVERAL = 3
+#: longest default and example that the page shows [characters]
+LONGEST, LONGEST_EXAMPLE = 60, 350
+SHARED = """## Keys of several parts
+
+The sections below name these keys without repeating them.
 
 """
 
@@ -73,12 +83,23 @@ def page(kind: str) -> str:
     title, text = HEADS[kind]
     parts = [f"# {title}\n\n{text} {WHERE}"]
     if "properties" in found:
-        parts.append(f"{_table(found, definitions)}\n\n")
+        parts.append(f"{_list(_rows(found, definitions))}\n\n")
     parts += [EDITS] if kind == "scene" else []
-    examples = _examples(kind)
-    for name in _order(found, definitions):
-        parts.append(_section(name, definitions, examples))
+    examples, rows = (
+        _examples(kind),
+        {name: _rows(definitions[name], definitions) for name in _order(found, definitions)},
+    )
+    shared = _shared(row for of in rows.values() for row in of)
+    parts += [f"{SHARED}{_list(shared.values())}\n\n"] if shared else []
+    for name in rows:
+        parts.append(_section(name, definitions, examples, rows, shared))
     return "".join(parts).rstrip() + "\n"
+
+
+def _shared(rows: Iterable[Row]) -> dict[str, Row]:
+    """Return each row that stands in several sections, by key, the most frequent one of its key."""
+    counted = sorted(Counter(rows).items(), key=lambda one: (one[0][0], one[1]))
+    return {row[0]: row for row, times in counted if times >= SEVERAL}
 
 
 def _schema(kind: str) -> dict[str, Any]:
@@ -111,12 +132,28 @@ def _references(node: Any) -> Iterator[str]:
             yield from _references(item)
 
 
-def _section(name: str, definitions: dict[str, Any], examples: dict[str, str]) -> str:
+def _section(
+    name: str, definitions: dict[str, Any], examples: dict[str, str], rows: dict[str, list[Row]], shared: dict[str, Row]
+) -> str:
     part = definitions[name]
     entry = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
-    key = _kind(part)
-    example = f"```toml\n{examples[key]}\n```\n\n" if key in examples else ""
-    return f"## {_heading(name, part)}\n\n{entry}\n\n{_table(part, definitions)}\n\n{example}"
+    base = _base(name, rows)
+    more = [row for row in rows[name] if base is None or row not in rows[base]]
+    own = [row for row in more if shared.get(row[0]) != row]
+    known = ", ".join(row[0] for row in more if row not in own)
+    example = examples.pop(_kind(part), "")  # of two parts of one kind, the first has it
+    texts = [f"## {_heading(name, part)}", entry]
+    texts += [f"All keys of [{_heading(base, definitions[base])}](#{_anchor(base, definitions)})."] if base else []
+    texts += [_list(own)] if own else []
+    texts += [f"[Also](#keys-of-several-parts) {known}."] if known else []
+    texts += [f"```toml\n{example}\n```"] if example else []
+    return "\n\n".join(texts) + "\n\n"
+
+
+def _base(name: str, rows: dict[str, list[Row]]) -> str | None:
+    """Return the largest other part, of several keys, all of which this part has as well, or None."""
+    inner = [other for other, of in rows.items() if len(of) >= SEVERAL and set(of) < set(rows[name])]
+    return max(inner, key=lambda other: len(rows[other]), default=None)
 
 
 def _heading(name: str, part: dict[str, Any]) -> str:
@@ -141,21 +178,25 @@ def _anchor(name: str, definitions: dict[str, Any]) -> str:
     return words.replace(" ", "-")
 
 
-def _table(part: dict[str, Any], definitions: dict[str, Any]) -> str:
-    required = part.get("required", [])
-    rows = []
-    for key, entry in part.get("properties", {}).items():
-        if key == "source":
-            continue
-        default = "needed" if key in required else _default(entry)
-        meaning = "this kind" if "const" in entry else _meaning(entry)
-        rows.append((f"`{key}`", _value(entry, definitions), default, meaning))
-    return table(("key", "value", "default", "meaning"), rows) if rows else "It has no keys."
+def _list(rows: Iterable[Row]) -> str:
+    return "\n".join(f"- {key} ({value}): {meaning}" for key, value, meaning in rows)
+
+
+def _rows(part: dict[str, Any], definitions: dict[str, Any]) -> list[Row]:
+    """Return the rows of a part, without its kind, which its heading names, and without `source`, which all have."""
+    needed = part.get("required", [])
+    return [
+        (f"`{key}`", f"{_value(entry, definitions)}{'; needed' if key in needed else _default(entry)}", _meaning(entry))
+        for key, entry in part.get("properties", {}).items()
+        if key != "source" and "const" not in entry
+    ]
 
 
 def _default(entry: dict[str, Any]) -> str:
     value = entry.get("default")
-    return "-" if value in (None, {}, [], "") or isinstance(value, dict) else f"`{json.dumps(value)}`"
+    if value in (None, {}, [], "") or isinstance(value, dict):
+        return ""
+    return f"; default `{json.dumps(value)}`" if len(json.dumps(value)) < LONGEST else "; default zeros"
 
 
 def _meaning(entry: dict[str, Any]) -> str:
@@ -164,27 +205,26 @@ def _meaning(entry: dict[str, Any]) -> str:
 
 def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
     """Return the permitted values of an entry in words."""
-    if "const" in entry:
-        return f"`{json.dumps(entry['const'])}`"
     if "enum" in entry:
         return ", ".join(f"`{json.dumps(one)}`" for one in entry["enum"])
     if "$ref" in entry:
         name = entry["$ref"].rpartition("/")[2]
-        return f"[{_heading(name, definitions[name])}](#{_anchor(name, definitions)})"
+        shown = f"`{kind}`" if (kind := _kind(definitions[name])) else _heading(name, definitions[name])
+        return f"[{shown}](#{_anchor(name, definitions)})"
     for several in ("anyOf", "oneOf"):
         if several in entry:
             kinds = [_value(one, definitions) for one in entry[several] if one.get("type") != "null"]
             if set(_references(entry)) >= _LAW_KINDS and len(kinds) > 1:
-                return f"[law of time](#{_anchor('Constant', definitions)}), or a constant value"
-            return " or ".join(dict.fromkeys(kinds))
+                return f"[law of time](#{_anchor('Constant', definitions)})"
+            return ", ".join(dict.fromkeys(kinds))
     if "format" in entry:
         return _with_unit(entry["format"])
     return _plain(entry, definitions)
 
 
 def _with_unit(quantity: str) -> str:
-    """Return a quantity with the SI unit of its bare numbers."""
-    return f"{quantity} [{SI[quantity]}]" if SI.get(quantity) else quantity
+    """Return the SI unit of a quantity's bare numbers, or the quantity."""
+    return SI.get(quantity, quantity)
 
 
 def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
@@ -192,14 +232,14 @@ def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
     if kind == "array":
         inner = entry.get("items") or (entry.get("prefixItems") or [{}])[0]
         if "format" in inner and entry.get("maxItems") == 3:
-            return f"three components, {_with_unit(inner['format'])}"
+            return f"3 x {_with_unit(inner['format'])}"
         return f"list of {_value(inner, definitions)}" if inner else "list"
     if kind == "object":
         inner = entry.get("additionalProperties")
         return f"by name: {_value(inner, definitions)}" if isinstance(inner, dict) and inner else "table"
     words = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false"}
     if isinstance(kind, list):
-        return "number or text with a unit"
+        return "number with unit"
     return words.get(str(kind), "any value")
 
 
@@ -213,7 +253,7 @@ def _examples(kind: str) -> dict[str, str]:
             text = _toml(place, part)
             if name and place and (name not in found or len(text) < len(found[name])):
                 found[name] = text
-    return {name: text for name, text in found.items() if len(text) < 900}
+    return {name: text for name, text in found.items() if len(text) < LONGEST_EXAMPLE}
 
 
 def _parts(node: Any, place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
@@ -238,9 +278,3 @@ def _inline(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_inline(item) for item in value) + "]"
     return json.dumps(value, ensure_ascii=False)
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a Markdown table of texts; bars in cells are escaped."""
-    lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

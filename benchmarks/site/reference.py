@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterable
 
 import flexclear as fc
 from benchmarks.page import DOCS
-from benchmarks.site.keys import table
 from flexclear.artifacts import schema as artifacts
 from flexclear.artifacts.coordinates import COORDINATES
 from flexclear.artifacts.schema import Schema
@@ -39,24 +39,20 @@ DATASETS: dict[str, tuple[str, Schema]] = {
 }
 DATASETS_HEAD = """# Datasets
 
-Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Dimensions have coordinates
-with names, so that values are selected by the name of a body, joint, mode or contact. Units are SI, written as UDUNITS
-reads them. This page is written from the schemas that every dataset is checked against (`python -m benchmarks.site`);
-the recipes run as tests.
+Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Values are selected by the
+name of a body, joint, mode or contact. Units are SI, as UDUNITS reads them. `python -m benchmarks.site` writes the
+tables from the schemas that every dataset is checked against; the recipes run as tests.
 
-- **Units of entries.** Where some entries of a variable slide and others turn, as drives do, the variable has no
-  attribute `units`; the coordinate `<variable>_units` then gives the unit of each entry. Where all are of one kind, the
-  attribute is there and the coordinate is not. The coordinate `<dimension>_motion` says which are which.
-- **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that they have the unit m. (Texts that write
-  sqrt(kg) m for mass-normalised modes mean the same numbers.)
-- **Times.** The rows of a run are the regular outputs, and besides them breaks of drives, events and the deepest points
-  of contacts.
-- **Attributes.** `title`; `source`, the version that made the file; `references`, publications of the methods that
-  the scene's parts represent; `parameters` of the scene as JSON; `versions` of libraries; `warnings`. `sources` and
-  `assumptions`, where the values of the scene and of its recipes come from, are attributes of post.nc and of what
-  `flexclear.run` returns, so that another sentence there runs nothing again. No file holds the time or the machine of
-  its making: equal inputs give equal bytes.
-- **Marked `*`:** variables that are there only when the scene has such a part.
+- **Two units** (`N; N m`): the second belongs to entries that turn. Where a variable has both kinds, the coordinate
+  `<variable>_units` gives the unit of each entry, and `<dimension>_motion` its kind; else the attribute `units` does.
+- **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that their unit is m.
+- **Rows** of a run: the regular outputs, breaks of drives, events, and the deepest points of contacts.
+- **Attributes**: `title`; `source`, the version that made the file; `references`, publications of the methods;
+  `parameters` of the scene as JSON; `versions` of libraries; `warnings`. post.nc, and what `flexclear.run` returns,
+  have `sources` and `assumptions` of the scene's values as well. No file names its time or machine: equal inputs give
+  equal bytes.
+- **Lines** below: name, (dimensions), [unit] and meaning; texts have no unit. `*`: of parts that a scene may lack.
+
 """
 
 
@@ -67,14 +63,14 @@ def datasets() -> str:
         "## Recipes\n\n",
         *(_recipe(path.read_text(encoding="utf-8")) for path in sorted(RECIPES.glob("*.py"))),
     ]
-    known: set[str] = set()
+    known: Schema = {}
     for heading, (where, schema) in DATASETS.items():
         own = {name: v for name, v in schema.items() if heading != "Vibrations" or name not in artifacts.EQUILIBRIUM}
-        parts.append(f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_table(own)}\n\n")
-        known |= set(schema)
-    parts.append(
-        f"## Coordinates\n\nThe same names mean the same in all datasets.\n\n{_table(COORDINATES, marks=False)}\n"
-    )
+        parts.append(
+            f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_repeated(own, known)}{_table(own, known)}\n\n"
+        )
+        known = {**own, **known}
+    parts.append(f"## Coordinates\n\nThe same names mean the same in all datasets.\n\n{_coordinates()}\n")
     return "".join(parts)
 
 
@@ -83,18 +79,50 @@ def _recipe(source: str) -> str:
     return f"### {title.removesuffix('.')}\n\n```python\n{code.strip()}\n```\n\n"
 
 
-def _table(schema: Schema, *, marks: bool = True) -> str:
-    rows = [
-        (f"`{name}`{'*' if marks and v.optional else ''}", ", ".join(v.dims) or "-", _units(v), v.long_name)
-        for name, v in schema.items()
-    ]
-    return table(("name", "dimensions", "unit", "meaning"), rows)
+#: endings of the statistics of a variable over the members of an ensemble
+STATISTICS = ("_mean", "_std", "_quantile")
+
+
+def _table(schema: Schema, known: Schema) -> str:
+    """Return the variables as a list, those of `known` left out, and the statistics of a variable in one line."""
+    rows = []
+    for name, v in schema.items():
+        if _known(name, v, known) or name.endswith(STATISTICS[1:]):
+            continue
+        stem, meaning = name.removesuffix(STATISTICS[0]), v.long_name
+        if stem != name:
+            name = f"{stem}{STATISTICS[0]}, {', '.join(STATISTICS[1:])}"
+            meaning = "mean, standard deviation and (first dimension quantile) quantiles over the members"
+        dims = f" ({_dims(v)})" if v.dims else ""
+        rows.append(f"- `{name}`{'*' if v.optional else ''}{dims}{_units(v)}: {meaning}")
+    return _lines(rows)
+
+
+def _coordinates() -> str:
+    return _lines(
+        f"- `{name}`{'' if v.dims == (name,) else f' ({_dims(v)})'}{_units(v)}: {v.long_name}"
+        for name, v in COORDINATES.items()
+    )
+
+
+def _dims(variable: Variable) -> str:
+    return ", ".join(variable.dims)
+
+
+def _known(name: str, variable: Variable, known: Schema) -> bool:
+    return name in known and known[name].long_name == variable.long_name
+
+
+def _repeated(schema: Schema, known: Schema) -> str:
+    """Return a sentence on the variables that an earlier dataset has, with their dimensions here."""
+    same = [f"`{name}`{f' ({_dims(v)})' if v.dims else ''}" for name, v in schema.items() if _known(name, v, known)]
+    return f"With the meanings above: {', '.join(same)}.\n\n" if same else ""
 
 
 def _units(variable: Variable) -> str:
-    if not variable.units:
-        return "words"
-    return f"{variable.units}; {variable.turning} where it turns" if variable.turning else variable.units
+    """Return the unit in brackets; nothing for words."""
+    units = "; ".join(unit for unit in (variable.units, variable.turning) if unit)
+    return f" [{units}]" if units else ""
 
 
 QUANTITIES = """# Quantities
@@ -113,7 +141,7 @@ fc.quantity(run, "force(pin) - force(main)")
 
 - `<owner>.<word>` as in `slider.position`; `slider.position.x` is a component along x, y or z of the world.
 - Where a part is a body and a joint at the same time, the word means the first of the owners below that has it.
-  The second word of the table says which one is meant: `guide.joint_position`.
+  The second word of a line says which one is meant: `guide.joint_position`.
 - `force(A1)` is another way to write `A1.force`.
 - What belongs to the whole mechanism has no owner: `kinetic`.
 - Expressions have `+ - * / ^`, parentheses, numbers with units, the time `t` and the functions `max`, `min`, `abs`,
@@ -132,18 +160,23 @@ def quantities() -> str:
     """Return docs/reference/quantities.md: every quantity with its unit, and the reductions of sweeps."""
     parts = [QUANTITIES]
     for dim, owner in OWNERS.items():
-        rows = [
-            (", ".join(f"`{word}`" for word in _words(key)), " or ".join(dict.fromkeys(kind.units)), _meaning(kind))
-            for key, kind in KINDS.items()
-            if kind.owner == dim and kind.variable
-        ]
-        parts.append(f"## {owner[0].upper()}{owner[1:]}\n\n{table(('word', 'unit', 'meaning'), rows)}\n\n")
-    reductions = [(f"`{name}`", meaning) for name, meaning in SERIES.items()]
-    of_contacts = [
-        (f"`{kind}.{name}`", meaning) for kind, few in CONTACT_REDUCTIONS.items() for name, meaning in few.items()
-    ]
-    parts.append(f"## Reductions, of sweeps\n\n{table(('name', 'meaning'), reductions + of_contacts)}\n")
+        shown = _lines(_quantity(key, kind) for key, kind in KINDS.items() if kind.owner == dim and kind.variable)
+        parts.append(f"## {owner[0].upper()}{owner[1:]}\n\n{shown}\n\n")
+    reductions = [(name, meaning) for name, meaning in SERIES.items()]
+    for kind, few in CONTACT_REDUCTIONS.items():
+        reductions += [(f"{kind}.{name}", meaning) for name, meaning in few.items()]
+    shown = _lines(f"- `{name}`: {meaning}" for name, meaning in reductions)
+    parts.append(f"## Reductions, of sweeps\n\n{shown}\n")
     return "".join(parts)
+
+
+def _quantity(key: str, kind: Kind) -> str:
+    words = ", ".join(f"`{word}`" for word in _words(key))
+    return f"- {words} [{' or '.join(dict.fromkeys(kind.units))}]: {_meaning(kind)}"
+
+
+def _lines(rows: Iterable[str]) -> str:
+    return "\n".join(rows)
 
 
 def _words(key: str) -> list[str]:

@@ -7,7 +7,7 @@ import html
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,21 +100,21 @@ def paper_markdown(content: Content) -> str:
     """Return docs/paper.md: all figures and tables with scenes and commands, the tables, assumptions, discrepancies."""
     parts = [
         "# The paper, reproduced\n",
-        f"{CITATION}. This page is written by `{PROGRAM}`; every number on it was computed by the "
-        "commands next to it.\n",
-        f"`make all` makes everything below. `flexclear run` brings the named scenes up to date, `{PROGRAM}` "
-        "draws every figure and table into `results/figures` and `results/tables`.\n",
+        f"{CITATION}. `make all` computes every number of this page: `flexclear run` brings scenes up to date, "
+        f"`{PROGRAM}` then draws figures and tables into `results/figures` and `results/tables`, and writes this "
+        "page.\n",
         "## Figures and tables\n",
         _index(),
         "## Tables\n",
-        *(_table(name, table) for name, table in content.tables.items()),
+        "Tables of given parameters, and what could not be integrated: `results/tables`.\n",
+        *_results(content.tables),
         "## Assumptions\n",
-        "Values that the paper does not print. Each is marked `assumed` in its scene file.\n",
-        _pipe(("value", "assumption", "scenes"), assumption_rows(content)),
+        "Values that the paper does not print, without those that follow from others. Each is marked `assumed` in "
+        "its scene file.\n",
+        _pipe(("value", "assumption", "scenes"), [r for r in assumption_rows(content) if "follows from" not in r[1]]),
         "## Discrepancies\n",
-        "What the paper leaves open or prints in conflict with itself. Differences in numbers stand below each "
-        "table. Which of its statements on mode sets hold, and for which position of the prismatic joint: "
-        "[reference-conditions.md](reference-conditions.md).\n",
+        "What the paper leaves open or prints in conflict with itself. Which of its statements on mode sets hold, and "
+        "for which position of the prismatic joint: [reference-conditions.md](reference-conditions.md).\n",
         _pipe(("place", "matter", "here"), DISCREPANCIES),
     ]
     return "\n".join(parts)
@@ -148,25 +148,24 @@ def scenes_of(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(reference.partition(":")[0] for reference in figures.figure(name).needs))
 
 
-def command(name: str) -> str:
-    """Return the command that makes one figure or table."""
-    scenes = [scene for scene in scenes_of(name) if "/" in scene]
-    return f"flexclear run {' '.join(scenes)} && {PROGRAM}" if scenes else PROGRAM
-
-
 def _index() -> str:
     rows = []
     for name in figures.NAMES:
         scenes = ", ".join(
             f"`{scene}`" if "/" in scene else f"timing of the `{scene}` scenes" for scene in scenes_of(name)
         )
-        rows.append((figures.figure(name).title, scenes, f"`{command(name)}`"))
-    return _pipe(("figure or table", "scenes", "command"), rows)
+        rows.append((figures.figure(name).title, scenes))
+    return _pipe(("figure or table", "scenes"), rows)
 
 
-def _table(name: str, table: Table) -> str:
-    notes = "".join(f"\n{note}\n" for note in table.notes)
-    return f"### {table.title}\n\n`{command(name)}`\n\n{_pipe(table.columns, table.rows)}{notes}"
+def _results(tables: Mapping[str, Table]) -> Iterator[str]:
+    """Yield the tables of results, each note once."""
+    known: set[str] = set()
+    for table in (table for name, table in tables.items() if name not in PARAMETERS):
+        new = [note for note in table.notes if note not in known and not note.startswith("What could not be")]
+        known |= set(new)
+        notes = "".join(f"\n{note}\n" for note in new)
+        yield f"### {table.title}\n\n{_pipe(table.columns, table.rows)}{notes}"
 
 
 def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -228,6 +227,8 @@ VERDICTS = "table_verdicts"
 GOOD, BAD = ("holds",), ("does not hold",)
 #: tables with the paper's given parameters; the others compare results
 GIVEN = ("table01", "table02", "table03", "table04", "table05", "table06")
+#: those of them that only repeat parameters
+PARAMETERS = ("table01", "table02", "table03", "table06")
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,11 +84,11 @@ def test_equal_assumptions_of_scenes_are_listed_once_and_different_ones_all():
     ]
 
 
-def test_paper_page_lists_every_figure_with_its_command(content):
+def test_paper_page_lists_every_figure_with_its_scenes(content):
     text = report.paper_markdown(content)
     for name in figures.NAMES:
         assert f"| {figures.figure(name).title} |" in text
-        assert f"`{report.command(name)}`" in text
+        assert all(f"`{scene}`" in text for scene in report.scenes_of(name) if "/" in scene)
     assert "| equal error: integration (ideal = 1) |" in text
 
 

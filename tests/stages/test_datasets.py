@@ -57,8 +57,7 @@ def test_pages_are_what_the_sources_say() -> None:
 @pytest.mark.parametrize("kind", keys.HEADS)
 def test_every_key_has_a_meaning(kind: str) -> None:
     """In words of its own, next to the name of its unit."""
-    found = re.findall(r"^## (.+)$|^\| `(\w+)` \| .*? \| (?:needed|-|`.*?`) \| (.*) \|$", keys.page(kind), re.MULTILINE)
-    rows = [(key, meaning) for _, key, meaning in found if key]
+    rows = re.findall(r"^- `(\w+)` \(.*?\): ?(.*)$", keys.page(kind), re.MULTILINE)
     assert len(rows) > 15
     assert [key for key, meaning in rows if not meaning.strip()] == []
 
