@@ -42,11 +42,11 @@ def widest(d, values, solved):
     """Return the largest of the closure rows' values, angles times the mechanism's size [m, or m/s].
 
     solved: whether only selected rows count.  Lengths of an independent mechanism are scaled up by the ratio of the
-    whole scene's size to its own.
+    whole scene's size to its own; a small one within a large one closes only to the rounding of its coordinates.
     """
-    result, arm = 0.0, d.length
+    result, arm, rounding = 0.0, d.length, 8.9e-16 * d.length / d.rtol  # four roundings of a length
     for c in range(d.n_closures):
-        closure, weight = d.closures[c], d.closure_numbers[c].weight
+        closure, weight = d.closures[c], max(d.length / max(d.closure_numbers[c].extent, rounding), 1.0)
         for k in range(closure.row0, closure.row0 + (closure.n_kept if solved else closure.n_rows)):
             size = abs(values[k]) * (weight if d.closure_rows[k].kind == 0 else arm)
             if not size <= result:
