@@ -27,18 +27,11 @@ from flexclear.dynamics.integrate.stepper import AGAIN, NO_GUARDS, RESTART
 from flexclear.dynamics.integrate.within_step import make_evaluate_at, make_repeat
 from flexclear.dynamics.kernels import kernel
 
-#: mode changes at one and the same time before the solver gives up (Zeno)
-MOST_IMMEDIATE = 200
 #: the dense output of a long step misplaces what a contact does in a small fraction of it; the step is then repeated,
 #: at most so often, with this fraction of its length or more
 MOST_SHORTENED, REPEATED_FRACTION = 8, 0.1
 #: a contact that begins deeper than this fraction of its clearance, and so many tolerances, has been stepped over
 DEPTH_STEPPED_OVER, ERRORS = 1e-6, 100.0
-#: fraction of its length by which a step may miss the event on which it must end
-EVENT_MISS = 1e-6
-#: a contact that would end where it has just begun is resolved by shorter steps, down to one in which it moves by so
-#: many times the error of its gap
-FURTHER = 10.0
 
 
 # Modes ---------------------------------------------------------------------------------------------------------------
@@ -127,7 +120,9 @@ def backwards(d, c, rate):
 def resolvable(d, c, step):
     """Return True when contact c moves further in a step than the uncertainty of its gap at the start."""
     watch = d.watch[c]
-    return abs(watch.rate0) * step > FURTHER * max(abs(watch.gap0), zero_gap(d, c))
+    # a contact that would end where it has just begun is resolved by shorter steps, down to one in which it moves by so
+    # many times the error of its gap
+    return abs(watch.rate0) * step > 10.0 * max(abs(watch.gap0), zero_gap(d, c))
 
 
 def make_resolve_events(
@@ -162,7 +157,8 @@ def make_resolve_events(
                 return step, False
             off = gap / rate
             step += off
-        return step, abs(off) <= EVENT_MISS * step
+        # fraction of its length by which a step may miss the event on which it must end
+        return step, abs(off) <= 1e-6 * step
 
     _, note_end, accept, make_end_on_guard = guards
     end_on_guard = make_end_on_guard(evaluate_at, extend, repeat)
@@ -195,7 +191,8 @@ def make_resolve_events(
             return give_up(d, m.STEPPED_OVER, c)
         d.watch[c].rate1 = d.touch[c].rate
         change_mode(d, events, c, t)
-        return give_up(d, m.STUCK_EVENT, c) if d.immediate > MOST_IMMEDIATE else RESTART
+        # mode changes at one and the same time before the solver gives up (Zeno)
+        return give_up(d, m.STUCK_EVENT, c) if d.immediate > 200 else RESTART
 
     @kernel
     def resolve_events(d, step, t_new, rows, events):

@@ -14,12 +14,6 @@ from flexclear.dynamics.kernels import kernel
 
 #: the remaining error may be this fraction of the tolerance, or ten roundings if that is more
 TOLERANCE_FRACTION, TEN_ROUNDINGS = 1e-2, 2.2e-15
-#: a first correction this far below the limit needs no second one to know how fast they fall
-SMALL_CORRECTION = 1e-3
-#: corrections that fall slower than this request a new Jacobian at the next step
-SLOW_CONVERGENCE = 0.3
-#: perturbation of a Jacobian's column, relative to the variable's size: root of the rounding error
-COLUMN_STEP = 1e-8
 # first floats that implicit methods store: step of the factors, whether the Jacobian still holds, length of the step
 # before; and the first of their matrices
 FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(4)
@@ -39,7 +33,8 @@ def converged(k, norm, last_norm, rtol):
     if not norm <= 1e300:
         return -1
     if k == 0:
-        return 1 if norm <= SMALL_CORRECTION * enough else 0
+        # a first correction this far below the limit needs no second one to know how fast they fall
+        return 1 if norm <= 1e-3 * enough else 0
     rate = norm / last_norm
     if rate < 1.0 and rate / (1.0 - rate) * norm < enough:
         return 1
@@ -68,7 +63,8 @@ def make_jacobian(evaluate: Callable) -> Callable:
                     d.w[J + size * i + k] = 0.0
                 continue
             value = d.w[y + k]
-            d.y_stage[k] = value + COLUMN_STEP * (d.floors[d.groups[k].group].natural + abs(value))
+            # perturbation of a Jacobian's column, relative to the variable's size: root of the rounding error
+            d.y_stage[k] = value + 1e-8 * (d.floors[d.groups[k].group].natural + abs(value))
             change = d.y_stage[k] - value
             evaluate(d, t, d.at_y_stage, near)
             d.evaluations += 1
@@ -103,7 +99,8 @@ def make_solve(jacobian: Callable, factorise: Callable, predict: Callable, itera
             predict(d, step)
             rate = iterate(d, step)
             if rate >= 0.0:
-                d.memory[JACOBIAN_HOLDS] = 1.0 if rate <= SLOW_CONVERGENCE else 0.0
+                # corrections that fall slower than this request a new Jacobian at the next step
+                d.memory[JACOBIAN_HOLDS] = 1.0 if rate <= 0.3 else 0.0
                 return True
             d.memory[JACOBIAN_HOLDS] = 0.0
             if fresh:

@@ -32,10 +32,6 @@ from flexclear.dynamics.kernels import kernel
 RESTART = 1
 #: returned for a step of given length that cannot end on the event inside it; other negative numbers end the run
 AGAIN = -2
-#: a step below this fraction of the planned one has been cut short
-CUT = 0.9
-#: such a step is tried again with this fraction of its length
-RETRY_FRACTION = 0.3
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
@@ -45,14 +41,13 @@ FAILED = 1e9
 PENDING = -1.0
 #: stage of a complete attempt that waits for the rates at its end
 ENDING = 1 << 30
-#: a step below this fraction of the time reached cannot be distinguished from rounding
-SMALLEST_STEP = 4e-16
 
 
 @kernel
 def plan(d, step, following):
     """Return the next step to attempt; a step that was cut short does not limit it."""
-    least = d.step if step < CUT * d.step else 0.0
+    # a step below this fraction of the planned one has been cut short
+    least = d.step if step < 0.9 * d.step else 0.0
     d.step = max(following, least)
 
 
@@ -310,7 +305,8 @@ def make_advance(
             return 0.0
         if t + 1.0001 * step >= d.end:
             step = d.end - t
-        if step > SMALLEST_STEP * max(abs(t), d.span):
+        # a step below this fraction of the time reached cannot be distinguished from rounding
+        if step > 4e-16 * max(abs(t), d.span):
             return step
         if d.evaluation == m.NOT_FINITE:
             d.status = m.NOT_A_NUMBER
@@ -350,7 +346,8 @@ def make_advance(
             happened, known, t_end, step = resolve(d, step, t_new, rows, events)
             if happened == AGAIN and d.fixed == 0.0 and not along:  # a polynomial would be the same again
                 d.rejected += 1
-                d.step, d.rejected_step = RETRY_FRACTION * step, 0.0
+                # such a step is tried again with this fraction of its length
+                d.step, d.rejected_step = 0.3 * step, 0.0
                 continue
             if happened < 0:
                 return False
