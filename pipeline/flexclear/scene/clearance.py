@@ -283,60 +283,66 @@ class _Clearance(_Contact):
     """half the difference of the diameters"""
 
 
-class ClearanceSpherical(_Clearance):
-    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+class _Ball(_Contact):
+    """Keys of all contacts of a ball."""
 
-    surfaces, ideal = ("socket", "ball"), "spherical"
-    type: Literal["clearance-spherical"]
     ball_radius: Annotated[Length, Positive]
     """radius of the ball"""
-    socket_material: Material | None = None
-    """elastic constants, for the stiffness"""
     ball_material: Material | None = None
     """elastic constants, for the stiffness"""
+
+
+class _Worn(_Clearance):
+    """Keys of joints whose wear can be computed."""
+
     wear: Wear | None = None
     """wear of both surfaces; default: none"""
 
 
-class ClearanceRevolute(_Clearance):
-    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
+class Pin(_Clearance):
+    """Keys of all joints of a pin, whose surfaces meet along a line."""
 
-    surfaces, held, ideal = ("journal", "pin"), "planar", "revolute"
-    across, plane = (0, 1), (0, 1)
-    type: Literal["clearance-revolute"]
+    held, plane = "planar", (0, 1)
     pin_radius: Annotated[Length, Positive]
     """radius of the pin"""
     length: Annotated[Length, Positive]
     """length of the bearing along the axis"""
-    journal_material: Material | None = None
-    """elastic constants, for the stiffness"""
     pin_material: Material | None = None
     """elastic constants, for the stiffness"""
-    wear: Wear | None = None
-    """wear of both surfaces; default: none"""
 
 
-class ClearanceSlot(_Clearance):
+class ClearanceSpherical(_Ball, _Worn):
+    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+
+    surfaces, ideal = ("socket", "ball"), "spherical"
+    type: Literal["clearance-spherical"]
+    socket_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+
+class ClearanceRevolute(Pin, _Worn):
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
+
+    surfaces, ideal, across = ("journal", "pin"), "revolute", (0, 1)
+    type: Literal["clearance-revolute"]
+    journal_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+
+class ClearanceSlot(Pin):
     """Pin in a straight slot with round ends; between = [slot frame, pin frame].
 
     The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
     """
 
-    surfaces, held, ideal = ("slot", "pin"), "planar", "slot"
-    across, plane, middle = (1,), (0, 1), "centre line"
+    surfaces, ideal, across, middle = ("slot", "pin"), "slot", (1,), "centre line"
     type: Literal["clearance-slot"]
     clearance: Annotated[Length, Positive]
     """half the slot's width minus the pin's radius"""
     travel: Annotated[Length, Positive]
     """travel of the pin's centre along the slot's middle line, from the centre of one end's half circle to that of the
     other"""
-    pin_radius: Annotated[Length, Positive]
-    """radius of the pin"""
-    length: Annotated[Length, Positive]
-    """length of the bearing along the axis"""
     slot_material: Material | None = None
-    """elastic constants, for the stiffness"""
-    pin_material: Material | None = None
     """elastic constants, for the stiffness"""
 
     @property
@@ -345,7 +351,7 @@ class ClearanceSlot(_Clearance):
         return 0.5 * self.travel, 0.0
 
 
-class BallOnPlane(_Contact):
+class BallOnPlane(_Ball):
     """Ball above an unbounded plane; between = [plane frame, ball frame].
 
     The plane contains x and y of its frame; the ball is on the side of z.
@@ -353,11 +359,7 @@ class BallOnPlane(_Contact):
 
     surfaces, hollow, plane = ("plane", "ball"), False, (0, 2)
     type: Literal["ball-on-plane"]
-    ball_radius: Annotated[Length, Positive]
-    """radius of the ball"""
     plane_material: Material | None = None
-    """elastic constants, for the stiffness"""
-    ball_material: Material | None = None
     """elastic constants, for the stiffness"""
 
     @property

@@ -12,16 +12,9 @@ from collections.abc import Callable
 from typing import Any
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate import mode_changes
 from flexclear.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
 from flexclear.dynamics.integrate.method import slope
-from flexclear.dynamics.integrate.mode_changes import (
-    NO_CHANGE,
-    cubic_tells,
-    ends_tell,
-    make_locate_change,
-    side,
-    zero_gap,
-)
 from flexclear.dynamics.integrate.recording import add_event
 from flexclear.dynamics.integrate.stepper import AGAIN, NO_GUARDS, RESTART
 from flexclear.dynamics.integrate.within_step import make_evaluate_at, make_repeat
@@ -113,7 +106,7 @@ def backwards(d, c, rate):
 
     Fixed steps and polynomials cannot be shortened.
     """
-    return side(d, c) * rate < 0.0 and d.fixed == 0.0 and d.collocated == 0.0
+    return mode_changes.side(d, c) * rate < 0.0 and d.fixed == 0.0 and d.collocated == 0.0
 
 
 @kernel
@@ -122,7 +115,7 @@ def resolvable(d, c, step):
     watch = d.watch[c]
     # a contact that would end where it has just begun is resolved by shorter steps, down to one in which it moves by so
     # many times the error of its gap
-    return abs(watch.rate0) * step > 10.0 * max(abs(watch.gap0), zero_gap(d, c))
+    return abs(watch.rate0) * step > 10.0 * max(abs(watch.gap0), mode_changes.zero_gap(d, c))
 
 
 def make_resolve_events(
@@ -138,7 +131,7 @@ def make_resolve_events(
     last = method.last
     evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
     follow_contacts = make_follow_contacts(evaluate, evaluate_at, extend, method, regimes)
-    locate_change = make_locate_change(evaluate_at)
+    locate_change = mode_changes.make_locate_change(evaluate_at)
 
     @kernel
     def end_on_event(d, step, c):
@@ -151,7 +144,7 @@ def make_resolve_events(
             if not repeat(d, step):
                 return -1.0, False
             gap, rate = d.touch[c].gap, d.touch[c].rate
-            if abs(gap) <= zero_gap(d, c):
+            if abs(gap) <= mode_changes.zero_gap(d, c):
                 return step, True
             if not abs(gap) < 0.1 * abs(rate) * step:
                 return step, False
@@ -166,9 +159,9 @@ def make_resolve_events(
     @kernel
     def first_change(d, step):
         """Return contact and fraction of the step of the first mode change, and whether the dense output is ready."""
-        ready, first, which = False, NO_CHANGE, -1
+        ready, first, which = False, mode_changes.NO_CHANGE, -1
         for c in range(d.n_contacts):
-            if not (ends_tell(d, c) or cubic_tells(d, c, step)):
+            if not (mode_changes.ends_tell(d, c) or mode_changes.cubic_tells(d, c, step)):
                 continue
             if not ready:
                 extend(d, step)

@@ -30,21 +30,8 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.integrate import hermite
+from flexclear.dynamics.integrate import hermite, newton
 from flexclear.dynamics.integrate.method import Method, matrix, slope, vector
-from flexclear.dynamics.integrate.newton import (
-    FACTORED_STEP,
-    FLOATS,
-    JACOBIAN,
-    JACOBIAN_HOLDS,
-    LAST_STEP,
-    converged,
-    limit,
-    lu_factor,
-    lu_solve,
-    make_jacobian,
-    make_solve,
-)
 from flexclear.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
 from flexclear.dynamics.kernels import kernel
 from flexclear.scene.integrators import INTEGRATORS
@@ -99,10 +86,10 @@ def gain(d, step, i):
 @kernel
 def by_rate(d, step, i, k):
     """Return the derivative of rate i at the end of the step by rate k there, through speeds and positions."""
-    row, total = matrix(d, JACOBIAN) + d.ny * (d.nq + i), 0.0
+    row, total = matrix(d, newton.JACOBIAN) + d.ny * (d.nq + i), 0.0
     if k < d.nv:
         for q in range(d.nq):
-            total += d.w[row + q] * d.w[matrix(d, JACOBIAN) + d.ny * q + d.nq + k]
+            total += d.w[row + q] * d.w[matrix(d, newton.JACOBIAN) + d.ny * q + d.nq + k]
     return gain(d, step, k) * d.w[row + d.nq + k] + coefficients(d)[2] * step * step * total
 
 
@@ -115,14 +102,14 @@ def factorise(d, step):
         for k in range(size):
             d.w[S + size * i + k] = -weight * by_rate(d, step, i, k)
         d.w[S + (size + 1) * i] += own_weight(d, i)
-    d.memory[FACTORED_STEP] = step
-    return lu_factor(d.w, S, vector(d, PIVOTS), size)
+    d.memory[newton.FACTORED_STEP] = step
+    return newton.lu_factor(d.w, S, vector(d, PIVOTS), size)
 
 
 @kernel
 def solve(d, b):
     """Solve Newton's system in place for the right-hand side at index b."""
-    lu_solve(d.w, matrix(d, NEWTON), vector(d, PIVOTS), n_rates(d), b)
+    newton.lu_solve(d.w, matrix(d, NEWTON), vector(d, PIVOTS), n_rates(d), b)
 
 
 @kernel
@@ -138,7 +125,7 @@ def rates_norm(d, step, a):
 @kernel
 def predict(d, step):
     """Rescale the accelerations at the start to this step, and guess the rates at its end."""
-    nq, share = d.nq, step / d.memory[LAST_STEP]
+    nq, share = d.nq, step / d.memory[newton.LAST_STEP]
     for k in range(d.nv):
         now = d.slopes[nq + k]
         a = now + share * (d.w[vector(d, OLD) + k] - now)
@@ -155,14 +142,14 @@ def keep(d, step):
         d.w[vector(d, OLD) + k] = d.w[vector(d, NEW) + k]
     for c in range(d.ny):
         d.w[vector(d, SLOPE_BEFORE) + c] = d.slopes[c]
-    d.memory[LAST_STEP] = step
+    d.memory[newton.LAST_STEP] = step
 
 
 @kernel
 def error(d, step):
     """Return the norm of the local error, 1 at the tolerance."""
     size, start, end, before = d.ny, slope(d, 0), slope(d, ITERATE), vector(d, SLOPE_BEFORE)
-    out, length = slope(d, ESTIMATE), d.memory[LAST_STEP]
+    out, length = slope(d, ESTIMATE), d.memory[newton.LAST_STEP]
     for c in range(size):
         f0, f1 = d.w[start + c], d.w[end + c]
         bend = ((f1 - f0) / step - (f0 - d.w[before + c]) / length) / (step + length)
@@ -194,8 +181,8 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             d.w[vector(d, SLOPE_BEFORE) + c] = d.w[first + c] - change
             if d.nq <= c < d.nq + d.nv:
                 d.w[vector(d, OLD) + c - d.nq] = d.w[first + c] + (alpha_m - alpha_f) * change
-        d.memory[LAST_STEP] = step
-        d.memory[JACOBIAN_HOLDS] = 0.0
+        d.memory[newton.LAST_STEP] = step
+        d.memory[newton.JACOBIAN_HOLDS] = 0.0
         d.evaluation = m.OK
 
     @kernel
@@ -212,7 +199,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callable]:
     """Build the kernels place_end(d, step, out) and solve_step(d, step)."""
-    jacobian = make_jacobian(evaluate)
+    jacobian = newton.make_jacobian(evaluate)
 
     @kernel
     def place_end(d, step, out):
@@ -256,7 +243,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
                 d.w[vector(d, NEW) + i] += d.w[left + i]
             norm = rates_norm(d, step, left)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = converged(k, norm, last_norm, d.rtol)
+            verdict = newton.converged(k, norm, last_norm, d.rtol)
             if verdict != 0:
                 return rate if verdict > 0 else -1.0
             last_norm = norm
@@ -281,7 +268,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
     @kernel
     def iterate_damped(d, step):
         """Iterate damped with a new Newton matrix each time: for friction that saturates within a step."""
-        t, enough = d.time + step, limit(d.rtol)
+        t, enough = d.time + step, newton.limit(d.rtol)
         correction = vector(d, CORRECTION)
         if not residual(d, step):
             return False
@@ -300,7 +287,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
                 return False
         return False
 
-    simplified = make_solve(jacobian, factorise, predict, iterate)
+    simplified = newton.make_solve(jacobian, factorise, predict, iterate)
 
     @kernel
     def solve_step(d, step):
@@ -320,7 +307,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
 METHOD = Method(
     traits=INTEGRATORS["generalized-alpha"],
-    room=m.Room(ROWS, hermite.ROWS, FLOATS, VECTORS, MATRICES),
+    room=m.Room(ROWS, hermite.ROWS, newton.FLOATS, VECTORS, MATRICES),
     last=LAST,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,

@@ -15,21 +15,8 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.integrate import hermite
+from flexclear.dynamics.integrate import hermite, newton
 from flexclear.dynamics.integrate.method import Method, matrix, slope, vector
-from flexclear.dynamics.integrate.newton import (
-    FACTORED_STEP,
-    FLOATS,
-    JACOBIAN,
-    LAST_STEP,
-    converged,
-    lu_factor,
-    lu_factor_complex,
-    lu_solve,
-    lu_solve_complex,
-    make_jacobian,
-    make_solve,
-)
 from flexclear.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
 from flexclear.dynamics.kernels import kernel
 from flexclear.scene.integrators import INTEGRATORS
@@ -81,7 +68,7 @@ REAL, COMPLEX, MATRICES = 1, 2, 4
 @kernel
 def factorise(d, step):
     """Factorise both systems for a step; return False when one is singular."""
-    size, jacobian, real, rest = d.ny, matrix(d, JACOBIAN), matrix(d, REAL), matrix(d, COMPLEX)
+    size, jacobian, real, rest = d.ny, matrix(d, newton.JACOBIAN), matrix(d, REAL), matrix(d, COMPLEX)
     for o in range(size * size):
         d.w[real + o] = d.w[rest + 2 * o] = -d.w[jacobian + o]
         d.w[rest + 2 * o + 1] = 0.0
@@ -89,15 +76,15 @@ def factorise(d, step):
         d.w[real + o] += MU_REAL / step
         d.w[rest + 2 * o] += MU_REST / step
         d.w[rest + 2 * o + 1] = MU_IMAG / step
-    d.memory[FACTORED_STEP] = step
+    d.memory[newton.FACTORED_STEP] = step
     real_pivots, complex_pivots = vector(d, REAL_PIVOTS), vector(d, COMPLEX_PIVOTS)
-    return lu_factor(d.w, real, real_pivots, size) and lu_factor_complex(d.w, rest, complex_pivots, size)
+    return newton.lu_factor(d.w, real, real_pivots, size) and newton.lu_factor_complex(d.w, rest, complex_pivots, size)
 
 
 @kernel
 def solve_real(d, b):
     """Solve the real system in place for the right-hand side at index b."""
-    lu_solve(d.w, matrix(d, REAL), vector(d, REAL_PIVOTS), d.ny, b)
+    newton.lu_solve(d.w, matrix(d, REAL), vector(d, REAL_PIVOTS), d.ny, b)
 
 
 @kernel
@@ -133,13 +120,13 @@ def extend(d, step):
 def keep(d, step):
     """Store the polynomial of an accepted step, which predicts the stages of the next."""
     write_polynomial(d, vector(d, POLYNOMIAL))
-    d.memory[LAST_STEP] = step
+    d.memory[newton.LAST_STEP] = step
 
 
 @kernel
 def begin(d):
     """Discard the polynomial; the Jacobian serves until iterations converge slowly, whatever the contacts' modes."""
-    d.memory[LAST_STEP] = 0.0
+    d.memory[newton.LAST_STEP] = 0.0
 
 
 # Newton's iteration --------------------------------------------------------------------------------------------------
@@ -162,7 +149,7 @@ def predict(d, step):
     first iterate at a contact's begin would have no penetration, and the force in the second would look like
     divergence.
     """
-    length, o, size = d.memory[LAST_STEP], vector(d, POLYNOMIAL), d.ny
+    length, o, size = d.memory[newton.LAST_STEP], vector(d, POLYNOMIAL), d.ny
     for i in range(3):
         x = 1.0 + C[i] * step / length if length > 0.0 else 0.0
         for c in range(size):
@@ -239,16 +226,16 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             residuals(d, step)
             solve_real(d, vector(d, CORRECTION))
             pivots, rest = vector(d, COMPLEX_PIVOTS), vector(d, CORRECTION + 1)
-            lu_solve_complex(d.w, matrix(d, COMPLEX), pivots, size, rest)
+            newton.lu_solve_complex(d.w, matrix(d, COMPLEX), pivots, size, rest)
             norm = correct(d)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = converged(k, norm, last_norm, d.rtol)
+            verdict = newton.converged(k, norm, last_norm, d.rtol)
             if verdict != 0:
                 return rate if verdict > 0 else -1.0
             last_norm = norm
         return -1.0
 
-    solve_step = make_solve(make_jacobian(evaluate), factorise, predict, iterate)
+    solve_step = newton.make_solve(newton.make_jacobian(evaluate), factorise, predict, iterate)
 
     @kernel
     def attempt(d, step):
@@ -279,7 +266,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 METHOD = Method(
     traits=INTEGRATORS["radau"],
-    room=m.Room(ROWS, hermite.ROWS, FLOATS, VECTORS, MATRICES),
+    room=m.Room(ROWS, hermite.ROWS, newton.FLOATS, VECTORS, MATRICES),
     last=LAST,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,

@@ -21,6 +21,7 @@ from flexclear.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.dynamics.model.merge import rigid_inertia
 from flexclear.dynamics.model.mobility import moves
 from flexclear.dynamics.model.model import Model, filled
+from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.fields import Part
 from flexclear.scene.formulas import formula
 from flexclear.scene.schema import Scene
@@ -29,8 +30,7 @@ from flexclear.scene.schema import Scene
 KEYS = {
     "time": "end",
     "body": "mass com inertia",
-    "joint": "clearance ball_radius pin_radius length travel ball_material socket_material pin_material "
-    "journal_material slot_material plane_material normal friction floor initial_approach_speed",
+    "joint": " ".join({key for kind in CONTACTS for key in kind.model_fields} - {"type", "between", "source", "wear"}),
     "drive": "law",
     "load": "acceleration force torque stiffness damping free_length rest viscous coulomb values",
 }
