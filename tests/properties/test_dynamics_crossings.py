@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from flexclear.scene.clearance import Hysteretic
 from flexclear.scene.schema import Scene
 from tests.properties.mechanisms import Table, joint, rigid, scene, simulate, simulated
 
@@ -134,7 +135,8 @@ def test_a_mechanism_of_any_size_bounces_alike(seed: int) -> None:
     for unit in (1.0, 10.0 ** random.uniform(-7.0, -4.0)):
         grazing, _ = graze(Random(seed), 1e-10, unit, 0.3)
         joint = grazing.joint["f"]
-        law = joint.normal.model_copy(update={"law": "lankarani-nikravesh", "restitution": 0.6})
+        keys = joint.normal.model_dump(exclude_none=True) | {"law": "lankarani-nikravesh", "restitution": 0.6}
+        law = Hysteretic.model_validate(keys)
         lossy = grazing.model_copy(update={"joint": grazing.joint | {"f": joint.model_copy(update={"normal": law})}})
         run = simulated(lossy)
         runs.append(run.event_approach_speed.values[run.event_kind.values == "closing"] / unit)

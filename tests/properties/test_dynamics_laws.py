@@ -4,10 +4,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
 from flexclear.dynamics.contact import form as forms
 from flexclear.dynamics.contact import normal
@@ -37,6 +39,11 @@ NORMAL: dict[str, tuple[Callable[[float], float], tuple[float | None, ...]]] = {
 MASS = 1.3
 
 
+def normal_law(**keys: Any) -> Any:
+    """A normal law from its keys in a scene."""
+    return TypeAdapter(NormalLaw).validate_python(keys)
+
+
 @dataclass(frozen=True)
 class Law:
     """A normal law with its numbers."""
@@ -51,9 +58,9 @@ class Law:
     @cached_property
     def resolved(self) -> Resolved:
         asked = {} if self.restitution is None else {self.asked: self.restitution}
-        exponent = 1.0 if self.name == "kelvin-voigt" else self.exponent
-        given_law = NormalLaw(law=self.name, exponent=exponent, **asked)
-        return lookup(normal.__name__, self.name, where="test").resolve(given_law, self.stiffness, self.mass)
+        exponent = {} if self.name == "kelvin-voigt" else {"exponent": self.exponent}
+        given_law = normal_law(law=self.name, **exponent, **asked)
+        return lookup(normal.__name__, self.name, where="test")(given_law, self.stiffness, self.mass)
 
     @property
     def a(self) -> float:

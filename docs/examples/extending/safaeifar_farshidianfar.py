@@ -9,4 +9,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis("safaeifar-farshidianfar", lambda c_r: 1.25 * (1.0 - c_r) / c_r, valid=(0.6, 1.0))
+resolve = Hysteresis(lambda c_r: 1.25 * (1.0 - c_r) / c_r, valid=(0.6, 1.0)).resolve

@@ -250,7 +250,7 @@ GRAVITY = numbers("acceleration:3")
 #: per error group. magnitude: values below it are resolved absolutely, natural: likewise, from the size of the whole
 #: mechanism; share: factor of its tolerance, so that each independent mechanism is resolved at least as well as alone
 FLOORS = numbers("magnitude natural share")
-CLOSURE_NUMBERS = numbers("weight")  # of each closure's lengths, so that the loops of small mechanisms close as well
+CLOSURE_NUMBERS = numbers("extent")  # of the independent mechanism [m], so that the loops of small ones close as well
 #: of bodies and named frames in their link, undeformed. mass, com, inertia: see LINK_NUMBERS; mass and inertia are 0
 #: where the link holds the body alone
 BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), numbers("origin:3")

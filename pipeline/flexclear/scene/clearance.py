@@ -21,23 +21,15 @@ class Material(Part):
     """Poisson's ratio"""
 
 
-class NormalLaw(Part):
-    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii."""
+class _Normal(Part):
+    """Keys of all normal contact laws; `stiffness` may be given instead of materials and radii."""
 
-    law: str
-    """name of the law, as docs/contact.md lists them"""
     restitution: Annotated[Number, Share] | None = None
     """the law's own parameter c_r; a free impact rebounds with c_r only as well as the law achieves"""
     delivered_restitution: Annotated[Number, Share] | None = None
     """coefficient of restitution that a free impact must have; the law's parameter follows from it"""
-    exponent: Annotated[Number, Field(ge=1.0)] | None = None
-    """exponent of the penetration; default 1.5, for linear laws 1"""
     stiffness: Annotated[Number, Positive] | None = None
-    """K in force = K penetration^exponent; default: from materials and radii"""
-    damping: Annotated[Number, Field(ge=0.0)] | None = None
-    """damping coefficient of linear laws [N s/m]"""
-    effective_mass: Annotated[Mass, Positive] | None = None
-    """mass that rebounds, for linear laws; default: the reduced mass of the two bodies"""
+    """K in force = K penetration^exponent [N/m^exponent]; default: from materials and radii"""
 
     @model_validator(mode="after")
     def _one_restitution(self) -> Self:
@@ -46,6 +38,86 @@ class NormalLaw(Part):
                 "restitution (the law's parameter) and delivered_restitution (the rebound) are alternatives; give one"
             )
         return self
+
+    @property
+    def requested(self) -> float | None:
+        """The restitution that the scene gives, of either kind."""
+        return self.restitution if self.delivered_restitution is None else self.delivered_restitution
+
+    @property
+    def needs_mass(self) -> bool:
+        """True when the damping follows from the mass that rebounds, and none is given."""
+        return False
+
+
+class Hertz(_Normal):
+    """Elastic contact without loss."""
+
+    law: Literal["hertz"]
+    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
+    """exponent of the penetration"""
+
+    @model_validator(mode="after")
+    def _lossless(self) -> Self:
+        if self.delivered_restitution not in (None, 1.0):
+            raise ValueError(
+                f"the law 'hertz' has no loss and cannot deliver a restitution of {self.delivered_restitution:g}; "
+                "choose a law with damping"
+            )
+        return self
+
+
+class Hysteretic(_Normal):
+    """Hertzian contact with a damping in proportion to the elastic force, by the law's factor for the restitution."""
+
+    law: Literal[
+        "hunt-crossley",
+        "herbert-mcwhannell",
+        "lee-wang",
+        "lankarani-nikravesh",
+        "gonthier",
+        "flores",
+        "hu-guo",
+        "zhiying-qishao",
+        "carvalho-martins",
+    ]
+    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
+    """exponent of the penetration"""
+
+    @model_validator(mode="after")
+    def _damped(self) -> Self:
+        if self.requested is None:
+            raise ValueError(f"the law '{self.law}' needs a restitution, or a delivered_restitution")
+        return self
+
+
+class KelvinVoigt(_Normal):
+    """Linear spring and damper in parallel."""
+
+    law: Literal["kelvin-voigt"]
+    damping: Annotated[Number, Field(ge=0.0)] | None = None
+    """damping coefficient [N s/m]; default: from the restitution"""
+    effective_mass: Annotated[Mass, Positive] | None = None
+    """mass that rebounds; default: the reduced mass of the two bodies"""
+    exponent: ClassVar[float] = 1.0
+
+    @property
+    def needs_mass(self) -> bool:
+        """True when the damping follows from the mass that rebounds, and none is given."""
+        return self.requested is not None and self.effective_mass is None
+
+    @model_validator(mode="after")
+    def _damped(self) -> Self:
+        if self.damping is None and self.requested is None:
+            raise ValueError("the law 'kelvin-voigt' needs a damping [N s/m], or a restitution")
+        if self.damping is not None and self.requested is not None:
+            raise ValueError("damping and restitution are alternatives; give one")
+        return self
+
+
+NormalLaw = Annotated[Hertz | Hysteretic | KelvinVoigt, Field(discriminator="law")]
+#: all kinds of normal laws
+NORMALS: tuple[Any, ...] = get_args(get_args(NormalLaw)[0])
 
 
 class ModifiedCoulomb(Part):
@@ -169,6 +241,16 @@ class _Contact(Part):
     surfaces: ClassVar[tuple[str, str]]
     #: the ideal joint that constrains the two frames in addition to the contact; None for the contact alone
     held: ClassVar[str | None] = None
+    #: the ideal joint that connects the two frames without clearance; None where nothing but the contact does
+    ideal: ClassVar[str | None] = None
+    #: whether the outer surface is hollow, and the inner one moves in it
+    hollow: ClassVar[bool] = True
+    #: axes of the outer frame along which `ideal` holds the inner one in the middle
+    across: ClassVar[tuple[int, ...]] = (0, 1, 2)
+    #: axes of the outer frame that show the motion; None for those of the largest motion
+    plane: ClassVar[tuple[int, int] | None] = None
+    #: what of the outer surface the inner one is near to, in words
+    middle: ClassVar[str] = "centre"
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> Self:
@@ -201,58 +283,66 @@ class _Clearance(_Contact):
     """half the difference of the diameters"""
 
 
-class ClearanceSpherical(_Clearance):
-    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+class _Ball(_Contact):
+    """Keys of all contacts of a ball."""
 
-    surfaces = ("socket", "ball")
-    type: Literal["clearance-spherical"]
     ball_radius: Annotated[Length, Positive]
     """radius of the ball"""
-    socket_material: Material | None = None
-    """elastic constants, for the stiffness"""
     ball_material: Material | None = None
     """elastic constants, for the stiffness"""
+
+
+class _Worn(_Clearance):
+    """Keys of joints whose wear can be computed."""
+
     wear: Wear | None = None
     """wear of both surfaces; default: none"""
 
 
-class ClearanceRevolute(_Clearance):
-    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
+class Pin(_Clearance):
+    """Keys of all joints of a pin, whose surfaces meet along a line."""
 
-    surfaces, held = ("journal", "pin"), "planar"
-    type: Literal["clearance-revolute"]
+    held, plane = "planar", (0, 1)
     pin_radius: Annotated[Length, Positive]
     """radius of the pin"""
     length: Annotated[Length, Positive]
     """length of the bearing along the axis"""
-    journal_material: Material | None = None
-    """elastic constants, for the stiffness"""
     pin_material: Material | None = None
     """elastic constants, for the stiffness"""
-    wear: Wear | None = None
-    """wear of both surfaces; default: none"""
 
 
-class ClearanceSlot(_Clearance):
+class ClearanceSpherical(_Ball, _Worn):
+    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+
+    surfaces, ideal = ("socket", "ball"), "spherical"
+    type: Literal["clearance-spherical"]
+    socket_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+
+class ClearanceRevolute(Pin, _Worn):
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
+
+    surfaces, ideal, across = ("journal", "pin"), "revolute", (0, 1)
+    type: Literal["clearance-revolute"]
+    journal_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+
+class ClearanceSlot(Pin):
     """Pin in a straight slot with round ends; between = [slot frame, pin frame].
 
     The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
     """
 
-    surfaces, held = ("slot", "pin"), "planar"
+    surfaces, ideal, across, middle = ("slot", "pin"), "slot", (1,), "centre line"
     type: Literal["clearance-slot"]
     clearance: Annotated[Length, Positive]
     """half the slot's width minus the pin's radius"""
     travel: Annotated[Length, Positive]
     """travel of the pin's centre along the slot's middle line, from the centre of one end's half circle to that of the
     other"""
-    pin_radius: Annotated[Length, Positive]
-    """radius of the pin"""
-    length: Annotated[Length, Positive]
-    """length of the bearing along the axis"""
     slot_material: Material | None = None
-    """elastic constants, for the stiffness"""
-    pin_material: Material | None = None
     """elastic constants, for the stiffness"""
 
     @property
@@ -261,19 +351,15 @@ class ClearanceSlot(_Clearance):
         return 0.5 * self.travel, 0.0
 
 
-class BallOnPlane(_Contact):
+class BallOnPlane(_Ball):
     """Ball above an unbounded plane; between = [plane frame, ball frame].
 
     The plane contains x and y of its frame; the ball is on the side of z.
     """
 
-    surfaces = ("plane", "ball")
+    surfaces, hollow, plane = ("plane", "ball"), False, (0, 2)
     type: Literal["ball-on-plane"]
-    ball_radius: Annotated[Length, Positive]
-    """radius of the ball"""
     plane_material: Material | None = None
-    """elastic constants, for the stiffness"""
-    ball_material: Material | None = None
     """elastic constants, for the stiffness"""
 
     @property
@@ -285,8 +371,8 @@ class BallOnPlane(_Contact):
 Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
 #: all types of contacts
 CONTACTS: tuple[Any, ...] = get_args(Clearance)
-#: types of joints with a hollow part, in which a pin or ball moves
-HOLLOW: tuple[Any, ...] = tuple(kind for kind in CONTACTS if issubclass(kind, _Clearance))
+#: their classes by type
+SURFACES: dict[str, Any] = {name: kind for kind in CONTACTS for name in get_args(kind.model_fields["type"].annotation)}
 
 #: sizes that the bearing of a joint may have, and those that it must have
 SIZES: dict[str, tuple[set[str], set[str]]] = {

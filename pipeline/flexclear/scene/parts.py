@@ -309,8 +309,7 @@ class Stop(OnCoordinate):
             raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
         if self.normal.stiffness is None:
             raise ValueError("the stiffness of a stop is unknown: give normal.stiffness")
-        mass = (self.normal.restitution, self.normal.delivered_restitution) != (None, None)
-        if self.normal.law == "kelvin-voigt" and mass and self.normal.effective_mass is None:
+        if self.normal.needs_mass:
             raise ValueError(
                 "the mass that meets a stop depends on the pose, so a linear stop needs a damping, "
                 "or a restitution with the effective_mass [kg or kg m^2] for that restitution"

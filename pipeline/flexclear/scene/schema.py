@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from flexclear.scene import provenance
-from flexclear.scene.clearance import CONTACTS, BallOnPlane, Clearance
+from flexclear.scene.clearance import CONTACTS, Clearance
 from flexclear.scene.drives import Drive
 from flexclear.scene.events import Event, require_possible
 from flexclear.scene.fields import Direction, Length, Number, Part, PartName, Positive, Time
@@ -381,7 +381,7 @@ class Scene(Part):
 
     def summary(self) -> str:
         """Return the numbers of parts by kind, in words."""
-        planes = sum(isinstance(joint, BallOnPlane) for joint in self.contacts().values())
+        planes = sum(not joint.hollow for joint in self.contacts().values())
         counts = {
             ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
             ("flexible body", "flexible bodies"): len(self.flexible()),

@@ -99,8 +99,6 @@ _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "
 #: signs for degrees
 DEGREES = re.compile(r"\s*[°º]")
 
-#: largest number of characters of a quantity
-LONGEST_QUANTITY = 200
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$")
 
 
@@ -265,7 +263,8 @@ def _read(value: object, dimension: str) -> float:
 def _parts(text: str) -> re.Match[str] | None:
     """Match number and unit; white space is stripped first, since the expression would try it in many ways."""
     text = text.strip()
-    return _QUANTITY.fullmatch(text) if len(text) <= LONGEST_QUANTITY else None
+    # largest number of characters of a quantity
+    return _QUANTITY.fullmatch(text) if len(text) <= 200 else None
 
 
 def any_quantity(value: object) -> float | str:

@@ -18,9 +18,9 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-from flexclear.scene.clearance import CONTACTS, Clearance
+from flexclear.scene.clearance import SURFACES, Clearance
 from flexclear.scene.load import FAMILIES, SETTINGS, edited
 from flexclear.scene.loads import Bushing
 from flexclear.scene.parts import UNSEEN
@@ -38,8 +38,6 @@ EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
 #: kinds of effects on request: of these types of loads, others are forces
 KINDS = {"bushing": "bushing", "spring-damper": "spring", "joint-spring": "spring"}
 KINDS |= {"pid": "controller", "sampled-pid": "controller"}
-#: joint with clearance -> ideal joint that connects the same frames; a ball on a plane has none
-WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical", "clearance-slot": "slot"}
 #: keys of a flexible body that a rigid one from the same recipe also has
 SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
 #: settings that follow the parts: quantities of removed parts are no longer requested or shown
@@ -180,13 +178,12 @@ def staying(types: Mapping[str, str]) -> list[str]:
 
     types: type of each joint, by name.
     """
-    contacts = {get_args(one.model_fields["type"].annotation)[0] for one in CONTACTS} - set(WITHOUT_CLEARANCE)
-    return [name for name, kind in types.items() if kind in contacts]
+    return [name for name, kind in types.items() if kind in SURFACES and SURFACES[kind].ideal is None]
 
 
 def loose(scene: Scene) -> dict[str, Clearance]:
     """Return joints with clearance that have an ideal counterpart, by name: all but balls on planes."""
-    return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
+    return {name: joint for name, joint in scene.contacts().items() if joint.ideal is not None}
 
 
 def _requests(scene: Scene, bare: Scene) -> dict[str, Any]:
@@ -238,7 +235,7 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
             joint = name if name not in scene.joint else f"{name}_ideal"
             changes |= {effect.name: None, f"joint.{joint}": {"type": effect.joint, "between": list(part.between)}}
         elif effect.kind == CLEARANCE:
-            changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
+            changes[f"joint.{name}"] = {"type": part.ideal, "between": list(part.between)}
         elif effect.kind == FLEXIBILITY:
             unchanged = part.model_dump(mode="json", include=set(SHARED_KEYS), exclude_none=True)
             changes[f"body.{name}"] = {"type": "rigid", **unchanged}

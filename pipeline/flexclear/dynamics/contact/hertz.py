@@ -6,10 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from flexclear.scene.clearance import Clearance, ClearanceRevolute, ClearanceSlot
-
-#: joints whose surfaces meet along a line
-Pin = ClearanceRevolute | ClearanceSlot
+from flexclear.scene.clearance import Clearance, Pin
 
 
 def published(stiffness: Mapping[float, Callable[[Any], float]]) -> Callable[[Clearance, float], float]:

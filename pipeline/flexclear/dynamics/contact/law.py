@@ -8,7 +8,7 @@ from math import inf, isfinite
 from typing import NamedTuple
 
 from flexclear.dynamics.contact import restitution as closed_form
-from flexclear.scene.clearance import NormalLaw
+from flexclear.scene.clearance import Hysteretic
 from flexclear.scene.registry import lookup
 
 #: largest deviation of the delivered from the requested restitution within a law's range
@@ -52,35 +52,26 @@ class Hysteresis:
     """A law F = K d^n (1 + a d'/d'0); `factor` gives a for the requested coefficient of restitution.
 
     valid: range of restitutions that the law delivers within RESTITUTION_ERROR.
-    exponent: default exponent n.
     """
 
-    name: str
     factor: Callable[[float], float]
     valid: tuple[float, float]
-    exponent: float = 1.5
 
-    def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+    def resolve(self, law: Hysteretic, stiffness: float, mass: float | None) -> Resolved:
         """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
-        refuse_linear(self.name, law)
-        exponent = self.exponent if law.exponent is None else law.exponent
-        if law.delivered_restitution is not None:
-            delivered = law.delivered_restitution
-            a = closed_form.factor(delivered)
-            parameter = self._parameter(a)
-        elif law.restitution is not None:
-            parameter = law.restitution
-            a = self._factor(parameter)
-            delivered = closed_form.delivered(a)
+        if law.restitution is None:
+            a = closed_form.factor(delivered := law.delivered_restitution)
+            parameter = self._parameter(law.law, a)
         else:
-            raise ValueError(f"the law '{self.name}' needs a restitution, or a delivered_restitution")
-        numbers = Numbers(stiffness, exponent, a)
+            a = self._factor(law.law, parameter := law.restitution)
+            delivered = closed_form.delivered(a)
+        numbers = Numbers(stiffness, law.exponent, a)
         return Resolved("hysteretic", numbers, parameter, delivered, self._warning(law, delivered))
 
-    def _factor(self, parameter: float) -> float:
+    def _factor(self, name: str, parameter: float) -> float:
         a = self._at(parameter)
         if not isfinite(a):
-            raise ValueError(f"the law '{self.name}' has no finite damping for a restitution of 0; request 0.01 or so")
+            raise ValueError(f"the law '{name}' has no finite damping for a restitution of 0; request 0.01 or so")
         return a
 
     def _at(self, parameter: float) -> float:
@@ -89,7 +80,7 @@ class Hysteresis:
         except ZeroDivisionError:
             return inf
 
-    def _parameter(self, a: float) -> float:
+    def _parameter(self, name: str, a: float) -> float:
         """Return the parameter whose factor is a; the factors of all these laws decrease with the parameter."""
         if a == 0.0:
             return 1.0
@@ -97,23 +88,16 @@ class Hysteresis:
         if self.factor(least) < a:
             lowest = closed_form.delivered(self.factor(least))
             raise ValueError(
-                f"the law '{self.name}' delivers no restitution below {lowest:.4g}; request more, or choose "
+                f"the law '{name}' delivers no restitution below {lowest:.4g}; request more, or choose "
                 "'gonthier', 'hu-guo' or 'flores', which cover all restitutions"
             )
         return closed_form.root(lambda c: self.factor(c) - a, least, 1.0)
 
-    def _warning(self, law: NormalLaw, delivered: float) -> str | None:
+    def _warning(self, law: Hysteretic, delivered: float) -> str | None:
         if law.restitution is None or abs(delivered - law.restitution) <= RESTITUTION_ERROR:
             return None
         low, high = self.valid
         return (
-            f"'{self.name}' with restitution = {law.restitution:g} delivers {delivered:.4g} "
+            f"'{law.law}' with restitution = {law.restitution:g} delivers {delivered:.4g} "
             f"(meant for {low:g} to {high:g}); delivered_restitution = {law.restitution:g} gives the rebound itself"
         )
-
-
-def refuse_linear(name: str, law: NormalLaw) -> None:
-    """Raise ValueError when a scene gives a law numbers that only linear laws take."""
-    for key in ("damping", "effective_mass"):
-        if getattr(law, key) is not None:
-            raise ValueError(f"the law '{name}' takes no {key}; 'kelvin-voigt' does")

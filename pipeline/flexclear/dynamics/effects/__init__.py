@@ -20,7 +20,7 @@ from flexclear.dynamics.effects.effect import Effect
 from flexclear.scene import integrators
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.registry import lookup, module_of
-from flexclear.scene.variants import WITHOUT_CLEARANCE, loose
+from flexclear.scene.variants import loose
 from flexclear.workflow.encounters import meet
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def named(scene: Scene) -> set[str]:
     if scene.start is not None and scene.start.at is not None:
         parts.append((STARTS, scene.start.at, "[start.at]"))
         laws += ["constant", "polynomial"] if scene.start.joint else []  # which hold given positions
-        parts += [(JOINTS, WITHOUT_CLEARANCE[one.type], f"[joint.{name}]") for name, one in loose(scene).items()]
+        parts += [(JOINTS, one.ideal, f"[joint.{name}]") for name, one in loose(scene).items()]
     parts += [(RECORDS, name, "[output]") for name in scene.output.requests()]
     if scene.event:
         parts.append((EVENTS, "phases", "[event]"))

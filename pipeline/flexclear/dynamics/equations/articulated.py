@@ -22,20 +22,7 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.dynamics.bodies.rigid import FlexibleBodies
-from flexclear.dynamics.equations.articulated_modes import (
-    at_port,
-    backward_modes,
-    begin_modes,
-    begin_shapes,
-    deforming,
-    factor_modes,
-    forward_modes,
-    load_modes,
-    outer,
-    push_modes,
-    push_shapes,
-    spread_shapes,
-)
+from flexclear.dynamics.equations import articulated_modes
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import (
     ZERO,
@@ -164,13 +151,13 @@ def reduce(d, i):
         A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
         M, F = add(M, body.moment), add(F, body.force)
     if link.flex >= 0:
-        sound = factor_modes(d, link.flex, MASSLESS_ARTICULATED)
-        M, F = forward_modes(d, link.flex, d.at_force, M, F)
+        sound = articulated_modes.factor_modes(d, link.flex, MASSLESS_ARTICULATED)
+        M, F = articulated_modes.forward_modes(d, link.flex, d.at_force, M, F)
         first = d.flexes[link.flex].c0
         for k in range(first, first + d.flexes[link.flex].n_modes):
             gain = d.gain[k]
             A = less(A, outer_symmetric(1.0, gain.moment))
-            B = less9(B, outer(1.0, gain.moment, gain.force))
+            B = less9(B, articulated_modes.outer(1.0, gain.moment, gain.force))
             C = less(C, outer_symmetric(1.0, gain.force))
     if link.c0 < d.nv:
         for k in range(link.c0, link.c0 + link.n_speeds):
@@ -186,7 +173,7 @@ def reduce(d, i):
             gain.moment, gain.force = scale(root, moment), scale(root, force)
             M, F = add(M, scale(inverse * rest, moment)), add(F, scale(inverse * rest, force))
             A = less(A, outer_symmetric(inverse, moment))
-            B = less9(B, outer(inverse, moment, force))
+            B = less9(B, articulated_modes.outer(inverse, moment, force))
             C = less(C, outer_symmetric(inverse, force))
     if link.parent > 0:
         # about the parent's origin, from which a leads to the link's
@@ -199,8 +186,8 @@ def reduce(d, i):
         A = add6(A, (x[0], y[1], z[2], y[0], z[0], z[1]))
         M = add(M, cross(a, F))
         if link.carried_by >= 0:
-            load_modes(d, link.carried_by, A, B, C)
-            push_modes(d, link.carried_by, d.at_force, M, F)
+            articulated_modes.load_modes(d, link.carried_by, A, B, C)
+            articulated_modes.push_modes(d, link.carried_by, d.at_force, M, F)
         above = d.articulated[link.parent]
         if link.first == 0:
             A, B, C = add6(A, at6(above.turning, 0)), add9(B, above.mixed), add6(C, at6(above.moving, 0))
@@ -221,7 +208,7 @@ def forward(d, b):
         if link.leaf == 0:
             moment, force = body.moment, body.force
         if link.flex >= 0:
-            moment, force = forward_modes(d, link.flex, b, moment, force)
+            moment, force = articulated_modes.forward_modes(d, link.flex, b, moment, force)
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local, gain = d.local[k], d.gain[k]
@@ -231,7 +218,7 @@ def forward(d, b):
         if link.parent > 0:
             above, moment = d.articulated[link.parent], add(moment, cross(body.arm, force))
             if link.carried_by >= 0:
-                push_modes(d, link.carried_by, b, moment, force)
+                articulated_modes.push_modes(d, link.carried_by, b, moment, force)
             if link.first == 0:
                 moment, force = add(moment, above.moment), add(force, above.force)
             above.moment, above.force = moment, force
@@ -245,7 +232,7 @@ def carried(d, i, b):
         above = d.articulated[link.parent]
         angular, linear = above.angular, above.linear
         if link.carried_by >= 0:
-            angular, linear = at_port(d, link.carried_by, b, angular, linear)
+            angular, linear = articulated_modes.at_port(d, link.carried_by, b, angular, linear)
         linear = add(linear, cross(angular, d.articulated[i].arm))
     return angular, linear
 
@@ -266,7 +253,7 @@ def backward(d, b):
                 d.w[b + k] = value
                 angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
         if link.flex >= 0:
-            backward_modes(d, link.flex, b, angular, linear)
+            articulated_modes.backward_modes(d, link.flex, b, angular, linear)
         body.angular, body.linear = angular, linear
 
 
@@ -281,7 +268,7 @@ def spread(d, c):
             none = d.transmitted[path.link]
             none.moments, none.forces = NONE, NONE
             if path.shapes >= 0:
-                begin_shapes(d, path, start)
+                articulated_modes.begin_shapes(d, path, start)
         for e in range(closure.path0, closure.path0 + closure.n_path):
             path = d.paths[e]
             link, moments, forces = (
@@ -290,22 +277,22 @@ def spread(d, c):
                 d.transmitted[path.link].forces,
             )
             if path.shapes >= 0:
-                moments, forces = spread_shapes(d, path, start, moments, forces)
+                moments, forces = articulated_modes.spread_shapes(d, path, start, moments, forces)
             if path.slot >= 0:
                 for k in range(link.n_speeds):
                     local, gain, place = d.local[link.c0 + k], d.gain[link.c0 + k], start + 3 * (path.slot + k)
                     against = add(turn_back(moments, local.angular), turn_back(forces, local.linear))
                     values = scale(d.mass[link.c0 + k], sub(at(d.jacobian, place), against))
                     put(d.spread, place, values)
-                    moments = add9(moments, outer(1.0, gain.moment, values))
-                    forces = add9(forces, outer(1.0, gain.force, values))
+                    moments = add9(moments, articulated_modes.outer(1.0, gain.moment, values))
+                    forces = add9(forces, articulated_modes.outer(1.0, gain.force, values))
             if link.parent > 0:
                 above, lever = d.transmitted[link.parent], product(skewed(d.articulated[path.link].arm), forces)
                 moments = add9(moments, lever)
                 above.moments = add9(above.moments, moments)
                 above.forces = add9(above.forces, forces)
                 if path.carrier >= 0:
-                    push_shapes(d, link.carried_by, start + 3 * path.carrier, moments, forces)
+                    articulated_modes.push_shapes(d, link.carried_by, start + 3 * path.carrier, moments, forces)
 
 
 @kernel
@@ -326,7 +313,7 @@ def transmit(d, b, biased):
         own, wrench, p = d.own[i], d.wrench[i], d.link_frames[i].origin
         turning, pushing = ZERO, ZERO
         if link.flex >= 0:
-            angular, linear, turning, pushing = deforming(d, link.flex, b, angular, linear)
+            angular, linear, turning, pushing = articulated_modes.deforming(d, link.flex, b, angular, linear)
         moment = add(turn_symmetric(at6(own.inertia, 0), angular), cross(own.moment, linear))
         force = add(scale(own.mass, linear), cross(angular, own.moment))
         needed = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
@@ -401,7 +388,7 @@ def make_eliminate(flexible: FlexibleBodies) -> Callable:
     @kernel
     def eliminate(d):
         sound = True
-        begin_modes(d)
+        articulated_modes.begin_modes(d)
         for i in range(d.n_links - 1, 0, -1):
             sound = reduce(d, i) & sound
         return sound

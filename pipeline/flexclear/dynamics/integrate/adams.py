@@ -23,8 +23,6 @@ LAST = rk4.STAGES
 # floats: number of stored slopes (vectors, the latest first), and the time between them
 COUNT, DISTANCE, FLOATS = range(3)
 MOST_STEPS_BACK = 3
-#: step lengths that differ by less than this fraction are equal: rounding of times
-EQUAL_STEPS = 1e-8
 
 
 @kernel
@@ -37,7 +35,8 @@ def begin(d):
 def alike(d, step):
     """Return True when a step is as long as the distance between the stored slopes."""
     distance = d.memory[DISTANCE]
-    return abs(step - distance) <= EQUAL_STEPS * distance
+    # step lengths that differ by less than this fraction are equal: rounding of times
+    return abs(step - distance) <= 1e-8 * distance
 
 
 @kernel

@@ -12,33 +12,19 @@ from collections.abc import Callable
 from typing import Any
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate import mode_changes
 from flexclear.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
 from flexclear.dynamics.integrate.method import slope
-from flexclear.dynamics.integrate.mode_changes import (
-    NO_CHANGE,
-    cubic_tells,
-    ends_tell,
-    make_locate_change,
-    side,
-    zero_gap,
-)
 from flexclear.dynamics.integrate.recording import add_event
 from flexclear.dynamics.integrate.stepper import AGAIN, NO_GUARDS, RESTART
 from flexclear.dynamics.integrate.within_step import make_evaluate_at, make_repeat
 from flexclear.dynamics.kernels import kernel
 
-#: mode changes at one and the same time before the solver gives up (Zeno)
-MOST_IMMEDIATE = 200
 #: the dense output of a long step misplaces what a contact does in a small fraction of it; the step is then repeated,
 #: at most so often, with this fraction of its length or more
 MOST_SHORTENED, REPEATED_FRACTION = 8, 0.1
 #: a contact that begins deeper than this fraction of its clearance, and so many tolerances, has been stepped over
 DEPTH_STEPPED_OVER, ERRORS = 1e-6, 100.0
-#: fraction of its length by which a step may miss the event on which it must end
-EVENT_MISS = 1e-6
-#: a contact that would end where it has just begun is resolved by shorter steps, down to one in which it moves by so
-#: many times the error of its gap
-FURTHER = 10.0
 
 
 # Modes ---------------------------------------------------------------------------------------------------------------
@@ -120,14 +106,16 @@ def backwards(d, c, rate):
 
     Fixed steps and polynomials cannot be shortened.
     """
-    return side(d, c) * rate < 0.0 and d.fixed == 0.0 and d.collocated == 0.0
+    return mode_changes.side(d, c) * rate < 0.0 and d.fixed == 0.0 and d.collocated == 0.0
 
 
 @kernel
 def resolvable(d, c, step):
     """Return True when contact c moves further in a step than the uncertainty of its gap at the start."""
     watch = d.watch[c]
-    return abs(watch.rate0) * step > FURTHER * max(abs(watch.gap0), zero_gap(d, c))
+    # a contact that would end where it has just begun is resolved by shorter steps, down to one in which it moves by so
+    # many times the error of its gap
+    return abs(watch.rate0) * step > 10.0 * max(abs(watch.gap0), mode_changes.zero_gap(d, c))
 
 
 def make_resolve_events(
@@ -143,7 +131,7 @@ def make_resolve_events(
     last = method.last
     evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
     follow_contacts = make_follow_contacts(evaluate, evaluate_at, extend, method, regimes)
-    locate_change = make_locate_change(evaluate_at)
+    locate_change = mode_changes.make_locate_change(evaluate_at)
 
     @kernel
     def end_on_event(d, step, c):
@@ -156,13 +144,14 @@ def make_resolve_events(
             if not repeat(d, step):
                 return -1.0, False
             gap, rate = d.touch[c].gap, d.touch[c].rate
-            if abs(gap) <= zero_gap(d, c):
+            if abs(gap) <= mode_changes.zero_gap(d, c):
                 return step, True
             if not abs(gap) < 0.1 * abs(rate) * step:
                 return step, False
             off = gap / rate
             step += off
-        return step, abs(off) <= EVENT_MISS * step
+        # fraction of its length by which a step may miss the event on which it must end
+        return step, abs(off) <= 1e-6 * step
 
     _, note_end, accept, make_end_on_guard = guards
     end_on_guard = make_end_on_guard(evaluate_at, extend, repeat)
@@ -170,9 +159,9 @@ def make_resolve_events(
     @kernel
     def first_change(d, step):
         """Return contact and fraction of the step of the first mode change, and whether the dense output is ready."""
-        ready, first, which = False, NO_CHANGE, -1
+        ready, first, which = False, mode_changes.NO_CHANGE, -1
         for c in range(d.n_contacts):
-            if not (ends_tell(d, c) or cubic_tells(d, c, step)):
+            if not (mode_changes.ends_tell(d, c) or mode_changes.cubic_tells(d, c, step)):
                 continue
             if not ready:
                 extend(d, step)
@@ -195,7 +184,8 @@ def make_resolve_events(
             return give_up(d, m.STEPPED_OVER, c)
         d.watch[c].rate1 = d.touch[c].rate
         change_mode(d, events, c, t)
-        return give_up(d, m.STUCK_EVENT, c) if d.immediate > MOST_IMMEDIATE else RESTART
+        # mode changes at one and the same time before the solver gives up (Zeno)
+        return give_up(d, m.STUCK_EVENT, c) if d.immediate > 200 else RESTART
 
     @kernel
     def resolve_events(d, step, t_new, rows, events):

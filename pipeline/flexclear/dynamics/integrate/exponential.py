@@ -55,9 +55,6 @@ POLYNOMIALS = np.array(
     ]
 )
 FACTORIALS = np.array([1.0 * factorial(k) for k in range(NODES + 2)])
-MOST_SWEEPS = 10
-#: the slowest rate of convergence counts less by this factor from sweep to sweep
-FORGETTING = 0.3
 #: step lengths aim at corrections that fall by this factor per sweep, which goes with their square; the least rate used
 SWIFT, LEAST_CONTRACTION = 0.1, 0.01
 
@@ -281,7 +278,8 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
             now = norm / last_norm if last_norm > 0.0 else 0.0
             if now >= 1.0 and norm > enough:
                 return LOST
-            rate = max(FORGETTING * rate, now)
+            # the slowest rate of convergence counts less by this factor from sweep to sweep
+            rate = max(0.3 * rate, now)
             if last_norm > enough:
                 d.memory[SLOWEST] = max(d.memory[SLOWEST], now)
         d.memory[CORRECTED], d.memory[CONVERGING] = norm, rate
@@ -289,7 +287,7 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
         if k > 0 and left <= enough:
             d.memory[RATE] = rate
             return MADE
-        return AWAITS if k + 1 < MOST_SWEEPS else LOST
+        return AWAITS if k + 1 < 10 else LOST
 
     @kernel
     def proceed(d, step):

@@ -10,8 +10,8 @@ t_n + (alpha_m - alpha_f) h, so it is initialised there and rescaled when the st
 which follow the speeds in the state (energy ledger, internal states of friction), obey the trapezoidal rule, coupled.
 
 The unknowns are the *rates* at the end of the step: a, then z'. Newton's matrix has rows (1 - alpha_m) -
-(1 - alpha_f) D for a and 1 - D / 2 for z', with D = gamma h d/du + beta h^2 d/dq for columns of u, and h d/dz for those
-of z. A simplified iteration uses the last Jacobian, then a new one; with fixed steps a damped iteration
+(1 - alpha_f) D for a and 1 - D / 2 for z', with D = gamma h d/du + beta h^2 d/dq dq'/du for columns of u, and h d/dz
+for those of z. A simplified iteration uses the last Jacobian, then a new one; with fixed steps a damped iteration
 follows with a new Jacobian at every iterate, for friction that saturates within the step.
 
 The error estimate compares the step with the integral of the parabola through the last three slopes; its rates are
@@ -30,30 +30,24 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.integrate import hermite
+from flexclear.dynamics.integrate import hermite, newton
 from flexclear.dynamics.integrate.method import Method, matrix, slope, vector
-from flexclear.dynamics.integrate.newton import COLUMN_STEP, converged, limit, lu_factor, lu_solve
 from flexclear.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
 from flexclear.dynamics.kernels import kernel
 from flexclear.scene.integrators import INTEGRATORS
 
 # rows of SLOPES: start of the step, Newton's iterate, end of the step, error estimates, search for events
 ITERATE, LAST, ESTIMATE, ROWS = 1, 2, 3, 5
-#: simplified iterations at most, and the number from which on the next step computes a new Jacobian
-MOST_ITERATIONS, SLOW_FROM = 10, 4
-#: damped iterations at most, and halvings of one correction
-MOST_CORRECTIONS, MOST_HALVINGS = 30, 12
+#: simplified iterations at most, damped ones, and halvings of one correction
+MOST_ITERATIONS, MOST_CORRECTIONS, MOST_HALVINGS = 10, 30, 12
 
 # Memory between steps ------------------------------------------------------------------------------------------------
-# floats: step to which the stored accelerations belong, step of the factors, whether the Jacobian still holds, step
-# before
-A_STEP, FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(5)
 #: vectors of rates: accelerations at the start as stored, rates at the end, accelerations at the start for this step's
 #: length, displacement, residual, Newton's correction, row exchanges of the factors; then storage for positions, and
 #: the slope at the start of the previous step
 OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, CORRECTION, PIVOTS, POSITIONS, SLOPE_BEFORE, VECTORS = range(10)
-#: matrices: derivatives of the rates by speeds and z, by positions, and Newton's matrix
-BY_STATE, BY_POSITION, NEWTON, MATRICES = range(4)
+#: matrices: after the Jacobian Newton's matrix
+NEWTON, MATRICES = 1, 2
 
 
 @kernel
@@ -90,27 +84,32 @@ def gain(d, step, i):
 
 
 @kernel
+def by_rate(d, step, i, k):
+    """Return the derivative of rate i at the end of the step by rate k there, through speeds and positions."""
+    row, total = matrix(d, newton.JACOBIAN) + d.ny * (d.nq + i), 0.0
+    if k < d.nv:
+        for q in range(d.nq):
+            total += d.w[row + q] * d.w[matrix(d, newton.JACOBIAN) + d.ny * q + d.nq + k]
+    return gain(d, step, k) * d.w[row + d.nq + k] + coefficients(d)[2] * step * step * total
+
+
+@kernel
 def factorise(d, step):
     """Factorise Newton's matrix for a step; return False when it is singular."""
-    _, alpha_f, beta, _ = coefficients(d)
-    size, nv = n_rates(d), d.nv
-    S, by_state, by_position = matrix(d, NEWTON), matrix(d, BY_STATE), matrix(d, BY_POSITION)
+    size, S = n_rates(d), matrix(d, NEWTON)
     for i in range(size):
-        weight = 1.0 - alpha_f if i < nv else 0.5
+        weight = 1.0 - coefficients(d)[1] if i < d.nv else 0.5
         for k in range(size):
-            change = gain(d, step, k) * d.w[by_state + size * i + k]
-            if k < nv:
-                change += beta * step * step * d.w[by_position + size * i + k]
-            d.w[S + size * i + k] = -weight * change
+            d.w[S + size * i + k] = -weight * by_rate(d, step, i, k)
         d.w[S + (size + 1) * i] += own_weight(d, i)
-    d.memory[FACTORED_STEP] = step
-    return lu_factor(d.w, S, vector(d, PIVOTS), size)
+    d.memory[newton.FACTORED_STEP] = step
+    return newton.lu_factor(d.w, S, vector(d, PIVOTS), size)
 
 
 @kernel
 def solve(d, b):
     """Solve Newton's system in place for the right-hand side at index b."""
-    lu_solve(d.w, matrix(d, NEWTON), vector(d, PIVOTS), n_rates(d), b)
+    newton.lu_solve(d.w, matrix(d, NEWTON), vector(d, PIVOTS), n_rates(d), b)
 
 
 @kernel
@@ -126,13 +125,12 @@ def rates_norm(d, step, a):
 @kernel
 def predict(d, step):
     """Rescale the accelerations at the start to this step, and guess the rates at its end."""
-    nq = d.nq
-    share, on = step / d.memory[A_STEP], step / d.memory[LAST_STEP]
+    nq, share = d.nq, step / d.memory[newton.LAST_STEP]
     for k in range(d.nv):
         now = d.slopes[nq + k]
         a = now + share * (d.w[vector(d, OLD) + k] - now)
         d.w[vector(d, RESCALED) + k] = a
-        d.w[vector(d, NEW) + k] = a + on * (now - d.w[vector(d, SLOPE_BEFORE) + nq + k])
+        d.w[vector(d, NEW) + k] = a + share * (now - d.w[vector(d, SLOPE_BEFORE) + nq + k])
     for k in range(d.nv, n_rates(d)):
         d.w[vector(d, NEW) + k] = d.slopes[nq + k]
 
@@ -144,14 +142,14 @@ def keep(d, step):
         d.w[vector(d, OLD) + k] = d.w[vector(d, NEW) + k]
     for c in range(d.ny):
         d.w[vector(d, SLOPE_BEFORE) + c] = d.slopes[c]
-    d.memory[A_STEP] = d.memory[LAST_STEP] = step
+    d.memory[newton.LAST_STEP] = step
 
 
 @kernel
 def error(d, step):
     """Return the norm of the local error, 1 at the tolerance."""
     size, start, end, before = d.ny, slope(d, 0), slope(d, ITERATE), vector(d, SLOPE_BEFORE)
-    out, length = slope(d, ESTIMATE), d.memory[LAST_STEP]
+    out, length = slope(d, ESTIMATE), d.memory[newton.LAST_STEP]
     for c in range(size):
         f0, f1 = d.w[start + c], d.w[end + c]
         bend = ((f1 - f0) / step - (f0 - d.w[before + c]) / length) / (step + length)
@@ -183,8 +181,8 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             d.w[vector(d, SLOPE_BEFORE) + c] = d.w[first + c] - change
             if d.nq <= c < d.nq + d.nv:
                 d.w[vector(d, OLD) + c - d.nq] = d.w[first + c] + (alpha_m - alpha_f) * change
-        d.memory[A_STEP] = d.memory[LAST_STEP] = step
-        d.memory[JACOBIAN_HOLDS] = 0.0
+        d.memory[newton.LAST_STEP] = step
+        d.memory[newton.JACOBIAN_HOLDS] = 0.0
         d.evaluation = m.OK
 
     @kernel
@@ -201,7 +199,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callable]:
     """Build the kernels place_end(d, step, out) and solve_step(d, step)."""
-    jacobian = make_jacobian(evaluate, retract)
+    jacobian = newton.make_jacobian(evaluate)
 
     @kernel
     def place_end(d, step, out):
@@ -235,20 +233,21 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def iterate(d, step):
-        """Iterate with the present Newton matrix; return the number of iterations, 0 when they do not converge."""
-        left, last_norm = vector(d, RESIDUAL), 0.0
+        """Iterate; return the rate at which the corrections fell, or -1 when they did not."""
+        left, last_norm, rate = vector(d, RESIDUAL), 0.0, 0.0
         for k in range(MOST_ITERATIONS):
             if not residual(d, step):
-                return 0
+                return -1.0
             solve(d, left)
             for i in range(n_rates(d)):
                 d.w[vector(d, NEW) + i] += d.w[left + i]
             norm = rates_norm(d, step, left)
-            verdict = converged(k, norm, last_norm, d.rtol)
+            rate = norm / last_norm if k > 0 else 0.0
+            verdict = newton.converged(k, norm, last_norm, d.rtol)
             if verdict != 0:
-                return k + 1 if verdict > 0 else 0
+                return rate if verdict > 0 else -1.0
             last_norm = norm
-        return 0
+        return -1.0
 
     @kernel
     def line_search(d, step, norm):
@@ -269,13 +268,13 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
     @kernel
     def iterate_damped(d, step):
         """Iterate damped with a new Newton matrix each time: for friction that saturates within a step."""
-        t, enough = d.time + step, limit(d.rtol)
+        t, enough = d.time + step, newton.limit(d.rtol)
         correction = vector(d, CORRECTION)
         if not residual(d, step):
             return False
         left = rates_norm(d, step, vector(d, RESIDUAL))
         for _ in range(MOST_CORRECTIONS):
-            if not jacobian(d, t, d.at_y_new, slope(d, ITERATE)) or not factorise(d, step):
+            if not jacobian(d, t, d.at_y_new, slope(d, ITERATE), slope(d, ESTIMATE)) or not factorise(d, step):
                 return False
             for i in range(n_rates(d)):
                 d.w[correction + i] = d.w[vector(d, RESIDUAL) + i]
@@ -288,77 +287,27 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
                 return False
         return False
 
+    simplified = newton.make_solve(jacobian, factorise, predict, iterate)
+
     @kernel
     def solve_step(d, step):
         """Solve for the rates NEW at the end of the step; return False when no iteration converges.
 
         With adaptive steps a shorter step is the better remedy, with fixed steps further iterations are.
         """
-        for _ in range(2):
-            fresh = d.memory[JACOBIAN_HOLDS] == 0.0
-            if fresh and not jacobian(d, d.time, d.at_y, slope(d, 0)):
-                return False
-            if d.memory[FACTORED_STEP] != step and not factorise(d, step):
-                return False
-            predict(d, step)
-            count = iterate(d, step)
-            if count > 0:
-                d.memory[JACOBIAN_HOLDS] = 1.0 if count <= SLOW_FROM else 0.0
-                return True
-            d.memory[JACOBIAN_HOLDS] = 0.0
-            if fresh:
-                break
-        if d.fixed > 0.0:
-            predict(d, step)
-            return iterate_damped(d, step)
-        return False
+        if simplified(d, step):
+            return True
+        if d.fixed == 0.0:
+            return False
+        predict(d, step)
+        return iterate_damped(d, step)
 
     return place_end, solve_step
 
 
-def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
-    """Build the kernel jacobian(d, t, y, slope_there)."""
-
-    @kernel
-    def column(d, t, slope_there, k, change, target):
-        """Store column k of a Jacobian of the rates, from the changed state in Y_STAGE."""
-        size, nq, near = n_rates(d), d.nq, slope(d, ESTIMATE)
-        evaluate(d, t, d.at_y_stage, near)
-        d.evaluations += 1
-        for i in range(size):
-            d.w[target + size * i + k] = (d.w[near + nq + i] - d.w[slope_there + nq + i]) / change
-        return d.evaluation == m.OK
-
-    @kernel
-    def jacobian(d, t, y, slope_there):
-        """Store the derivatives of the rates by speeds and z, and by displacements, at state y; False on failure."""
-        nv, nq, shift = d.nv, d.nq, vector(d, DISPLACEMENT)
-        for c in range(d.ny):
-            d.y_stage[c] = d.w[y + c]
-        for k in range(n_rates(d)):
-            floor, value = d.floors[d.groups[nq + k].group].natural, d.w[y + nq + k]
-            changed = value + COLUMN_STEP * (floor + abs(value))
-            d.y_stage[nq + k] = changed
-            if not column(d, t, slope_there, k, changed - value, matrix(d, BY_STATE)):
-                return False
-            d.y_stage[nq + k] = value
-        for k in range(nv):
-            change = COLUMN_STEP * d.floors[d.groups[nq + k].group].natural
-            for j in range(nv):
-                d.w[shift + j] = change if j == k else 0.0
-            retract(d, y, shift, d.at_y_stage, vector(d, POSITIONS))
-            if not column(d, t, slope_there, k, change, matrix(d, BY_POSITION)):
-                return False
-        d.jacobians += 1
-        d.memory[JACOBIAN_HOLDS], d.memory[FACTORED_STEP] = 1.0, 0.0
-        return True
-
-    return jacobian
-
-
 METHOD = Method(
     traits=INTEGRATORS["generalized-alpha"],
-    room=m.Room(ROWS, hermite.ROWS, FLOATS, VECTORS, MATRICES),
+    room=m.Room(ROWS, hermite.ROWS, newton.FLOATS, VECTORS, MATRICES),
     last=LAST,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,

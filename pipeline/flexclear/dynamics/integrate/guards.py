@@ -29,11 +29,7 @@ from flexclear.dynamics.vectors import add, dot, scale, sub
 #: how close to its level a guard ends a step, as a fraction of the guard's size over the root of the tolerance: the
 #: error of a step that ends so far beyond falls with the square of it
 LEVEL_DISTANCE = 0.1
-#: a vector that passes zero within this fraction of its change reverses: in a plane mechanism the rest is rounding
-REVERSES = 1e-6
 MOST_REPEATS = 3
-#: a repeated step that would be a smaller fraction of the first one, or of the time reached, is not made
-SHORTEST_STEP = 1e-12
 #: returned by `first_passed` when a step passes no guard
 NONE = (2.0, -1, 0.0, 1.0, 0.0, 0.0)
 
@@ -113,7 +109,9 @@ def passage(d, g):
     inside, within, first, second = length(there), 0.0 < theta < 1.0, length(at.start), length(at.end)
     if level == 0.0:
         way = length(sub(at.end, at.start))
-        if not (within and inside <= REVERSES * way and min(first, second) > close):
+        # a vector that passes zero within this fraction of its change reverses: in a plane mechanism the rest is
+        # rounding
+        if not (within and inside <= 1e-6 * way and min(first, second) > close):
             return NONE
         return theta, g, 0.0, 1.0, -first, second
     first, second, inside = first - level, second - level, inside - level
@@ -189,7 +187,8 @@ def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable)
             return 0.0
         close = closeness(d, g)
         theta = locate(d, step, g, 0.0, close, a, b, fa, fb)
-        if not theta < before or theta * step <= SHORTEST_STEP * max(abs(d.time), step):
+        # a repeated step that would be a smaller fraction of the first one, or of the time reached, is not made
+        if not theta < before or theta * step <= 1e-12 * max(abs(d.time), step):
             return 0.0
         size = land(d, step, theta, g, close, a, fa)
         if size < 0.0:

@@ -22,9 +22,6 @@ ZERO_GAP, FOUR_ROUNDINGS = 1e-12, 8.9e-16
 ROOT_ITERATIONS, TURN_ITERATIONS = 60, 40
 #: returned in place of a fraction of the step when the mode does not change
 NO_CHANGE = 2.0
-#: assumed error of the cubic through a step's ends, as a fraction of its departure from a straight line; in long steps
-#: of order 8 its error is a tenth of that
-TRUST = 0.2
 #: a step with a possible mode change is searched in intervals of at most this fraction. They are halved while the cubic
 #: through an interval's ends misses its middle by more than this fraction of its departure, and of the distance before
 #: the mode change (that behind it may be thousands of times larger), and while the ball travels more than its
@@ -32,8 +29,6 @@ TRUST = 0.2
 WIDEST_STRETCH, FAITHFUL = 0.25, 0.05
 #: to this fraction: even the rate of a gap jumps where a ball passes the centre of its socket
 SHORTEST = 2.0**-13
-#: by more than this fraction of its departure, a cubic may be lower between the quarters of its halves
-DIP = 0.05
 
 
 @kernel
@@ -88,7 +83,9 @@ def cubic_tells(d, c, step):
     watch, s = d.watch[c], side(d, c)
     d0, d1 = s * watch.gap0, s * watch.gap1
     r0, r1 = -s * watch.rate0 * step, -s * watch.rate1 * step
-    return cubic_least(d0, d1, r0, r1) < TRUST * cubic_departure(d0, d1, r0, r1)
+    # assumed error of the cubic through a step's ends, as a fraction of its departure from a straight line; in long
+    # steps of order 8 its error is a tenth of that
+    return cubic_least(d0, d1, r0, r1) < 0.2 * cubic_departure(d0, d1, r0, r1)
 
 
 def make_locate_change(evaluate_at: Callable) -> Callable:
@@ -185,7 +182,8 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
             half, missed = 0.5 * width, abs(dm - cubic_middle(d0, d1, width * r0, width * r1))
             least = min(cubic_least(d0, dm, half * r0, half * r), cubic_least(dm, d1, half * r, half * r1))
             bend = cubic_departure(d0, d1, width * r0, width * r1)
-            if not min(least, min(dm, d1)) > missed + DIP * bend:
+            # by more than this fraction of its departure, a cubic may be lower between the quarters of its halves
+            if not min(least, min(dm, d1)) > missed + 0.05 * bend:
                 near = FAITHFUL * min(bend, max(d0, max(dm, d1))) + zero
                 known = missed <= near and distance_between(p0, p) + distance_between(p, p1) <= room
                 if width > SHORTEST and not known:

@@ -23,8 +23,6 @@ PHI_COUNT = 5
 SERIES_LIMIT, TERMS = 1.0, 14
 #: where (b / 2)^2 - a is more, two decays are distinguished; where it is less, a is not small
 DISTINCT = 0.0625
-#: even order to which sine and cosine are expanded in between
-EVEN_ORDER = 12
 INVERSE_FACTORIALS = np.array([1.0 / factorial(k) for k in range(PHI_COUNT + TERMS)])
 
 
@@ -79,7 +77,8 @@ def phi_functions(w, out, a, b):
         alpha, beta = decay * np.cos(root), decay * np.sin(root) / root
     else:  # the same series, whether it swings or creeps
         alpha = beta = decay
-        for k in range(EVEN_ORDER, 0, -2):
+        # even order to which sine and cosine are expanded in between
+        for k in range(12, 0, -2):
             alpha, beta = decay - square / ((k - 1) * k) * alpha, decay - square / (k * (k + 1)) * beta
     alpha += 0.5 * b * beta
     for k in range(PHI_COUNT):

@@ -15,16 +15,8 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.integrate import hermite
+from flexclear.dynamics.integrate import hermite, newton
 from flexclear.dynamics.integrate.method import Method, matrix, slope, vector
-from flexclear.dynamics.integrate.newton import (
-    COLUMN_STEP,
-    converged,
-    lu_factor,
-    lu_factor_complex,
-    lu_solve,
-    lu_solve_complex,
-)
 from flexclear.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
 from flexclear.dynamics.kernels import kernel
 from flexclear.scene.integrators import INTEGRATORS
@@ -62,41 +54,43 @@ P = np.array(
     ]
 )
 MOST_ITERATIONS = 7
-#: corrections that fall slower than this request a new Jacobian at the next step
-SLOW_CONVERGENCE = 0.3
 
 # Memory between steps ------------------------------------------------------------------------------------------------
-# floats: step of the factors, whether the Jacobian still holds, length of the step before (0: none)
-FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(4)
-#: vectors: three each of Z, of the transformed Z and of its Newton corrections, four of the previous step's polynomial;
-#: row exchanges of the factors of a real and of a complex system
+#: vectors: three each of Z, of the transformed Z and of its Newton corrections (`correction`), four of the previous
+#: step's polynomial; row exchanges of the factors of a real and of a complex system
 Z, TRANSFORMED, CORRECTION, POLYNOMIAL = range(0, 12, 3)
 REAL_PIVOTS, COMPLEX_PIVOTS, VECTORS = range(POLYNOMIAL + 4, POLYNOMIAL + 7)
-#: matrices: the Jacobian, and the factors of both systems, the complex one's imaginary part last
-JACOBIAN, REAL, COMPLEX, MATRICES = 0, 1, 2, 4
+#: matrices: after the Jacobian the factors of both systems
+REAL, COMPLEX, MATRICES = 1, 2, 4
 
 
 # Linear systems ------------------------------------------------------------------------------------------------------
 @kernel
 def factorise(d, step):
     """Factorise both systems for a step; return False when one is singular."""
-    size, jacobian, real, rest = d.ny, matrix(d, JACOBIAN), matrix(d, REAL), matrix(d, COMPLEX)
-    for i in range(size):
-        for o in range(size * i, size * (i + 1)):
-            d.w[real + o] = d.w[rest + o] = -d.w[jacobian + o]
-            d.w[rest + size * size + o] = 0.0
-        d.w[real + (size + 1) * i] += MU_REAL / step
-        d.w[rest + (size + 1) * i] += MU_REST / step
-        d.w[rest + size * size + (size + 1) * i] = MU_IMAG / step
-    d.memory[FACTORED_STEP] = step
+    size, jacobian, real, rest = d.ny, matrix(d, newton.JACOBIAN), matrix(d, REAL), matrix(d, COMPLEX)
+    for o in range(size * size):
+        d.w[real + o] = d.w[rest + 2 * o] = -d.w[jacobian + o]
+        d.w[rest + 2 * o + 1] = 0.0
+    for o in range(0, size * size, size + 1):
+        d.w[real + o] += MU_REAL / step
+        d.w[rest + 2 * o] += MU_REST / step
+        d.w[rest + 2 * o + 1] = MU_IMAG / step
+    d.memory[newton.FACTORED_STEP] = step
     real_pivots, complex_pivots = vector(d, REAL_PIVOTS), vector(d, COMPLEX_PIVOTS)
-    return lu_factor(d.w, real, real_pivots, size) and lu_factor_complex(d.w, rest, complex_pivots, size)
+    return newton.lu_factor(d.w, real, real_pivots, size) and newton.lu_factor_complex(d.w, rest, complex_pivots, size)
 
 
 @kernel
 def solve_real(d, b):
     """Solve the real system in place for the right-hand side at index b."""
-    lu_solve(d.w, matrix(d, REAL), vector(d, REAL_PIVOTS), d.ny, b)
+    newton.lu_solve(d.w, matrix(d, REAL), vector(d, REAL_PIVOTS), d.ny, b)
+
+
+@kernel
+def correction(d, i, c):
+    """Return the index in w of the correction of transformed stage i and variable c; the last two form one number."""
+    return vector(d, CORRECTION) + c if i == 0 else vector(d, CORRECTION + 1) + 2 * c + i - 1
 
 
 # Collocation polynomial ----------------------------------------------------------------------------------------------
@@ -126,13 +120,13 @@ def extend(d, step):
 def keep(d, step):
     """Store the polynomial of an accepted step, which predicts the stages of the next."""
     write_polynomial(d, vector(d, POLYNOMIAL))
-    d.memory[LAST_STEP] = step
+    d.memory[newton.LAST_STEP] = step
 
 
 @kernel
 def begin(d):
     """Discard the polynomial; the Jacobian serves until iterations converge slowly, whatever the contacts' modes."""
-    d.memory[LAST_STEP] = 0.0
+    d.memory[newton.LAST_STEP] = 0.0
 
 
 # Newton's iteration --------------------------------------------------------------------------------------------------
@@ -155,7 +149,7 @@ def predict(d, step):
     first iterate at a contact's begin would have no penetration, and the force in the second would look like
     divergence.
     """
-    length, o, size = d.memory[LAST_STEP], vector(d, POLYNOMIAL), d.ny
+    length, o, size = d.memory[newton.LAST_STEP], vector(d, POLYNOMIAL), d.ny
     for i in range(3):
         x = 1.0 + C[i] * step / length if length > 0.0 else 0.0
         for c in range(size):
@@ -183,7 +177,7 @@ def residuals(d, step):
                 total -= MU_REST * two - MU_IMAG * three
             else:
                 total -= MU_REST * three + MU_IMAG * two
-            d.w[vector(d, CORRECTION + i) + c] = total
+            d.w[correction(d, i, c)] = total
 
 
 @kernel
@@ -193,7 +187,7 @@ def correct(d):
     for c in range(d.ny):
         scale = error_scale(d, c)
         for i in range(3):
-            change = d.w[vector(d, CORRECTION + i) + c]
+            change = d.w[correction(d, i, c)]
             d.w[vector(d, TRANSFORMED + i) + c] += change
             total += (change / scale) ** 2
     transform(d, T, TRANSFORMED, Z)
@@ -217,33 +211,6 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """Build the method's kernels."""
 
     @kernel
-    def jacobian(d):
-        """Compute the derivatives of all rates by all variables at the step's start; works and losses have none."""
-        size, near, J = d.ny, slope(d, 1), matrix(d, JACOBIAN)
-        works = d.nq + d.nv
-        states = works + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * d.n_contacts
-        for c in range(size):
-            d.y_stage[c] = d.y[c]
-        for k in range(size):
-            if works <= k < states:
-                for i in range(size):
-                    d.w[J + size * i + k] = 0.0
-                continue
-            y = d.y[k]
-            d.y_stage[k] = y + COLUMN_STEP * (d.floors[d.groups[k].group].natural + abs(y))
-            change = d.y_stage[k] - y
-            evaluate(d, d.time, d.at_y_stage, near)
-            d.evaluations += 1
-            if d.evaluation != m.OK:
-                return False
-            for i in range(size):
-                d.w[J + size * i + k] = (d.w[near + i] - d.slopes[i]) / change
-            d.y_stage[k] = y
-        d.jacobians += 1
-        d.memory[JACOBIAN_HOLDS], d.memory[FACTORED_STEP] = 1.0, 0.0
-        return True
-
-    @kernel
     def iterate(d, step):
         """Iterate; return the rate at which the corrections fell, or -1 when they did not."""
         size, last_norm, rate = d.ny, 0.0, 0.0
@@ -258,37 +225,27 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
                     return -1.0
             residuals(d, step)
             solve_real(d, vector(d, CORRECTION))
-            right, imaginary = vector(d, CORRECTION + 1), vector(d, CORRECTION + 2)
-            lu_solve_complex(d.w, matrix(d, COMPLEX), vector(d, COMPLEX_PIVOTS), size, right, imaginary)
+            pivots, rest = vector(d, COMPLEX_PIVOTS), vector(d, CORRECTION + 1)
+            newton.lu_solve_complex(d.w, matrix(d, COMPLEX), pivots, size, rest)
             norm = correct(d)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = converged(k, norm, last_norm, d.rtol)
+            verdict = newton.converged(k, norm, last_norm, d.rtol)
             if verdict != 0:
                 return rate if verdict > 0 else -1.0
             last_norm = norm
         return -1.0
 
+    solve_step = newton.make_solve(newton.make_jacobian(evaluate), factorise, predict, iterate)
+
     @kernel
     def attempt(d, step):
         """Step from Y to Y_NEW; return False when Newton's iteration fails with a new Jacobian, too."""
         set_error_scales(d, d.at_y)
-        for _ in range(2):
-            fresh = d.memory[JACOBIAN_HOLDS] == 0.0
-            if fresh and not jacobian(d):
-                return False
-            if d.memory[FACTORED_STEP] != step and not factorise(d, step):
-                return False
-            predict(d, step)
-            rate = iterate(d, step)
-            if rate >= 0.0:
-                d.memory[JACOBIAN_HOLDS] = 1.0 if rate <= SLOW_CONVERGENCE else 0.0
-                for c in range(d.ny):
-                    d.y_new[c] = d.y[c] + d.w[vector(d, Z + 2) + c]
-                return True
-            d.memory[JACOBIAN_HOLDS] = 0.0
-            if fresh:
-                return False
-        return False
+        if not solve_step(d, step):
+            return False
+        for c in range(d.ny):
+            d.y_new[c] = d.y[c] + d.w[vector(d, Z + 2) + c]
+        return True
 
     @kernel
     def error(d, step):
@@ -309,7 +266,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
 METHOD = Method(
     traits=INTEGRATORS["radau"],
-    room=m.Room(ROWS, hermite.ROWS, FLOATS, VECTORS, MATRICES),
+    room=m.Room(ROWS, hermite.ROWS, newton.FLOATS, VECTORS, MATRICES),
     last=LAST,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,

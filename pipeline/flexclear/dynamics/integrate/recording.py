@@ -21,8 +21,6 @@ from flexclear.dynamics.kernels import kernel
 #: recorded states are projected to this fraction of rtol times the mechanism's size; it grows by so many times rtol, up
 #: to the second fraction: a residual that the run itself left needs no evaluation in every row
 RECORD_SHARE, MOST_SHARE, LOOSER_FACTOR = 1e-3, 0.1, 1e3
-#: growth of the square of an error group's distance from the start after which a row is stored
-LARGER = 2.0
 #: largest number of rows between outputs, for which the array has room at its end: the last ones are those that count
 BETWEEN = 128
 #: steps over many vibrations are examined inside, too: the first ones, then one of so many, at fractions that the
@@ -100,7 +98,8 @@ def keep_largest(d, rows, t, y):
         d.excursion[d.groups[k].group].now += (d.w[y + k] - first[state + k]) ** 2
     for g in range(d.n_groups):
         group = d.excursion[g]
-        if group.now > LARGER * group.largest:
+        # growth of the square of an error group's distance from the start after which a row is stored
+        if group.now > 2.0 * group.largest:
             group.largest, further = group.now, True
     if further:
         put_row(d, rows[rows.shape[0] - 1 - d.n_between % BETWEEN], t, y)

@@ -32,10 +32,6 @@ FROM, HALF = 0.3, 0.5
 TOO_LITTLE = 2e-4
 #: steps towards that point end short of it by this fraction of the way: nearer, the time of the pose is known better
 POSE_MARGIN, NEARER = 0.1, 0.7
-#: fraction of a step for the finite difference of the slope: the state there comes from the slope at the end
-SLOPE_FRACTION = 1e-4
-#: fraction of the mechanism's size to which closures are closed where the polynomial ends
-TIGHTLY = 1e-15
 
 
 @kernel
@@ -122,7 +118,8 @@ def make_foresee(evaluate: Callable) -> Callable:
             if d.left > LOW:
                 d.most_reach = NEVER
             return
-        back = SLOPE_FRACTION * min(span, rough)
+        # fraction of a step for the finite difference of the slope: the state there comes from the slope at the end
+        back = 1e-4 * min(span, rough)
         for k in range(d.ny):
             d.y_stage[k] = d.y[k] - back * d.slopes[k]
         evaluate(d, t - back, d.at_y_stage, d.at_y_new)
@@ -225,7 +222,8 @@ def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method
         d.evaluations += 1
         used = -1
         if d.evaluation == m.OK:
-            tolerance = TIGHTLY * d.length
+            # fraction of the mechanism's size to which closures are closed where the polynomial ends
+            tolerance = 1e-15 * d.length
             used = project(d.h, d.f, d.w, d.n, t_new, d.at_y_new, d.at_slopes + d.ny * last, tolerance)
             d.evaluations += max(used, 0)
         if used >= 0:

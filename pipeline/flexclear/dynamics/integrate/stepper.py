@@ -14,16 +14,9 @@ from typing import Any, NamedTuple
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.projection import keep_scales, largest
 from flexclear.dynamics.fields import data
+from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.integrate.method import AWAITS, LOST, await_rates, make_at_once, make_attempt
 from flexclear.dynamics.integrate.norms import finite
-from flexclear.dynamics.integrate.recording import (
-    BETWEEN,
-    hold_modes,
-    keep_largest,
-    make_record_outputs,
-    share_of_records,
-    snapshot,
-)
 from flexclear.dynamics.integrate.stiffness import make_detect_stiffness
 from flexclear.dynamics.kernels import kernel
 
@@ -32,10 +25,6 @@ from flexclear.dynamics.kernels import kernel
 RESTART = 1
 #: returned for a step of given length that cannot end on the event inside it; other negative numbers end the run
 AGAIN = -2
-#: a step below this fraction of the planned one has been cut short
-CUT = 0.9
-#: such a step is tried again with this fraction of its length
-RETRY_FRACTION = 0.3
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
@@ -45,14 +34,13 @@ FAILED = 1e9
 PENDING = -1.0
 #: stage of a complete attempt that waits for the rates at its end
 ENDING = 1 << 30
-#: a step below this fraction of the time reached cannot be distinguished from rounding
-SMALLEST_STEP = 4e-16
 
 
 @kernel
 def plan(d, step, following):
     """Return the next step to attempt; a step that was cut short does not limit it."""
-    least = d.step if step < CUT * d.step else 0.0
+    # a step below this fraction of the planned one has been cut short
+    least = d.step if step < 0.9 * d.step else 0.0
     d.step = max(following, least)
 
 
@@ -175,7 +163,7 @@ def make_advance(
         foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, made.attempt, method)
     last, ends = method.last, method.ends
     watch_start, _, any_closed = events
-    record_outputs = make_record_outputs(made.extend, made.dense.interpolate, method.room.oscillations > 0)
+    record_outputs = recording.make_record_outputs(made.extend, made.dense.interpolate, method.room.oscillations > 0)
     detect_stiffness = make_detect_stiffness(method)
     first_step, error_norm, after_rejection, next_step = stepping.make_step_control(evaluate, any_closed, error, method)
 
@@ -194,7 +182,7 @@ def make_advance(
             d.status = m.AT_SINGULAR
         elif d.last_pivot < d.least_pivot:
             d.status = m.WORN_ROWS
-        elif d.n_recorded + waiting + room + BETWEEN > rows.shape[0] or d.n_events + room > events.shape[0]:
+        elif d.n_recorded + waiting + room + recording.BETWEEN > rows.shape[0] or d.n_events + room > events.shape[0]:
             d.status = m.FULL
         else:
             return False
@@ -209,7 +197,7 @@ def make_advance(
         """
         second = d.next_output + 1
         several = second < outputs.shape[0] and outputs[second] <= t_new
-        return (share_of_records(d.rtol) if several else 1.0) * d.rtol * d.length
+        return (recording.share_of_records(d.rtol) if several else 1.0) * d.rtol * d.length
 
     @kernel
     def finish(d, t_new, tolerance):
@@ -310,7 +298,8 @@ def make_advance(
             return 0.0
         if t + 1.0001 * step >= d.end:
             step = d.end - t
-        if step > SMALLEST_STEP * max(abs(t), d.span):
+        # a step below this fraction of the time reached cannot be distinguished from rounding
+        if step > 4e-16 * max(abs(t), d.span):
             return step
         if d.evaluation == m.NOT_FINITE:
             d.status = m.NOT_A_NUMBER
@@ -346,21 +335,22 @@ def make_advance(
                 continue
             along = loops and poses.ready(d)
             following = d.step if along else next_step(d, step, norm)
-            hold_modes(d)
+            recording.hold_modes(d)
             happened, known, t_end, step = resolve(d, step, t_new, rows, events)
             if happened == AGAIN and d.fixed == 0.0 and not along:  # a polynomial would be the same again
                 d.rejected += 1
-                d.step, d.rejected_step = RETRY_FRACTION * step, 0.0
+                # such a step is tried again with this fraction of its length
+                d.step, d.rejected_step = 0.3 * step, 0.0
                 continue
             if happened < 0:
                 return False
             d.steps += 1
             if along:
-                snapshot(d, rows, t, d.at_y)
+                recording.snapshot(d, rows, t, d.at_y)
             record_outputs(d, step, known, outputs, rows, t_end)
             keep(d, step)
             accept(d, t_end)
-            keep_largest(d, rows, t_end, d.at_y)
+            recording.keep_largest(d, rows, t_end, d.at_y)
             plan(d, step, following)
             if loops:
                 if along:
@@ -368,8 +358,8 @@ def make_advance(
                 elif t_end == t_new:  # how independent the rows are has been noted at the end that was tried
                     foresee(d, t_end)
             if happened > 0 or along:
-                hold_modes(d)
-                snapshot(d, rows, t_end, d.at_y)
+                recording.hold_modes(d)
+                recording.snapshot(d, rows, t_end, d.at_y)
                 d.fresh = 1 if along or happened == RESTART else 0
         return False
 

@@ -16,8 +16,6 @@ from flexclear.dynamics.kernels import kernel
 
 #: changes of state below this fraction of the tolerance are rounding, from which no rate can be computed
 LEAST_CHANGE = 1e-2
-#: adaptive steps oscillate about the stability limit: from this fraction of it on they count as limited
-SWINGING = 0.7
 
 
 @kernel
@@ -65,7 +63,8 @@ def make_detect_stiffness(method: Any) -> Callable:
         """Store the step's largest rate, and count the step if stability limits it."""
         rate = steepness(d, last)
         d.steepest = max(d.steepest, rate)
-        share = 1.0 if d.fixed > 0.0 else SWINGING
+        # adaptive steps oscillate about the stability limit: from this fraction of it on they count as limited
+        share = 1.0 if d.fixed > 0.0 else 0.7
         if rate * step > share * reach:
             d.stiff_steps += 1
 

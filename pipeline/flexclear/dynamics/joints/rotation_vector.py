@@ -15,14 +15,12 @@ from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import ZERO, about, add, at, cross, dot, put, scale
 from flexclear.numerics.rotations import matrix_to_quaternion
 
-#: angle^2 below which the functions come from their series; their next terms are below rounding there
-SERIES_ANGLE = 1e-2
-
 
 @kernel
 def _functions(s):
     """Return sin/angle, a, b and the derivatives of a and b by s = angle^2."""
-    if s < SERIES_ANGLE:
+    # angle^2 below which the functions come from their series; their next terms are below rounding there
+    if s < 1e-2:
         c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)))
         a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
         b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0

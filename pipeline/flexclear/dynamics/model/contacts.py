@@ -112,12 +112,11 @@ def resolved(joint: Clearance | End, mass: float | None, path: str) -> Resolved:
 
     mass: that rebounds [kg], for laws whose damping depends on it.
     """
-    normal, stiffness = lookup(NORMAL_LAWS, joint.normal.law, where=path), joint.normal.stiffness
+    normal, stiffness = joint.normal, joint.normal.stiffness
     try:
         if not isinstance(joint, End):
-            exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
-            stiffness = lookup(SURFACES, joint.type, where=path).stiffness(joint, exponent)
-        law: Resolved = normal.resolve(joint.normal, stiffness, mass)
+            stiffness = lookup(SURFACES, joint.type, where=path).stiffness(joint, normal.exponent)
+        law: Resolved = lookup(NORMAL_LAWS, normal.law, where=path)(normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None
     return law

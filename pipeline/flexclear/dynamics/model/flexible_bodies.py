@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.interface_basis import (
-    NO_COUPLING,
-    InterfaceBasis,
-    frame_index,
-    frame_shapes,
-    mass_coupled,
-)
+from flexclear.dynamics.model import interface_basis
 from flexclear.dynamics.model.mechanism import Mechanism, Site
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.numbering import Numbering
@@ -106,7 +100,7 @@ def second_motion(mechanism: Mechanism, link: int, frame: str) -> tuple[np.ndarr
     body, bundle = _body(mechanism, link)
     if mechanism.scene.flexible()[body].stiffening is None:
         return None, None
-    k = frame_index(bundle, frame)
+    k = interface_basis.frame_index(bundle, frame)
     return bundle["frame_second_translation"].values[k], bundle["frame_second_rotation"].values[k]
 
 
@@ -159,10 +153,10 @@ def _data(bundle: Labelled, damping: np.ndarray) -> np.ndarray:
     return np.concatenate([c.ravel() for c in chunks])
 
 
-def _interface_data(bundle: Labelled, basis: InterfaceBasis) -> np.ndarray:
+def _interface_data(bundle: Labelled, basis: interface_basis.InterfaceBasis) -> np.ndarray:
     """Return C1 (3n), modal mass (n n) and stiffness (n n) in the interface basis."""
     T, mass = basis.matrix, bundle["modal_mass"].values
-    mixed = mass if mass_coupled(bundle) else np.diag(np.diag(T.T @ np.diag(np.diag(mass)) @ T))
+    mixed = mass if interface_basis.mass_coupled(bundle) else np.diag(np.diag(T.T @ np.diag(np.diag(mass)) @ T))
     stiffness = T.T @ (np.diag(bundle["modal_stiffness"].values)[:, None] * T)
     return np.concatenate([(bundle["modal_first_moment"].values @ T).ravel(), mixed.ravel(), stiffness.ravel()])
 
@@ -171,7 +165,7 @@ def _moments(bundle: Labelled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return nonzero rows of MOMENT_VALUES by row (3k + l) n + j, modes i, and the end of each row among them."""
     F, L = bundle["mode_mode_moment"].values, bundle["second_order_moment"].values
     n, both = F.shape[-1], np.stack([F + L, F])
-    k, l, i, j = np.nonzero(np.any(np.abs(both) > NO_COUPLING * max(np.abs(F).max(), 1e-300), axis=0))
+    k, l, i, j = np.nonzero(np.any(np.abs(both) > interface_basis.NO_COUPLING * max(np.abs(F).max(), 1e-300), axis=0))
     row = (3 * k + l) * n + j
     order = np.lexsort((i, row))
     return both[:, k, l, i, j][:, order].T, i[order], np.cumsum(np.bincount(row, minlength=9 * n))
@@ -188,7 +182,7 @@ def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
     frame = _inboard_frame(mechanism, link)
     if frame is None:
         return False
-    _, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
+    _, *shapes = interface_basis.frame_shapes(_body(mechanism, link)[1], frame)
     return any(np.any(shape) for shape in [*shapes, *second_motion(mechanism, link, frame)] if shape is not None)
 
 
@@ -197,7 +191,7 @@ def coupled(mechanism: Mechanism, link: int) -> bool:
 
     They have where they move the inboard frame, and with it the whole body.
     """
-    return _inboard_moves(mechanism, link) or mass_coupled(_body(mechanism, link)[1])
+    return _inboard_moves(mechanism, link) or interface_basis.mass_coupled(_body(mechanism, link)[1])
 
 
 def _ports(numbering: Numbering, stiffened: bool) -> tuple[list[Any], list[Any], list[float]]:
@@ -210,7 +204,7 @@ def _ports(numbering: Numbering, stiffened: bool) -> tuple[list[Any], list[Any],
         if frame is None:
             pose, *shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), np.zeros((3, n)), np.zeros((3, n))
         else:
-            pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
+            pose, *shapes = interface_basis.frame_shapes(_body(mechanism, link)[1], frame)
         chunks: list[np.ndarray] = [(shape @ numbering.bases[link].moving).ravel() for shape in shapes]
         if stiffened:
             forms = (None, None) if frame is None else second_motion(mechanism, link, frame)
@@ -227,7 +221,7 @@ def start_place(mechanism: Mechanism, site: Site) -> Placement:
     if q is None or bundle is None or site.frame is None:
         return site.placement
     label = site.frame.partition(".")[2]
-    _, moves, turns = frame_shapes(bundle, label)
+    _, moves, turns = interface_basis.frame_shapes(bundle, label)
     rest = np.zeros((1, len(q)))
     second = second_motion(mechanism, site.link, label)
     shifted, turned = (shift(S, G, q[None], rest, rest)[0][0] for S, G in zip((moves, turns), second, strict=True))

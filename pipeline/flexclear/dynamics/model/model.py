@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -28,9 +28,6 @@ from flexclear.scene.schema import Scene
 
 if TYPE_CHECKING:
     from flexclear.dynamics.contact.law import Resolved
-
-#: four roundings of a length, relative to the length
-LENGTH_ROUNDING = 8.9e-16
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,7 @@ def filled(
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
-    gravity = loading.gravity(mechanism.scene)
+    gravity, components = loading.gravity(mechanism.scene), mechanism.components
     parts = _parts(numbering, normals, any(law.harmonics.any() for law in [*drive_laws, *loaded.laws]))
     slots = filling.slots(mechanism, parts)
     books = _books(slots)
@@ -127,7 +124,9 @@ def filled(
         m.GRAVITY: gravity,
         m.BOOKS: books,
         m.DRIVES: _drives(mechanism, books),
-        m.CLOSURE_NUMBERS: _closure_weights(mechanism, ordered),
+        m.CLOSURE_NUMBERS: [
+            components.lengths[components.of(*(site.link for both in one.ends for site in both))] for one in ordered
+        ],
     }
     tables[m.GROUPS], tables[m.FLOORS] = _error_groups(numbering, parts, gauges)
     if like is None:
@@ -294,20 +293,6 @@ def _drives(mechanism: Mechanism, books: Books) -> list[int]:
     """Return the rows of the table DRIVES."""
     parts = {name: mechanism.components.of(i) for i, link in enumerate(mechanism.links) for name in link.drives}
     return [books[parts[name]].work for name in mechanism.drives]
-
-
-def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling]) -> list[float]:
-    """Return the rows of the table CLOSURE_NUMBERS.
-
-    A small mechanism within a large one closes only to the rounding of its coordinates; the weights are bounded by
-    that.
-    """
-    L, weights = mechanism.length, list[float]()
-    rounding = LENGTH_ROUNDING * L / mechanism.scene.solver.rtol
-    for one in closures:
-        part = mechanism.components.of(*(site.link for both in one.ends for site in both))
-        weights.append(max(L / max(mechanism.components.lengths[part], rounding), 1.0))
-    return weights
 
 
 def _error_groups(numbering: Numbering, parts: Parts, gauges: Gauges) -> tuple[np.ndarray, np.ndarray]:

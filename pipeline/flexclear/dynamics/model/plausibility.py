@@ -14,7 +14,6 @@ from flexclear.dynamics.effects.stops.model import End
 from flexclear.dynamics.model.flexible_bodies import start_place
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.merge import Placement
-from flexclear.scene.clearance import HOLLOW
 from flexclear.scene.loads import Gravity, SpringDamper
 from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Scene
@@ -26,11 +25,8 @@ from flexclear.system.errors import InputError, errors_from
 SAME_POINT = 1e-3
 #: joints of planar mechanisms: their z axis is one about which bodies turn, or along which they slide; largest sine of
 #: the angle, and largest difference of its cosine from 1, between directions that count as parallel
-PLANAR = dict.fromkeys(("revolute", "clearance-revolute", "clearance-slot", "planar"), "turns")
-PLANAR |= {"prismatic": "slides", "fixed": "fixed"}
+PLANAR = {"revolute": "turns", "planar": "turns", "prismatic": "slides", "fixed": "fixed"}
 PARALLEL = 1e-6
-#: springs shorter than this fraction of the mechanism's size have no direction
-SHORTEST_SPRING = 1e-9
 
 
 class Separation(NamedTuple):
@@ -70,7 +66,7 @@ def start_errors(mechanism: Mechanism, *, final: bool = True) -> list[InputError
     scene, slack = mechanism.scene, 0.0 if mechanism.all_rigid else 2.0 * mechanism.start_residual
     checks = list[Callable[[], None]]()
     for contact, depth, offset, _ in separations(mechanism):
-        if depth > contact.joint.radius + slack and isinstance(contact.joint, HOLLOW):
+        if depth > contact.joint.radius + slack and contact.joint.hollow:
             checks.append(partial(_refuse_missed, contact, offset))
         elif final and depth > SAME_POINT * max(contact.joint.clearance, contact.joint.radius) + slack:
             checks.append(partial(refuse_depth, scene, contact, depth))
@@ -87,11 +83,10 @@ def start_errors(mechanism: Mechanism, *, final: bool = True) -> list[InputError
 def _refuse_missed(contact: Contact, offset: np.ndarray) -> None:
     """Raise InputError for a pin or ball outside its hollow part, with the distance."""
     joint: Any = contact.joint
-    centre = "centre line" if joint.type == "clearance-slot" else "centre"
     (hollow, inner), away = joint.surfaces, length(float(np.linalg.norm(offset)))
     raise InputError(
         f"[{contact.place}.between]",
-        f"the {inner} ('{joint.between[1]}') starts {away} from the {centre} of its {hollow} "
+        f"the {inner} ('{joint.between[1]}') starts {away} from the {joint.middle} of its {hollow} "
         f"('{joint.between[0]}'), where the clearance allows {length(joint.clearance)}",
         "correct poses or frames; a bare number is in metres: 50 is 50 m",
     )
@@ -100,7 +95,8 @@ def _refuse_missed(contact: Contact, offset: np.ndarray) -> None:
 def _refuse_short(name: str, load: Any, distance: float, size: float) -> None:
     """Raise InputError for a spring or damper of zero length: it has no direction; size: of the mechanism [m]."""
     directed = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
-    if directed and distance <= SHORTEST_SPRING * size:
+    # springs shorter than this fraction of the mechanism's size have no direction
+    if directed and distance <= 1e-9 * size:
         raise InputError(
             f"[load.{name}.between]",
             "its two ends coincide at the start, so that its force has no direction",
@@ -115,11 +111,13 @@ def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
         return
     problem, remedy = f"its surfaces start with a penetration of {length(depth)}", "enlarge the clearance"
     problem += f" (clearance {length(joint.clearance)})"
-    if joint.type == "ball-on-plane":
-        problem, remedy = f"the ball starts with a penetration of {length(depth)} into the plane", "lower the plane"
-    elif isinstance(joint, End):
+    if isinstance(joint, End):
         unit = "rad" if joint.coordinate.turning else "m"
         problem, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+    elif not joint.hollow:
+        outer, inner = joint.surfaces
+        problem = f"the {inner} starts with a penetration of {length(depth)} into the {outer}"
+        remedy = f"lower the {outer}"
     elif contact.name in loose(scene):
         remedy = "start the joint as without clearance ([start] at = 'ideal'), " + remedy
     raise InputError(
@@ -155,7 +153,7 @@ def _idle_gravity(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
         frame = mechanism.frames[joint.between[0]]
         link = mechanism.links[mechanism.link_of[frame.body]]
         R = link.start.of(link.placements[frame.body]).of(frame.placement).R
-        axes.setdefault(PLANAR.get(joint.type, ""), []).append(R[:, 2])
+        axes.setdefault(PLANAR.get(getattr(joint, "held", None) or joint.type, ""), []).append(R[:, 2])
     normals, slides = (np.array(axes.get(key, [])).reshape(-1, 3) for key in ("turns", "slides"))
     apart = any(link.branch.edge is None or link.on_path for link in mechanism.links[1:])
     if not len(normals) or "" in axes or apart or scene.rubbing() or not mechanism.all_rigid:

@@ -21,6 +21,7 @@ from flexclear.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.dynamics.model.merge import rigid_inertia
 from flexclear.dynamics.model.mobility import moves
 from flexclear.dynamics.model.model import Model, filled
+from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.fields import Part
 from flexclear.scene.formulas import formula
 from flexclear.scene.schema import Scene
@@ -29,8 +30,7 @@ from flexclear.scene.schema import Scene
 KEYS = {
     "time": "end",
     "body": "mass com inertia",
-    "joint": "clearance ball_radius pin_radius length travel ball_material socket_material pin_material "
-    "journal_material slot_material plane_material normal friction floor initial_approach_speed",
+    "joint": " ".join({key for kind in CONTACTS for key in kind.model_fields} - {"type", "between", "source", "wear"}),
     "drive": "law",
     "load": "acceleration force torque stiffness damping free_length rest viscous coulomb values",
 }
@@ -38,8 +38,6 @@ KEYS = {
 CHANGEABLE = {f"{table}.{key}" for table, keys in KEYS.items() for key in keys.split()}
 CHANGEABLE |= {key for effect in EFFECTS for key in effect.changeable}
 CHANGEABLE |= {"title", "description", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view"}
-#: least principal moment, as fraction of the largest, with which every motion of a link has inertia
-SLENDER_INERTIA = 1e-6
 
 
 def refilled(model: Model, scene: Scene) -> Model | None:
@@ -119,7 +117,8 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
                 return None
             links[i] = replace(link, inertia=now)
     principal = np.linalg.eigvalsh(np.array([link.inertia.moments for link in links if link.inertia is not None]))
-    if not np.all(principal[:, 0] > SLENDER_INERTIA * principal[:, -1]):
+    # least principal moment, as fraction of the largest, with which every motion of a link has inertia
+    if not np.all(principal[:, 0] > 1e-6 * principal[:, -1]):
         return None
     placed = [replace(link, start=start) for link, start in zip(links, mechanism.placed, strict=True)]
     length, parts = sizes(scene, placed, mechanism.link_of, mechanism.frames)

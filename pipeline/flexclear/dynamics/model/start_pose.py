@@ -19,7 +19,6 @@ from flexclear.dynamics.model.placing import guess, targets
 from flexclear.dynamics.model.plausibility import separations
 from flexclear.dynamics.model.start_table import given_coordinates
 from flexclear.numerics.rotations import matrix_to_quaternion
-from flexclear.scene.clearance import HOLLOW
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError
 
@@ -109,7 +108,7 @@ def _loose(mechanism: Mechanism) -> list[Gap]:
     """Return gaps of balls and pins that start outside their sockets."""
     result = []
     for contact, _, away, inner in separations(mechanism):
-        if isinstance(contact.joint, HOLLOW) and np.linalg.norm(away) > 2.0 * contact.joint.clearance:
+        if contact.joint.hollow and np.linalg.norm(away) > 2.0 * contact.joint.clearance:
             end = inner.p + mechanism.origin
             result.append(Gap(contact.name, end - away, end, 0.0))
     return result

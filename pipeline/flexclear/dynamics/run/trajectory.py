@@ -193,15 +193,11 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     model, n, control = engine.model, engine.n, engine.control
     solver, contacts = model.scene.solver, len(model.contacts)
     engine.select_pieces_after(t)
-    control[:] = 0.0
+    engine.reset()
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
-    control[m.RTOL], control[m.LENGTH] = engine.rtol, model.length
     control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
     engine.view(m.INDEPENDENCE.at)[:] = 0.0
-    for known in (
-        *range(m.MEMORY, m.QUADRATURES.at + 1),
-        m.EXCURSION.at,
-    ):  # of another run it would change this one's last bits
+    for known in (*range(m.MEMORY, m.QUADRATURES.at + 1), m.EXCURSION.at):  # of another run: it would change last bits
         engine.view(known)[:] = 0.0
     control[m.FIXED], control[m.PARAMETER] = solver.step or 0.0, engine.method.parameter(solver)
     n[m.STATUS : m.INTEGERS] = 0

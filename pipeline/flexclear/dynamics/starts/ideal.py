@@ -26,24 +26,19 @@ from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.dynamics.run.run import maker
 from flexclear.dynamics.starts.snapshot import held, moving, resting
+from flexclear.scene.clearance import Clearance
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import Start
-from flexclear.scene.variants import WITHOUT_CLEARANCE, loose
+from flexclear.scene.variants import loose
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress
 
 #: a pin has reached its position within this fraction of the clearance; largest number of passes for that
 REACHED, PIN_PASSES = 1e-9, 20
-#: forces below this fraction of the weight press nothing: the pin stays in the middle
-NO_FORCE = 1e-9
-#: axes of the outer frame along which an ideal joint holds a pin in the middle; others: all
-ACROSS: dict[str, tuple[int, ...]] = {"clearance-revolute": (0, 1), "clearance-slot": (1,)}
 #: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
 SETTLED, LOADINGS = 1e-9, 10
-#: step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
-MODAL_STEP = 1e-7
 #: singular values below this fraction of the largest are rounding
 SINGULAR_ROUNDING = 1e-9
 
@@ -96,7 +91,7 @@ def _pressed(
 def placed(scene: Scene) -> Scene:
     """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart."""
     joints = scene.joint | {
-        name: IdealJoint.model_validate({"type": WITHOUT_CLEARANCE[joint.type], "between": joint.between})
+        name: IdealJoint.model_validate({"type": joint.ideal, "between": joint.between})
         for name, joint in loose(scene).items()
     }
     start = (scene.start or Start()).model_copy(update={"at": None})
@@ -118,7 +113,8 @@ def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
     if not speeds or engine.mobility.singular_start:
         return y
     try:
-        state, step = y, MODAL_STEP * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
+        # step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
+        state, step = y, 1e-7 * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
         for _ in range(LOADINGS):
             rates = _accelerations(engine, state, speeds)
             slopes = np.array(
@@ -168,27 +164,28 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
     pins = [pin for pin in zip(table, model.contacts, model.laws, strict=True) if pin[1].name in loose(model.scene)]
     modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
 
-    def along(row: np.void, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def along(row: np.void, joint: Clearance) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the axes that hold a pin, its offset [m], and the rate of that [m/s] along the axes."""
         outer, inner = (engine.table(m.SITE_FRAMES)[row[side]] for side in ("outer", "inner"))
-        across, away = outer["axes"][:, ACROSS.get(kind, (0, 1, 2))].T, inner["origin"] - outer["origin"]
+        across, away = outer["axes"][:, joint.across].T, inner["origin"] - outer["origin"]
         return across, across @ away, across @ (inner["velocity"] - outer["velocity"] - np.cross(outer["omega"], away))
 
     for _ in range(PIN_PASSES):
         closure_rows.evaluate(engine, y, engine.start)
         missing = []
         for row, contact, law in pins:
-            across, offset, _ = along(row, contact.joint.type)
+            across, offset, _ = along(row, contact.joint)
             force = across @ forces[contact.name]
             size = float(np.linalg.norm(force))
             pressed = contact.joint.clearance + law.depth(size)
-            target = -force / size * pressed if size > NO_FORCE * weight else 0.0 * force
+            # forces below this fraction of the weight press nothing: the pin stays in the middle
+            target = -force / size * pressed if size > 1e-9 * weight else 0.0 * force
             missing.append(target - offset)
         offsets = np.concatenate(missing)
         if np.max(np.abs(offsets)) <= REACHED * least:
             return y
         engine.select_pieces_after(engine.start)
-        rates = per_speed(engine, y, lambda _: np.concatenate([along(row, one.joint.type)[2] for row, one, _ in pins]))
+        rates = per_speed(engine, y, lambda _: np.concatenate([along(row, one.joint)[2] for row, one, _ in pins]))
         y = _move_pins(engine, y, rates, offsets, modal)
     raise SolverError(
         f"at t = {engine.start:.6g} s: the pins cannot reach their pressed positions; give "

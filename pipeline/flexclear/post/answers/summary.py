@@ -16,6 +16,7 @@ from flexclear.post.answers.effect_sizes import stay
 from flexclear.post.answers.stability import ENERGY, lost_energy
 from flexclear.post.overview.curves import impacts, in_unit
 from flexclear.post.single_run.series import parameters, sentence
+from flexclear.scene.clearance import SURFACES
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import staying
 
@@ -105,7 +106,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
     body, joint = scene.get("body", {}), scene.get("joint", {})
     load = scene.get("load", {})
     flexible = [n for n, b in body.items() if b["type"] == "flexible"]
-    loose = [n for n, j in joint.items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"]
+    loose = [n for n, j in joint.items() if j["type"] in SURFACES]
     present = {
         "clearance": loose,
         "contact friction": [f"{n} ({joint[n]['friction']['law']})" for n in loose if joint[n].get("friction")],
@@ -130,7 +131,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
 def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:
     """Sort assumptions by influence: those on joints with clearance and flexible bodies come first."""
     scene = {} if run is None else parameters(run)
-    loose = {n for n, j in scene.get("joint", {}).items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"}
+    loose = {n for n, j in scene.get("joint", {}).items() if j["type"] in SURFACES}
     flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}
 
     def weight(path: str) -> int:

@@ -315,6 +315,7 @@ def _orbits(name: str, runs: Mapping[str, xr.Dataset]) -> dict[str, bytes]:
         for label, run in runs.items()
         if "contact" in run.sizes
         for k in range(min(run.sizes["contact"], CONTACTS))
+        if str(run["contact"].values[k]) in parameters(run).get("joint", {})  # ends of stops have no orbit
     ]
     if not orbits:
         return {}

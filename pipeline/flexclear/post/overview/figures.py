@@ -23,6 +23,7 @@ from flexclear.post.overview.curves import (
 )
 from flexclear.post.plotting import style
 from flexclear.post.single_run.series import derive, parameters
+from flexclear.scene.clearance import SURFACES
 from flexclear.scene.quantity import OF_CONTACTS, Quantity
 
 #: kinds of quantities that other figures show
@@ -40,8 +41,6 @@ ENERGIES = {
     "drive_work": "work of drives",
     "load_work": "work of loads",
 }
-#: part that holds a pin, by type of joint; a ball is in a socket
-HOLDERS = {"clearance-revolute": "in its journal", "clearance-slot": "in its slot", "ball-on-plane": "over plane"}
 #: an energy below this fraction of the largest one is not drawn
 UNSEEN = 1e-6
 
@@ -221,9 +220,10 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     """
     offset = 1e3 * _without_noise(run, run["contact_offset"].values[:, contact], "m")
     moving = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
-    i, j = PLANES.get(_type(run, contact), moving)
+    kind = _kind(run, contact)
+    i, j = kind.plane or moving
     radius = 1e3 * clearance
-    if _type(run, contact) == "ball-on-plane":  # it has a floor and no socket
+    if not kind.hollow:  # it has a floor and no socket
         joint = parameters(run)["joint"][str(run["contact"].values[contact])]
         axes.axhline(1e3 * float(joint["ball_radius"]), color="#a8a8a8", lw=1.0)
         axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
@@ -240,18 +240,15 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     return offset[:, i], offset[:, j]
 
 
-#: drawn axes of the joint's frame by type of joint; other joints show those of the largest motion
-PLANES = {"clearance-revolute": (0, 1), "clearance-slot": (0, 1), "ball-on-plane": (0, 2)}
-
-
 def centre(run: xr.Dataset, contact: int) -> str:
     """Return the title of the picture of a ball or pin in the part that holds it."""
-    return f"centre {HOLDERS.get(_type(run, contact), 'in its socket')} (mm)"
+    kind = _kind(run, contact)
+    return f"centre {'in its' if kind.hollow else 'over'} {kind.surfaces[0]} (mm)"
 
 
-def _type(run: xr.Dataset, contact: int) -> str:
-    joint = parameters(run).get("joint", {}).get(str(run["contact"].values[contact]), {})
-    return str(joint.get("type", ""))
+def _kind(run: xr.Dataset, contact: int) -> Any:
+    """Return the class of a contact's surfaces."""
+    return SURFACES[parameters(run)["joint"][str(run["contact"].values[contact])]["type"]]
 
 
 def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:

@@ -17,6 +17,7 @@ import numpy as np
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.post.render import surfaces
 from flexclear.post.render.surfaces import Surface
+from flexclear.scene.clearance import SURFACES
 from flexclear.scene.fields import Pose
 from flexclear.system.errors import InputError
 from flexclear.system.external_files import read_mesh
@@ -32,9 +33,9 @@ SLENDER = 2.5
 #: largest half extent of a body without separate joints, as a fraction of the mechanism's size
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
-TURNING = ("revolute", "clearance-revolute", "slot", "clearance-slot", "planar")
+TURNING = ("revolute", "slot", "planar", *(name for name, kind in SURFACES.items() if kind.held == "planar"))
 SLIDING = ("prismatic", "cylindrical")
-BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
+BALLS = ("spherical", *(name for name, kind in SURFACES.items() if kind.ideal == "spherical" or not kind.hollow))
 #: frames on a body at which a load acts, and at which nothing does
 LOADED, BARE = "load", "frame"
 #: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits

@@ -11,6 +11,7 @@ from flexclear.post.render import surfaces
 from flexclear.post.render.surfaces import Surface
 from flexclear.post.render.view import View
 from flexclear.post.single_run.series import parameters
+from flexclear.scene.clearance import SURFACES
 
 #: colour of a path, as in the plots of orbits; largest number of its drawn points
 PATH_COLOR, PLACES = "#009E73", 1500
@@ -52,13 +53,14 @@ def _room(given: dict, offset: np.ndarray) -> tuple[Surface, float]:
     A sphere or disc of the clearance, a slot longer by its travel; for a ball on a plane the plane of the centre at
     contact.
     """
-    if given["type"] == "ball-on-plane":
+    kind = SURFACES[given["type"]]
+    if not kind.hollow:
         low, high = offset.min(axis=0), offset.max(axis=0)
         reach = max(float((high - low).max()), 2.0 * float(given["ball_radius"]))
         plane = surfaces.box((*((high - low)[:2] + 0.4 * reach), 0.005 * reach))
         return surfaces.moved(plane, np.array([*(0.5 * (low + high))[:2], given["ball_radius"]])), 0.6 * reach
     clearance = float(given["clearance"])
-    if given["type"] == "clearance-spherical":
+    if kind.ideal == "spherical":
         return surfaces.sphere(clearance), clearance
     half = 0.5 * float(given.get("travel", 0.0))
     outline = surfaces.hull(np.array([[-half, 0.0], [half, 0.0]]), clearance)

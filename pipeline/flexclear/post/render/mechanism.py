@@ -33,6 +33,7 @@ from flexclear.post.render.view import View, view
 from flexclear.post.shapes import body_shape
 from flexclear.post.shapes.body_shape import faces, scale_to, surface
 from flexclear.post.single_run.series import parameters
+from flexclear.scene.clearance import SURFACES
 from flexclear.system.errors import InputError
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -227,7 +228,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
         if kind in forms.BALLS:
             radius = float(joint.get("ball_radius", BALL * size))
             yield at.seated(second, surfaces.sphere(radius), color, contact)
-            if kind == "ball-on-plane":
+            if kind in SURFACES and not SURFACES[kind].hollow:
                 yield at.seated(first, _floor(at, joint, size), GROUND_COLOR)
             else:
                 yield at.seated(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
@@ -240,7 +241,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
                 low, high = (-half, half) if half else travel(at.run, name)
                 rim = surfaces.prism(surfaces.hull(np.array([[low, 0.0], [high, 0.0]]), SOCKET * radius), 0.5 * long)
                 yield at.seated(first, rim, SOCKET_COLOR, opacity=0.5)
-            elif kind == "clearance-revolute":
+            elif kind in SURFACES:
                 yield at.seated(first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, opacity=0.35)
             elif grounded:
                 yield at.seated(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)

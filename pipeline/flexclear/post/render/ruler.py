@@ -48,7 +48,7 @@ def exaggeration(drawn: Mechanism) -> list[str]:
     factors = []
     for joint in parameters(drawn.run).get("joint", {}).values():
         radius = joint.get("ball_radius", joint.get("pin_radius"))
-        if joint.get("clearance") and radius and joint["type"] != "ball-on-plane":
+        if joint.get("clearance") and radius:
             factors.append((SOCKET - 1.0) * float(radius) / float(joint["clearance"]))
     if factors:
         low, high = (f"{value:.2g}" for value in (min(factors), max(factors)))

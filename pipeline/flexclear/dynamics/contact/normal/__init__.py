@@ -1,20 +1,12 @@
-"""Normal contact laws. To add one: a module here, a line below, and a case in tests/properties/test_dynamics_laws.
+"""Normal contact laws. To add one: a module here named like the law, its name, or the class of its keys, in
+scene/clearance, and a case in tests/properties/test_dynamics_laws.
 
-Each is a module, or the `LAW` in it, with its own ``exponent`` and with ``resolve(law, stiffness, mass) -> Resolved``
-(see `contact.law`): the numbers for one of the compiled forms in `contact.form`, and the restitution of a free impact.
+Each has ``resolve(law, stiffness, mass) -> Resolved`` (see `contact.law`): the numbers for one of the compiled forms in
+`contact.form`, and the restitution of a free impact. It raises ValueError, in words, for what it cannot deliver.
 """
 
+from flexclear.scene.clearance import NORMALS
+from flexclear.scene.registry import declared
+
 KIND = "normal law"
-NAMES = {
-    "hertz": "hertz",
-    "hunt-crossley": "hunt_crossley:LAW",
-    "herbert-mcwhannell": "herbert_mcwhannell:LAW",
-    "lee-wang": "lee_wang:LAW",
-    "lankarani-nikravesh": "lankarani_nikravesh:LAW",
-    "gonthier": "gonthier:LAW",
-    "flores": "flores:LAW",
-    "hu-guo": "hu_guo:LAW",
-    "zhiying-qishao": "zhiying_qishao:LAW",
-    "carvalho-martins": "carvalho_martins:LAW",
-    "kelvin-voigt": "kelvin_voigt",
-}
+NAMES = declared(NORMALS, key="law", made="resolve")

@@ -11,6 +11,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis(
-    "carvalho-martins", lambda c_r: 1.5 * (1.0 - c_r) * (11.0 - c_r) / (1.0 + 9.0 * c_r), valid=(0.03, 1.0)
-)
+resolve = Hysteresis(lambda c_r: 1.5 * (1.0 - c_r) * (11.0 - c_r) / (1.0 + 9.0 * c_r), valid=(0.03, 1.0)).resolve

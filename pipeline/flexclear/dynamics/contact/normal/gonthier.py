@@ -11,4 +11,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis("gonthier", lambda c_r: (1.0 - c_r**2) / c_r, valid=(0.0, 1.0))
+resolve = Hysteresis(lambda c_r: (1.0 - c_r**2) / c_r, valid=(0.0, 1.0)).resolve

@@ -11,6 +11,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis(
-    "herbert-mcwhannell", lambda c_r: 6.0 * (1.0 - c_r) / ((2.0 * c_r - 1.0) ** 2 + 3.0), valid=(0.61, 1.0)
-)
+resolve = Hysteresis(lambda c_r: 6.0 * (1.0 - c_r) / ((2.0 * c_r - 1.0) ** 2 + 3.0), valid=(0.61, 1.0)).resolve

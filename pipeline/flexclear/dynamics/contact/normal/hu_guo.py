@@ -10,4 +10,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis("hu-guo", lambda c_r: 1.5 * (1.0 - c_r) / c_r, valid=(0.0, 1.0))
+resolve = Hysteresis(lambda c_r: 1.5 * (1.0 - c_r) / c_r, valid=(0.0, 1.0)).resolve

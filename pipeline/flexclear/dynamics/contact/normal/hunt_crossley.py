@@ -12,4 +12,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis("hunt-crossley", lambda c_r: 1.5 * (1.0 - c_r), valid=(0.75, 1.0))
+resolve = Hysteresis(lambda c_r: 1.5 * (1.0 - c_r), valid=(0.75, 1.0)).resolve

@@ -17,28 +17,18 @@ import math
 
 from flexclear.dynamics.contact import restitution
 from flexclear.dynamics.contact.law import Numbers, Resolved
-from flexclear.scene.clearance import NormalLaw
-
-#: default exponent
-exponent = 1.0
+from flexclear.scene.clearance import KelvinVoigt
 
 
-def resolve(law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+def resolve(law: KelvinVoigt, stiffness: float, mass: float | None) -> Resolved:
     """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
-    if law.exponent not in (None, 1.0):
-        raise ValueError(f"the law 'kelvin-voigt' is linear; its exponent is 1, not {law.exponent:g}")
     mass = mass if law.effective_mass is None else law.effective_mass
     critical = None if mass is None else 2.0 * math.sqrt(stiffness * mass)
-    asked = law.restitution if law.delivered_restitution is None else law.delivered_restitution
     if law.damping is not None:
-        if asked is not None:
-            raise ValueError("damping and restitution are alternatives; give one")
         damping = law.damping
-    elif asked is None:
-        raise ValueError("the law 'kelvin-voigt' needs a damping [N s/m], or a restitution")
     elif critical is None:
         raise ValueError("no mass is known on either side of this joint; give an effective_mass, or a damping [N s/m]")
     else:
-        damping = critical * restitution.damping_ratio(asked)
+        damping = critical * restitution.damping_ratio(law.requested)
     delivered = None if critical is None else restitution.linear_delivered(damping / critical)
-    return Resolved("linear-damper", Numbers(stiffness, 1.0, damping), asked, delivered)
+    return Resolved("linear-damper", Numbers(stiffness, 1.0, damping), law.requested, delivered)

@@ -11,4 +11,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis("lankarani-nikravesh", lambda c_r: 0.75 * (1.0 - c_r**2), valid=(0.8, 1.0))
+resolve = Hysteresis(lambda c_r: 0.75 * (1.0 - c_r**2), valid=(0.8, 1.0)).resolve

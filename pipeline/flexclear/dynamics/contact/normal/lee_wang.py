@@ -12,4 +12,4 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis("lee-wang", lambda c_r: 0.75 * (1.0 - c_r), valid=(0.91, 1.0))
+resolve = Hysteresis(lambda c_r: 0.75 * (1.0 - c_r), valid=(0.91, 1.0)).resolve

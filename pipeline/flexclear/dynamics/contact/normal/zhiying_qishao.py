@@ -14,4 +14,4 @@ from math import exp
 
 from flexclear.dynamics.contact.law import Hysteresis
 
-LAW = Hysteresis("zhiying-qishao", lambda c_r: 0.75 * (1.0 - c_r**2) * exp(2.0 * (1.0 - c_r)), valid=(0.24, 1.0))
+resolve = Hysteresis(lambda c_r: 0.75 * (1.0 - c_r**2) * exp(2.0 * (1.0 - c_r)), valid=(0.24, 1.0)).resolve

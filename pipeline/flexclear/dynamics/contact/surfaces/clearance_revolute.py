@@ -15,13 +15,7 @@ cylinders.
 
 from __future__ import annotations
 
-from flexclear.dynamics.contact.hertz import (
-    cylinder_stiffness,
-    half_width,
-    published,
-    relative_radius,
-    sphere_stiffness,
-)
+from flexclear.dynamics.contact import hertz
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
 from flexclear.scene.clearance import ClearanceRevolute
@@ -35,9 +29,9 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, p
 
 
-stiffness = published({1.0: cylinder_stiffness, 1.5: sphere_stiffness})
+stiffness = hertz.published({1.0: hertz.cylinder_stiffness, 1.5: hertz.sphere_stiffness})
 
 
 def contact_size(joint: ClearanceRevolute, depth: float, force: float) -> float:
     """Return the half-width of the contact [m] under a force [N]."""
-    return half_width(joint, relative_radius(joint), depth, force)
+    return hertz.half_width(joint, hertz.relative_radius(joint), depth, force)

@@ -38,6 +38,7 @@ class End:
     radius: float = 0.0
     friction: None = None
     type: str = STOP
+    hollow: bool = False
 
 
 def ends_an_angle(joint: object) -> bool:

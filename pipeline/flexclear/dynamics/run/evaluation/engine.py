@@ -55,7 +55,6 @@ class Engine:
     mobility: Mobility
     start: float
     end: float
-    rtol: float
     specialised: SpecialisedCode
 
     @property
@@ -187,6 +186,16 @@ class Engine:
         """Control floats of the stepper, not copied; m.TIME is the index of the time."""
         return self.view(m.CONTROL)
 
+    def reset(self) -> None:
+        """Set the control floats to those of no step, with the tolerance and the size of the mechanism."""
+        self.control[:] = 0.0
+        self.control[m.RTOL], self.control[m.LENGTH] = self.model.scene.solver.rtol, self.model.length
+
+    @property
+    def rtol(self) -> float:
+        """Relative tolerance."""
+        return float(self.control[m.RTOL])
+
     @property
     def slope(self) -> np.ndarray:
         """Rates of the state from the last evaluation, not copied."""
@@ -252,13 +261,11 @@ def prepare(model: Model, progress: Progress) -> Engine:
 
 def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:
     """Return an engine with a new work array for a model whose functions are compiled."""
-    solver, space = model.scene.solver, model.arrays.work_space(method.room)
+    space = model.arrays.work_space(method.room)
     entry.connect(space.h)
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = Engine(
-        model, entry, method, *space, selected, mobility, time.start, time.end, solver.rtol, SpecialisedCode()
-    )
-    engine.control[m.LENGTH] = model.length
+    engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
+    engine.reset()
     engine.connect()
     return engine
 
