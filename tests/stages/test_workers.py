@@ -20,7 +20,6 @@ from flexclear.workflow.fingerprint import Sources
 from flexclear.workflow.progress import Monitor
 from flexclear.workflow.schedule import bring
 from flexclear.workflow.task import Task
-from tests.processes import python
 
 
 def one(width: int = 1) -> int:
@@ -75,29 +74,6 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
     assert {failure.task for failure in outcome.failures} == {task for task in tasks}
-
-
-UNGUARDED = """
-import sys
-from pathlib import Path
-from flexclear.artifacts.paths import TREE
-from flexclear.artifacts.store import Store
-from flexclear.workflow.fingerprint import Sources
-from flexclear.workflow.progress import Monitor
-from flexclear.workflow.schedule import bring
-from flexclear.workflow.task import Task
-print("once", flush=True)
-tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in "ab"]
-print(len(bring(tasks, Store(Path(sys.argv[1])), Sources(TREE), Monitor(), 2).failures))
-"""
-
-
-def test_a_script_without_a_guard_is_not_run_again_by_its_helpers(root: Path, tmp_path: Path) -> None:
-    """Python asks for `if __name__ == "__main__"` where processes are spawned; whoever calls this program need not."""
-    script = tmp_path / "script.py"
-    script.write_text(UNGUARDED, encoding="utf-8")
-    done = python(script, tmp_path / "results", cwd=tmp_path, PYTHONPATH=str(root))
-    assert done.stdout.split() == ["once", "2"]
 
 
 BROKEN = """

@@ -35,7 +35,6 @@ from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
 from flexclear.stages.meshing import kind_of
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
-from flexclear.system import file_names
 from flexclear.system.errors import InputError, ResourceError, SolverError, errors_from, errors_of, refuse
 from flexclear.system.external_files import reading, require_file
 from flexclear.system.version import DISTRIBUTION
@@ -412,11 +411,11 @@ def _refuse_namesakes(scenes: list[Scene]) -> None:
     """Raise InputError when two files given together have the same scene name."""
     folders: dict[str, Path] = {}
     for scene in scenes:
-        path, name = _file(scene), file_names.folded(scene.name)  # equal names on Windows and macOS
-        if path is not None and folders.setdefault(name, path) != path:
+        path = _file(scene)
+        if path is not None and folders.setdefault(scene.name, path) != path:
             raise InputError(
                 str(path),
-                f"is called '{scene.name}', as is {folders[name]}: their results would replace each other",
+                f"is called '{scene.name}', as is {folders[scene.name]}: their results would replace each other",
                 "rename one, or call the command from a folder above both, where their paths name them",
             )
 

@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from flexclear.dynamics.kernels import PLAIN
-
 #: names that only the exits of functions refer to which raise Python exceptions; no kernel does, and reaching one ends
 #: the process
 NEVER_REACHED = {
@@ -48,13 +46,8 @@ NOTHING = b"{}\n"
 
 def image(function: Any) -> bytes:
     """Return the code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
-    if PLAIN:
-        return stored(function.native_name, *assembled(function.inspect_llvm()))
-    try:  # private attributes of Numba, which another release may not have
-        module, binary = function._library._final_module, bytes(function._library._get_compiled_object())
-    except (AttributeError, TypeError, ValueError, RuntimeError):
-        module, binary = assembled(function.inspect_llvm())
-    return stored(function.native_name, module, binary)
+    library = function._library  # private attributes of Numba, as those in `dynamics.lowering`
+    return stored(function.native_name, library._final_module, bytes(library._get_compiled_object()))
 
 
 def stored(name: str, module: Any, binary: bytes) -> bytes:

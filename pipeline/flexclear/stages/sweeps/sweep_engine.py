@@ -162,8 +162,7 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
     pools: list[ProcessPoolExecutor] = [workers.pool(width)]
 
     def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
-        with workers.without_main():
-            return pools[-1].submit(work, family, packed, *rest)
+        return pools[-1].submit(work, family, packed, *rest)
 
     def renew() -> None:
         workers.kill(pools[-1])

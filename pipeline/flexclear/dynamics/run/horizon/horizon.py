@@ -34,8 +34,8 @@ from flexclear.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.dynamics.run.evaluation.engine import Engine, another
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import per_speed, project, rates_at_speeds
-from flexclear.dynamics.run.trajectory import Followed, Stop
-from flexclear.system.errors import SolverError, StoppedError
+from flexclear.dynamics.run.trajectory import Followed, Stop, asked
+from flexclear.system.errors import SolverError
 from flexclear.system.progress import Progress
 from flexclear.workflow.cores import TICK
 
@@ -89,11 +89,6 @@ class Pair:
             engine, trajectory, switched = steps(self._store_rows, self.outputs)
             self._store_rows(trajectory.rows)
             self._between, self._complete = trajectory.between, True
-        except StoppedError as stopped:
-            if stopped.partial is not None:
-                engine, trajectory = stopped.partial
-                stopped.partial = engine, trajectory.without(self.added)
-            raise
         finally:
             self._ended.set()
         return engine, trajectory.without(self.added), switched
@@ -125,9 +120,9 @@ class Pair:
         return PerturbedRun(time, separation, engine.end if horizon is None else horizon)
 
     def _store_rows(self, rows: np.ndarray) -> bool:
-        """Store the rows that the run has so far, and return False: it continues."""
+        """Store the rows that the run has so far, and return True on a request to stop."""
         self._run.rows = rows
-        return False
+        return asked(rows)
 
     def _enough(self, other: _Side, alive: Progress) -> bool:
         """Return True when the two have diverged, so that the horizon is known.
