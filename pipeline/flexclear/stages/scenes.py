@@ -43,8 +43,6 @@ from flexclear.workflow.schedule import Outcome
 if TYPE_CHECKING:
     import xarray as xr
 
-#: largest length of the `--set` changes in a folder's name [bytes]
-LONGEST_EDITS = 100
 #: parts without which the others form a scene as well
 ACTING = ("drive", "load", "stop", "gear")
 #: folder below a scene's results that is not for users
@@ -275,7 +273,8 @@ def with_edits(name: str, settings: Sequence[str]) -> str:
     if not settings:
         return name
     suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # Windows drops final dots
-    short = suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
+    # 100: largest length of the `--set` changes in a folder's name [bytes]
+    short = suffix if len(suffix.encode()) <= 100 else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
     return f"{name},{short}"
 
 

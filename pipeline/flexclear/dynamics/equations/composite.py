@@ -14,9 +14,6 @@ from flexclear.dynamics.equations import envelope
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn_symmetric
 
-#: pivots of M below this fraction of their diagonal mean a coordinate that moves no mass
-MASSLESS_COMPOSITE = 1e-15
-
 
 @kernel
 def origin(d, i):
@@ -177,7 +174,8 @@ def make_eliminate(flexible: FlexibleBodies) -> Callable:
             gather(d, i)
         modal(d)
         assemble_mass(d)
-        sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, MASSLESS_COMPOSITE)
+        # 1e-15: pivots of M below this fraction of their diagonal mean a coordinate that moves no mass
+        sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, 0, d.nv, 1e-15)
         for k in range(d.nv):
             d.force[k] = -d.bias[k]
         forward(d, d.at_force)

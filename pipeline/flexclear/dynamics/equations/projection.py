@@ -20,11 +20,6 @@ PROJECTIONS = 8
 BLIND = 1e-8
 #: rounding may stop the residuals this far above a very tight tolerance
 ROUNDING_FACTOR = 1e3
-#: redundant rows may have residuals of this fraction of the mechanism's size: rows of joints whose axes miss each other
-#: by less than `model.rates.ZERO_SINGULAR_VALUE` are redundant, and open by that, times some turns, during the motion
-OPEN_REDUNDANT = 1e-6
-#: time over which a gap is closed [s]: modes with shorter periods respond by their stiffness, not by their mass
-CLOSING_TIME = 0.1
 
 
 @kernel
@@ -91,7 +86,9 @@ def make_stiffen(closures: Any, tree: Any, flexible: Any) -> Callable:
                 row = d.envelope[c0 + i].origin + c0
                 # without held shapes, shapes are eigenmodes
                 for j in range(0 if i >= body.n_held > 0 else i, i + 1):
-                    d.mass[row + j] += CLOSING_TIME**2 * d.interface_data[stiffness + n * i + j].value
+                    # 0.1: time over which a gap is closed [s]: modes with shorter periods respond by their stiffness,
+                    # not by their mass
+                    d.mass[row + j] += 0.1**2 * d.interface_data[stiffness + n * i + j].value
         refactor(d)
         complete(d)
 
@@ -130,7 +127,10 @@ def make_projection(
         the error of the state, nothing changes.
         """
         d = data(h, f, w, n)
-        step, used, redundant = d.at_correction, 0, OPEN_REDUNDANT * d.length
+        # 1e-6: redundant rows may have residuals of this fraction of the mechanism's size: rows of joints whose axes
+        # miss each other by less than `model.rates.ZERO_SINGULAR_VALUE` are redundant, and open by that, times some
+        # turns, during the motion
+        step, used, redundant = d.at_correction, 0, 1e-6 * d.length
         if d.last_pivot < BLIND:
             return 0
         for _ in range(PROJECTIONS):

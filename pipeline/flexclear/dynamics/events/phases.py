@@ -33,8 +33,6 @@ from flexclear.system.progress import Progress
 
 #: evaluations between checks of the conditions; where a run fails after an event, the smaller number
 PAUSES = (2_000, 50)
-#: least number of times at which conditions are examined
-CONDITION_TIMES = 500
 #: an event nearer than this fraction of the run to its end does not happen
 END = 1e-12
 
@@ -164,7 +162,8 @@ class _Plan:
         if not watched:
             return *self._steps(engine, made, y, never, times, SLICE), None
         span = self.scene.time.end - self.scene.time.start
-        looks = np.linspace(engine.start, engine.end, 2 + int(CONDITION_TIMES * (engine.end - engine.start) / span))
+        # 500: least number of times at which conditions are examined
+        looks = np.linspace(engine.start, engine.end, 2 + int(500 * (engine.end - engine.start) / span))
         done: Followed | None = None
         for pause in PAUSES:
             try:

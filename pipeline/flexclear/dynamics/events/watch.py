@@ -27,8 +27,6 @@ from flexclear.system.progress import silent
 
 #: number of parts of a refined interval, and number of refinements, after which a straight line is exact enough
 PARTS, CLOSER_LOOKS = 12, 5
-#: rows are examined again when their number has grown by this factor
-GROWTH = 1.05
 
 
 class Watch:
@@ -60,7 +58,8 @@ class Watch:
 
     def stop(self, rows: np.ndarray) -> bool:
         """Return True when an event has happened in the rows so far."""
-        if len(rows) < GROWTH * len(self._rows):
+        # 1.05: rows are examined again when their number has grown by this factor
+        if len(rows) < 1.05 * len(self._rows):
             return False
         self.examine(rows)
         return self.hit is not None

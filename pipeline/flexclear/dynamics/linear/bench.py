@@ -33,8 +33,6 @@ Pose = TypeVar("Pose")
 
 #: drives reach the requested pose in steps of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
-#: smallest step, as a fraction of the whole way, before the pose counts as out of reach
-SHORTEST_STRIDE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -168,7 +166,8 @@ def move_drives(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
         set_drives(bench, np.stack([origin + fraction * (target - origin), 0.0 * target], axis=1))
         return close(bench, start)
 
-    return in_strides(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, SHORTEST_STRIDE)
+    # 1e-4: smallest step, as a fraction of the whole way, before the pose counts as out of reach
+    return in_strides(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, 1e-4)
 
 
 def in_strides(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:

@@ -48,18 +48,12 @@ from flexclear.scene.parts import RigidBody
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
 
-#: number of poses of the motion at which bounds are computed
-BOUND_TIMES = 32
 #: squared singular values of the joints' rates far below this fraction of the largest are zero, and a watched quantity
 #: with up to this freedom counts as held: within some 3e-4 of a singular pose no bound exists
 SQUARED_RANK, FREE = 1e-13, 1e-6
 #: largest rotation, and displacement in units of the mechanism's size, at which second order is evaluated: the fourth
 #: is a millionth of it then, and rounding 1e-10
 FINITE = 1e-3
-#: fraction of the largest motion below which the square of a motion, a thousandth of the largest square, is left out
-MINOR = 0.03
-#: assumed force on a joint with clearance after separation, as a multiple of the ideal force
-KNOCK = 10.0
 #: quantities that follow from the pose
 OF_POSE = ("position", "orientation")
 
@@ -74,7 +68,8 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Ma
     asked = [q for q in chosen if q.kind in OF_POSE and q.owner in model.mechanism.link_of]
     loads = joint_wrenches(Motions(model, seen), loose)
     load = {name: float(np.linalg.norm(loads[name][1], axis=1).max()) for name in loose}
-    rows = np.unique(np.linspace(0, len(seen.state) - 1, BOUND_TIMES).astype(int))
+    # 32: number of poses of the motion at which bounds are computed
+    rows = np.unique(np.linspace(0, len(seen.state) - 1, 32).astype(int))
     clearance = {name: {q.name: 0.0 for q in asked} for name in loose}
     joints = constraints(model.mechanism)
     whole = knows_all_joints(model)
@@ -102,7 +97,8 @@ def knows_all_joints(model: Model) -> bool:
 def _separation(joint: Clearance, force: float) -> float:
     """Return how far the points may separate [m]: the clearance, and the penetration under a force."""
     law = resolved(joint, 1.0, "[normal]")  # the depth at rest does not depend on the mass
-    return joint.clearance + law.depth(KNOCK * force)
+    # 10.0: assumed force on a joint with clearance after separation, as a multiple of the ideal force
+    return joint.clearance + law.depth(10.0 * force)
 
 
 @dataclass(frozen=True)
@@ -268,7 +264,9 @@ def curvature(
         return misfit(model.mechanism, _bent(model, joints, bundles, move[m:]), moved).values
 
     closed = misfit(model.mechanism, joints, poses).values  # to the tolerance of the run
-    for k in np.flatnonzero(size > MINOR * size.max()):
+    # 0.03: fraction of the largest motion below which the square of a motion, a thousandth of the largest square, is
+    # left out
+    for k in np.flatnonzero(size > 0.03 * size.max()):
         step = moves[:, k] * (FINITE / size[k])
         found[:, k] = (0.5 * (residuals(step) + residuals(-step)) - closed) * (size[k] / FINITE) ** 2
     return found

@@ -55,8 +55,6 @@ BALANCED, SHORT_MOVE = 1e-12, 1e-14
 STALLED = 1e-8
 #: eigenvalues of the stiffness below this fraction of the largest count as zero
 NO_STIFFNESS = 1e-12
-#: largest fraction of the starting power that may act against the step at its end
-OVERSHOOT = 0.5
 #: corrections of one pose; each must be at most this fraction of the one before, else the step of the speed is halved
 CORRECTIONS, CONTRACTION = 20, 0.5
 #: corrections below this fraction of the mechanism's size, or of a radian, that stop shrinking are rounding
@@ -138,7 +136,8 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
         except SolverError:
             fraction *= 0.5
             continue
-        if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -OVERSHOOT * power:
+        # 0.5: largest fraction of the starting power that may act against the step at its end
+        if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -0.5 * power:
             return new
         fraction *= 0.5
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium is possible from this pose")

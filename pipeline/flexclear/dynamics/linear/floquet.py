@@ -39,14 +39,10 @@ from flexclear.system.errors import SolverError
 
 #: motion of the drives that tests whether the forces stay constant, in radians or fractions of the mechanism's size
 PROBE = 0.1
-#: largest fraction of a motion's energy outside the motions that loops leave free
-LEAVING = 1e-9
 #: first and largest number of angles in a turn
 FEWEST_ANGLES, MOST_ANGLES = 8, 128
 #: first number of harmonics in each direction, and largest size of Hill's matrix with more
 FEWEST_HARMONICS, LARGEST = 2, 2000
-#: fraction of the squared amplitudes in the outermost harmonics that is negligible
-EDGE = 1e-12
 #: relative difference of squared amplitudes below which two harmonics are equally large
 EQUAL = 1e-6
 #: fraction of the squared amplitudes of coordinates that decides where no frame moves
@@ -91,7 +87,8 @@ def _after(bench: Bench, at: Tangent, here: Equations, duration: float) -> Insta
         there = tangent(later, at.q)
         heavy = there.mass @ along
         left = along - there.Z @ (there.Z.T @ heavy)
-        if there.Z.shape != at.Z.shape or np.abs(np.sum(left * heavy, axis=0)).max() > LEAVING:
+        # 1e-9: largest fraction of a motion's energy outside the motions that loops leave free
+        if there.Z.shape != at.Z.shape or np.abs(np.sum(left * heavy, axis=0)).max() > 1e-9:
             raise SolverError(
                 f"at t = {bench.time:.6g} s: the motions that the closed loops leave free vary with the angle of the "
                 "drives; vibrations about such a motion are not available: close the loop by a bushing"
@@ -170,7 +167,8 @@ def _floquet(bench: Bench, at: Tangent, first: Instant) -> Vibrations:
     reach = FEWEST_HARMONICS
     while True:
         value, shape, error, edge = _exponents(blocks, wrong, seen, reach, base, 2.0 * np.pi / period)
-        if edge <= EDGE and len(value) == len(wrong):
+        # 1e-12: fraction of the squared amplitudes in the outermost harmonics that is negligible
+        if edge <= 1e-12 and len(value) == len(wrong):
             break
         reach *= 2
         if (2 * reach + 1) * len(wrong) > LARGEST:

@@ -41,8 +41,6 @@ from flexclear.dynamics.run.run import Run
 from flexclear.scene.parts import RigidBody
 from flexclear.scene.quantity import Quantity
 
-#: number of poses at which the vibrations are computed
-RESPONSE_POSES = 8
 #: kinds of quantities by their dependence on elastic coordinates, rates or accelerations
 POSITIONS, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
 TURNS = ("orientation", "angular_velocity")
@@ -52,9 +50,6 @@ FOLLOWED, NO_STIFFNESS = 1e-9, 1e-12
 #: least force on an excited vibration, as a fraction of the largest that loads of this size could have; loads along a
 #: rod leave 2e-14 across the rod
 EXCITED = 1e-10
-#: largest change of the square of a frequency by the forces of joints, as a fraction, up to which vibrations are known:
-#: rods near their buckling load vibrate otherwise, and grow with forces that change in time
-BUCKLING = 0.2
 
 
 @dataclass(frozen=True)
@@ -93,7 +88,8 @@ def response(
         time = np.insert(time, at + 1, time[at])
     joints, responses = constraints(model.mechanism), list[Response]()
     loads = joint_wrenches(motions, [joint.name for joint in joints])
-    for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
+    # 8: number of poses at which the vibrations are computed
+    for row in np.unique(np.linspace(0, len(once) - 1, 8).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
         assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
         if assembled is None:
@@ -228,7 +224,9 @@ def _at(
     largest = most.max(axis=0, initial=np.finfo(float).tiny)
     moves = assembled.modes * largest
     curved = clearance_response.curvature(assembled.model, assembled.poses, assembled.lever, bundles, moves)
-    buckling = bool((2.0 * np.abs(multipliers @ curved) > BUCKLING * (omega * largest) ** 2).any())
+    # 0.2: largest change of the square of a frequency by the forces of joints, as a fraction, up to which vibrations
+    # are known: rods near their buckling load vibrate otherwise, and grow with forces that change in time
+    buckling = bool((2.0 * np.abs(multipliers @ curved) > 0.2 * (omega * largest) ** 2).any())
     influence = {}
     for q in chosen:
         if buckling:

@@ -23,8 +23,6 @@ ZERO_EIGENVALUE = 10.0
 RELATIVE_ZERO = 1e-13
 #: asymmetry below this fraction of the scaled stiffness is rounding
 ASYMMETRY = 1e-9
-#: scale of a motion without stiffness, as a fraction of the highest frequency
-LEAST_SCALE = 1e-6
 #: an eigenvalue with at most this fraction of imaginary part is real, without vibration; likewise imaginary
 REAL = 1e-12
 
@@ -145,7 +143,8 @@ def _without_stiffness(K: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 def _scale(K: np.ndarray) -> np.ndarray:
     own = np.sqrt(_sizes(K))
-    return np.maximum(own, LEAST_SCALE * own.max() or 1.0)
+    # 1e-6: scale of a motion without stiffness, as a fraction of the highest frequency
+    return np.maximum(own, 1e-6 * own.max() or 1.0)
 
 
 def _sizes(K: np.ndarray) -> np.ndarray:

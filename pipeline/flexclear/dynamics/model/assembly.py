@@ -23,9 +23,6 @@ from flexclear.dynamics.model.start_table import Given, given_coordinates
 from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.system.errors import InputError
 
-#: residuals of joints below this fraction of the mechanism's size come from rounded input
-MEANT_TO_FIT = 1e-4
-
 
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, exact: bool = False) -> Mechanism:
     """Return the mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
@@ -210,7 +207,8 @@ def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Plac
     )
     posed = len(given_start.given_links(mechanism)) > 1
     where = "close to the given poses; residuals" if posed else "by its joints; residuals of the first attempt"
-    slight = misfit(mechanism, joints, poses).worst < MEANT_TO_FIT
+    # 1e-4: residuals of joints below this fraction of the mechanism's size come from rounded input
+    slight = misfit(mechanism, joints, poses).worst < 1e-4
     return InputError(
         f"[joint.{worst}.between]",
         f"the mechanism cannot be assembled {where} (m, or sines of angles): {listed}"

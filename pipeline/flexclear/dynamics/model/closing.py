@@ -20,17 +20,11 @@ if TYPE_CHECKING:
 
 #: residuals of the start above this fraction of the mechanism's size are an error of the scene, not rounding
 WORST_GUESS = 0.05
-#: gap [m] above which a length may have been given in mm without a unit
-LIKELY_MILLIMETRES = 1.0
 #: residuals, in units of the mechanism's size, below which nothing is moved, and at which closing may end; with large
 #: coordinates, so many roundings of these instead if that is more
 CLOSED_EXACTLY, CLOSED_ENOUGH = 1e-13, 1e-11
 EXACT_ROUNDINGS, CLOSED_ROUNDINGS = 4.0, 100.0
 CLOSING_ITERATIONS = 60
-#: least damping, as a fraction of the mean of the normal matrix, which is singular for redundant joints
-LEAST_DAMPING = 1e-15
-#: least cosine of the angle between axes that a joint keeps parallel
-SAME_WAY = 0.5
 #: least radius of gyration that a link counts with, as a fraction of the mechanism's size
 LEAST_GYRATION = 0.01
 
@@ -92,7 +86,8 @@ def close(
         gradient = now.gradient()
         G = gradient @ mobility
         normal, rows = G @ gradient.T, len(now.values)
-        scale = max(damping * float(np.linalg.norm(now.values)), LEAST_DAMPING) * normal.trace() / rows
+        # 1e-15: least damping, as a fraction of the mean of the normal matrix, which is singular for redundant joints
+        scale = max(damping * float(np.linalg.norm(now.values)), 1e-15) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
         there = displaced(mechanism, here, step)
         then = misfit(mechanism, joints, there)
@@ -172,12 +167,13 @@ def ill_fitting(mechanism: Mechanism, joints: Sequence[Constraint], poses: Seque
         )
         a, b = joint.edge.frame_a, joint.edge.frame_b
         if gap > WORST_GUESS * mechanism.length:
+            # 1.0: gap [m] above which a length may have been given in mm without a unit
             return InputError(
                 f"[joint.{joint.name}.between]",
                 f"'{a}' and '{b}' start at a distance of {gap:.3g} m, where a {joint.edge.kind} joint connects "
                 f"them (limit {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
                 "correct the poses of the bodies, or the frames"
-                + ("; bare numbers are in metres" if gap >= LIKELY_MILLIMETRES else ""),
+                + ("; bare numbers are in metres" if gap >= 1.0 else ""),
             )
         if turned > WORST_GUESS:
             return InputError(
@@ -196,7 +192,8 @@ def opposite(joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputE
         pairs = joint_type(joint.edge.kind).ROTATIONS
         for k in range(3):
             others = {other for axis, other in pairs if axis == k} | {axis for axis, other in pairs if other == k}
-            if len(others - {k}) == 2 and A.R[:, k] @ B.R[:, k] < SAME_WAY:
+            # 0.5: least cosine of the angle between axes that a joint keeps parallel
+            if len(others - {k}) == 2 and A.R[:, k] @ B.R[:, k] < 0.5:
                 return InputError(
                     f"[joint.{joint.name}.between]",
                     f"the {'xyz'[k]} axes of '{joint.edge.frame_a}' and '{joint.edge.frame_b}', which a "

@@ -15,9 +15,6 @@ from flexclear.dynamics.model.merge import Placement
 from flexclear.numerics.rotations import matrix_to_quaternion, rotation_vector_to_matrix, skew
 from flexclear.scene.parts import FRAME_ERROR, RigidBody
 
-#: steps of Newton's method for the frame of a joint; they converge quadratically from the errors of a mesh
-NEWTON_STEPS = 5
-
 
 def fitted(
     mechanism: Mechanism, joints: list[Constraint], near: Callable[[float], Iterable[Sequence[Placement]]]
@@ -107,7 +104,8 @@ def _placed(bundle: Labelled, places: Mapping[str, Placement]) -> Labelled:
 def _met(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
     """Return a joint's second (`far`) or first frame in the world, moved by the least that makes the joint fit."""
     A, B = joint.frames(poses)
-    for _ in range(NEWTON_STEPS):
+    # 5: steps of Newton's method for the frame of a joint; they converge quadratically from the errors of a mesh
+    for _ in range(5):
         residual, wrench = demands(joint.edge.kind, A, B)
         here = B if far else A
         moment = wrench[:, :3] - wrench[:, 3:] @ skew(here.p).T

@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 NO_COUPLING = 1e-13
 #: products of inertia of two modes of unit modal mass below this are rounding: each is a sum over all elements
 UNCOUPLED = 1e-11
-#: singular values of the frames' shapes below this fraction of the largest count as zero
-FRAME_RANK = 1e-12
-#: least number of held shapes per moving shape at which modes are mixed: with fewer, mixing costs more than it saves
-WORTH_MIXING = 0.5
 
 
 @dataclass(frozen=True)
@@ -100,10 +96,13 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
     """Return held and moving shapes, as columns over the modes of one family."""
     n = len(stiffness)
     _, values, rows = np.linalg.svd(motions, full_matrices=True) if motions.size else (None, np.zeros(0), np.eye(n))
-    rank = int(np.sum(values > FRAME_RANK * values.max(initial=1e-300)))
+    # 1e-12: singular values of the frames' shapes below this fraction of the largest count as zero
+    rank = int(np.sum(values > 1e-12 * values.max(initial=1e-300)))
     if rank == 0:
         return np.eye(n), np.zeros((n, 0))
-    if n - rank < WORTH_MIXING * rank or rank == n:
+    # 0.5: least number of held shapes per moving shape at which modes are mixed: with fewer, mixing costs more than it
+    # saves
+    if n - rank < 0.5 * rank or rank == n:
         return np.zeros((n, 0)), np.eye(n)
     still, moving = rows[rank:].T, rows[:rank].T
     _, axes = np.linalg.eigh(still.T @ (stiffness[:, None] * still))

@@ -36,9 +36,6 @@ from flexclear.system.errors import InputError
 if TYPE_CHECKING:
     from flexclear.artifacts.labelled import Labelled
 
-#: a scene's distances count as its size only above this fraction of the largest radius of gyration
-NO_SIZE = 1e-9
-
 
 @dataclass(frozen=True)
 class Site:
@@ -391,7 +388,8 @@ def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequen
     size = max(size, *clearances, 0.0)
     # a body held at its centre of mass has no size but the rounding of its position
     gyration = max((np.sqrt(np.trace(J) / (2.0 * mass)) for mass, _, J in _inertias(links)), default=0.0)
-    return size if size > NO_SIZE * gyration else float(gyration) or 1.0
+    # 1e-9: a scene's distances count as its size only above this fraction of the largest radius of gyration
+    return size if size > 1e-9 * gyration else float(gyration) or 1.0
 
 
 def _inertias(links: Sequence[Link]) -> list[tuple[float, np.ndarray, np.ndarray]]:

@@ -31,13 +31,9 @@ NEARBY, POSE_TRIES, ENOUGH_POSES, LEFT = (0.03, 0.01), 24, 2, 0.1
 CARRIES = 1e-6
 #: condition numbers above this count as infinite
 INFINITE = 1e15
-#: rows of a locked mechanism below this size may come from misaligned joints
-SLIGHT_ROW = 1e-3
 #: a motion has no mass when its inertia is below this fraction of what bodies with their largest moment of inertia
 #: about all axes would have
 WEIGHTLESS = 1e-14
-#: least fraction of the largest motion at which a link takes part in a motion without mass
-TAKES_PART = 1e-3
 
 
 @dataclass(frozen=True)
@@ -184,9 +180,10 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
     if mobility.mobility > 0 or model.drives:
         return
     least = float(np.min(here.values[: here.rank], initial=1.0))
+    # 1e-3: rows of a locked mechanism below this size may come from misaligned joints
     hardly = (
         f"; one of these rows has only {least:.1g} of its natural size, as for joints with nearly aligned axes"
-        if least < SLIGHT_ROW
+        if least < 1e-3
         else ""
     )
     raise InputError(
@@ -265,7 +262,8 @@ def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
 def _refuse_motion(model: Model, twists: np.ndarray) -> None:
     """Raise InputError for a motion without mass; twists: of all links in this motion, (links, 6)."""
     sizes = np.abs(twists).max(axis=1)
-    links = [link for link, size in zip(model.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
+    # 1e-3: least fraction of the largest motion at which a link takes part in a motion without mass
+    links = [link for link, size in zip(model.links, sizes, strict=True) if size > 1e-3 * sizes.max()]
     names = sorted({name for link in links for name in link.placements})
     raise InputError(
         f"[body.{names[0]}.inertia]",

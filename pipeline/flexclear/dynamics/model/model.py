@@ -29,9 +29,6 @@ from flexclear.scene.schema import Scene
 if TYPE_CHECKING:
     from flexclear.dynamics.contact.law import Resolved
 
-#: four roundings of a length, relative to the length
-LENGTH_ROUNDING = 8.9e-16
-
 
 @dataclass(frozen=True)
 class Model:
@@ -303,7 +300,8 @@ def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling
     that.
     """
     L, weights = mechanism.length, list[float]()
-    rounding = LENGTH_ROUNDING * L / mechanism.scene.solver.rtol
+    # 8.9e-16: four roundings of a length, relative to the length
+    rounding = 8.9e-16 * L / mechanism.scene.solver.rtol
     for one in closures:
         part = mechanism.components.of(*(site.link for both in one.ends for site in both))
         weights.append(max(L / max(mechanism.components.lengths[part], rounding), 1.0))

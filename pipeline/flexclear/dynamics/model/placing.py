@@ -22,14 +22,8 @@ from flexclear.numerics.rotations import rotation_vector_to_matrix
 
 #: initial guesses from which assemblies are sought; only the first is not random
 GUESSES = 16
-#: largest random slide, as a fraction of the mechanism's size
-SLIDE = 0.3
 #: assemblies are equal if no coordinate differs by more than this, in radians or fractions of the mechanism's size
 SAME_ASSEMBLY = 1e-4
-#: the search ends at an assembly that can move and is closer than this to all hints
-NEAR_HINTS = 0.5
-#: a coordinate closer to its hint than this, in radians or fractions of the mechanism's size, starts where it is said
-AT_HINT = 0.01
 #: singular values of naturally sized rows below this fraction of the largest count as zero: a motion is free
 LOOSE = 1e-6
 
@@ -65,7 +59,8 @@ def assemblies(
         made = Assembly(poses, _coordinates(joints, poses))
         if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME_ASSEMBLY for other in distinct):
             distinct.append(made)
-        if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR_HINTS:
+        # 0.5: the search ends at an assembly that can move and is closer than this to all hints
+        if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < 0.5:
             break  # a mechanism that can move: its first assembly near the hints counts
     from_hints = [_distance(mechanism, joints, one.coordinates, hints) for one in distinct]
     nearest = min(from_hints, default=0.0)
@@ -122,7 +117,9 @@ def _anywhere(
     held, open_ones, said = list[Constraint](), dict[str, str](), {(start.joint, start.number) for start in starts}
     known = {key for key, value in at.coordinates.items() if abs(value) <= SAME_ASSEMBLY}
     for key, near in targets(joints, starts)[0].items():
-        known |= {key} if _distance(mechanism, joints, at.coordinates, {key: near}) <= AT_HINT else set()
+        # 0.01: a coordinate closer to its hint than this, in radians or fractions of the mechanism's size, starts where
+        # it is said
+        known |= {key} if _distance(mechanism, joints, at.coordinates, {key: near}) <= 0.01 else set()
     for joint in joints:
         numbers = range(len(joint_type(joint.edge.kind).COORDINATES))
         chosen = [k for k in numbers if {joint.link_a, joint.link_b} <= placed or (joint.name, k) in known]
@@ -194,7 +191,8 @@ def _motion(
         value, along = values.get((joint.name, k)), np.eye(3)[coordinate.axis]
         if value is None:
             value = 0.0 if random is None else float(random.uniform(-1.0, 1.0))
-            value *= np.pi if coordinate.turning else SLIDE * mechanism.length
+            # 0.3: largest random slide, as a fraction of the mechanism's size
+            value *= np.pi if coordinate.turning else 0.3 * mechanism.length
         step = Placement(R=rotation_vector_to_matrix(value * along)) if coordinate.turning else Placement(value * along)
         pose = pose.of(step)
     return pose

@@ -29,8 +29,6 @@ SAME_POINT = 1e-3
 PLANAR = dict.fromkeys(("revolute", "clearance-revolute", "clearance-slot", "planar"), "turns")
 PLANAR |= {"prismatic": "slides", "fixed": "fixed"}
 PARALLEL = 1e-6
-#: springs shorter than this fraction of the mechanism's size have no direction
-SHORTEST_SPRING = 1e-9
 
 
 class Separation(NamedTuple):
@@ -100,7 +98,8 @@ def _refuse_missed(contact: Contact, offset: np.ndarray) -> None:
 def _refuse_short(name: str, load: Any, distance: float, size: float) -> None:
     """Raise InputError for a spring or damper of zero length: it has no direction; size: of the mechanism [m]."""
     directed = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
-    if directed and distance <= SHORTEST_SPRING * size:
+    # 1e-9: springs shorter than this fraction of the mechanism's size have no direction
+    if directed and distance <= 1e-9 * size:
         raise InputError(
             f"[load.{name}.between]",
             "its two ends coincide at the start, so that its force has no direction",

@@ -33,15 +33,11 @@ from flexclear.dynamics.model.mechanism import Closure, Site
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
 
-#: least arm of a rotation, in units of the mechanism's size: positions are not more exact at smaller distances
-LEAST_ARM = 1e-3
 #: singular values of naturally sized rows below this are zero.  The bound is above the rounding of a zero: an entry is
 #: a sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
 #: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it is
 #: below the root of `closures.SINGULAR_PIVOT`, 3e-7, at which the kernels no longer solve for a row.
 ZERO_SINGULAR_VALUE = 1e-7
-#: iterations of scaling; each halves the exponents by which rows and columns differ
-SCALING_ROUNDS = 12
 
 
 @dataclass(frozen=True)
@@ -119,7 +115,9 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
                 moved = np.where(acts.turning, acts.directions @ turn, acts.directions @ shift)
                 J[mine, coordinate] += sign * factor * moved
                 angle = float(np.linalg.norm(turn))
-                way = float(np.linalg.norm(motion.shift[column])) + angle * (np.linalg.norm(arm) + L * LEAST_ARM)
+                # 1e-3: least arm of a rotation, in units of the mechanism's size: positions are not more exact at
+                # smaller distances
+                way = float(np.linalg.norm(motion.shift[column])) + angle * (np.linalg.norm(arm) + L * 1e-3)
                 sizes[mine, coordinate] += np.abs(factor) * np.where(acts.turning, angle, way)
         first += len(closure.rows)
     by_row, by_column = scales(sizes)
@@ -206,7 +204,8 @@ def _frame_motions(model: Model, link: int, frame: str, pose: Placement) -> tupl
 def scales(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return factors of rows and columns that bring the largest entry of each to one; empty ones have factor one."""
     row, column = np.ones(sizes.shape[0]), np.ones(sizes.shape[1])
-    for _ in range(SCALING_ROUNDS):
+    # 12: iterations of scaling; each halves the exponents by which rows and columns differ
+    for _ in range(12):
         now = sizes * row[:, None] * column
         row /= _root(np.max(now, axis=1, initial=0.0))
         column /= _root(np.max(now, axis=0, initial=0.0))

@@ -38,8 +38,6 @@ KEYS = {
 CHANGEABLE = {f"{table}.{key}" for table, keys in KEYS.items() for key in keys.split()}
 CHANGEABLE |= {key for effect in EFFECTS for key in effect.changeable}
 CHANGEABLE |= {"title", "description", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view"}
-#: least principal moment, as fraction of the largest, with which every motion of a link has inertia
-SLENDER_INERTIA = 1e-6
 
 
 def refilled(model: Model, scene: Scene) -> Model | None:
@@ -119,7 +117,8 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
                 return None
             links[i] = replace(link, inertia=now)
     principal = np.linalg.eigvalsh(np.array([link.inertia.moments for link in links if link.inertia is not None]))
-    if not np.all(principal[:, 0] > SLENDER_INERTIA * principal[:, -1]):
+    # 1e-6: least principal moment, as fraction of the largest, with which every motion of a link has inertia
+    if not np.all(principal[:, 0] > 1e-6 * principal[:, -1]):
         return None
     placed = [replace(link, start=start) for link, start in zip(links, mechanism.placed, strict=True)]
     length, parts = sizes(scene, placed, mechanism.link_of, mechanism.frames)

@@ -16,10 +16,6 @@ from flexclear.dynamics.model.arrays import envelope_size
 from flexclear.dynamics.model.index_tables import closure_envelope, threes
 from flexclear.dynamics.model.model import Model
 
-#: rows below this fraction of their natural length are rounding: the square root of the rounding in a cancelling sum,
-#: 1e-13 at worst, with some digits to spare
-ROUNDING_ROW = 1e-6
-
 
 def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray, float]:
     """Return the mask of `rank` rows to keep, and their least pivot: 1 for rows at right angles, 0 for dependent ones.
@@ -54,7 +50,9 @@ def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndar
         span = slice(line["row0"], line["row0"] + line["n_rows"])
         for kind in (0, 1):
             mine = np.flatnonzero(kinds[span] == kind) + span.start
-            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), ROUNDING_ROW * natural[mine])
+            # 1e-6: rows below this fraction of their natural length are rounding: the square root of the rounding in a
+            # cancelling sum, 1e-13 at worst, with some digits to spare
+            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), 1e-6 * natural[mine])
     return scales
 
 

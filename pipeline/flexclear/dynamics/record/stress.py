@@ -28,9 +28,6 @@ from flexclear.system.errors import InputError
 if TYPE_CHECKING:
     from flexclear.artifacts.labelled import Labelled
 
-#: largest number of stress components of solids in memory
-COMPONENTS_AT_ONCE = 10_000_000
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -299,7 +296,8 @@ def largest(field: np.ndarray, factor: np.ndarray, groups: list[np.ndarray]) -> 
     tensor = np.empty((len(factor), len(groups), 6))
     node = np.empty((len(factor), len(groups)), dtype=np.int64)
     flat = np.ascontiguousarray(field.reshape(-1, field.shape[2]).T)
-    step = max(1, COMPONENTS_AT_ONCE // flat.shape[1])
+    # 10_000_000: largest number of stress components of solids in memory
+    step = max(1, 10_000_000 // flat.shape[1])
     for start in range(0, len(factor), step):
         part = slice(start, start + step)
         stress = (factor[part] @ flat).reshape(-1, *field.shape[:2])

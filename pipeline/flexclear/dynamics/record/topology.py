@@ -14,8 +14,6 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.run import Run
 from flexclear.dynamics.run.trajectory import Trajectory
 
-#: singular values of the selected closure rows below this fraction of the largest count as zero in the rank
-ZERO_ROW = 1e-9
 #: condition numbers below this leave no doubt about a row's rank, in any units, and leave ten digits to the eigenvalues
 #: of J J^T, the squares of the singular values: their roundings are 1e-16 of the largest one
 WELL_CONDITIONED = 1e3
@@ -37,7 +35,9 @@ def topology(run: Run) -> Series:
         singular_rows = condition[1] > WELL_CONDITIONED
         if singular_rows.any():
             values = _singular_values(engine, trajectory, seen, closure_rows.natural)[singular_rows]
-            rank[singular_rows] = np.sum(values > ZERO_ROW * values[:, :1], axis=1)
+            # 1e-9: singular values of the selected closure rows below this fraction of the largest count as zero in the
+            # rank
+            rank[singular_rows] = np.sum(values > 1e-9 * values[:, :1], axis=1)
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
     if not indicators.shape[1]:

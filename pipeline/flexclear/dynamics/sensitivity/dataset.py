@@ -31,8 +31,6 @@ from flexclear.system.progress import Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-#: step for the derivative of reductions, smooth functions of their series, as a fraction of the largest change
-REDUCTION_STEP = 1e-6
 #: reductions without a derivative
 WITHOUT = ("count", "sections")
 
@@ -162,7 +160,8 @@ def _derivative(
     if recorded.reduction == "largest":
         at, value = _of_largest(time, series, change)
         return np.asarray(value if at <= horizon else np.nan)
-    step = REDUCTION_STEP * (np.abs(series).max(initial=0.0) or 1.0) / (np.abs(change).max(initial=0.0) or 1.0)
+    # 1e-6: step for the derivative of reductions, smooth functions of their series, as a fraction of the largest change
+    step = 1e-6 * (np.abs(series).max(initial=0.0) or 1.0) / (np.abs(change).max(initial=0.0) or 1.0)
     ends = [reduced(time, series + sign * step * change, recorded.reduction) for sign in (-1.0, 1.0)]
     result = np.asarray((ends[1] - ends[0]) / (2.0 * step))
     result = result if time[-1] <= horizon else np.full_like(result, np.nan)

@@ -16,8 +16,6 @@ from flexclear.system.errors import InputError, SolverError
 
 #: change of a recipe's number between bundles, as a fraction of it
 RECIPE_STEP = 1e-3
-#: modes with frequencies closer than this fraction may rotate among each other
-EQUAL_FREQUENCIES = 1e-6
 #: largest disagreement of differences over two and over four bundles, as a fraction of the change or of the value
 AGREEMENT, SLIGHT = 1e-2, 1e-4
 #: variables of modes that do not depend on their signs
@@ -77,7 +75,8 @@ def _alignment(base: LabelledArrays, other: LabelledArrays) -> np.ndarray:
     )
     overlap, turn, first = two.T @ one, np.zeros((len(frequency),) * 2), 0
     for k in range(1, len(frequency) + 1):
-        if k == len(frequency) or frequency[k] - frequency[k - 1] > EQUAL_FREQUENCIES * frequency[k]:
+        # 1e-6: modes with frequencies closer than this fraction may rotate among each other
+        if k == len(frequency) or frequency[k] - frequency[k - 1] > 1e-6 * frequency[k]:
             u, _, v = np.linalg.svd(overlap[first:k, first:k])
             turn[first:k, first:k], first = u @ v, k
     return turn

@@ -24,8 +24,6 @@ from flexclear.scene.quantity import Quantity
 #: steps along a direction are powers of ten, from this one [its unit] to that of its start; each changes no quantity by
 #: a larger fraction of its size
 FINEST = 1e-10
-#: step of a closed contact, as a fraction of its penetration
-OF_DEPTH = 1e-2
 #: name of the contacts' normal forces among the series
 NORMAL_FORCE = "normal force"
 
@@ -83,6 +81,7 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter, wi
         depth, change = -0.5 * (gaps[0] + gaps[1]), np.abs(gaps[1] - gaps[0]) / (2.0 * probe)
         closed = (recording.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            allowed = np.where(closed & (change > 0.0), OF_DEPTH * depth / change, np.inf)
+            # 1e-2: step of a closed contact, as a fraction of its penetration
+            allowed = np.where(closed & (change > 0.0), 1e-2 * depth / change, np.inf)
         steps = np.minimum(steps, allowed.min(axis=1))
     return np.clip(steps, FINEST, widest)

@@ -36,14 +36,10 @@ from flexclear.system.progress import Progress
 
 #: a pin has reached its position within this fraction of the clearance; largest number of passes for that
 REACHED, PIN_PASSES = 1e-9, 20
-#: forces below this fraction of the weight press nothing: the pin stays in the middle
-NO_FORCE = 1e-9
 #: axes of the outer frame along which an ideal joint holds a pin in the middle; others: all
 ACROSS: dict[str, tuple[int, ...]] = {"clearance-revolute": (0, 1), "clearance-slot": (1,)}
 #: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
 SETTLED, LOADINGS = 1e-9, 10
-#: step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
-MODAL_STEP = 1e-7
 #: singular values below this fraction of the largest are rounding
 SINGULAR_ROUNDING = 1e-9
 
@@ -118,7 +114,9 @@ def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
     if not speeds or engine.mobility.singular_start:
         return y
     try:
-        state, step = y, MODAL_STEP * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
+        # 1e-7: step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its
+        # mass
+        state, step = y, 1e-7 * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
         for _ in range(LOADINGS):
             rates = _accelerations(engine, state, speeds)
             slopes = np.array(
@@ -182,7 +180,8 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
             force = across @ forces[contact.name]
             size = float(np.linalg.norm(force))
             pressed = contact.joint.clearance + law.depth(size)
-            target = -force / size * pressed if size > NO_FORCE * weight else 0.0 * force
+            # 1e-9: forces below this fraction of the weight press nothing: the pin stays in the middle
+            target = -force / size * pressed if size > 1e-9 * weight else 0.0 * force
             missing.append(target - offset)
         offsets = np.concatenate(missing)
         if np.max(np.abs(offsets)) <= REACHED * least:

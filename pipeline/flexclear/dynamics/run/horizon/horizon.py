@@ -41,9 +41,6 @@ from flexclear.workflow.cores import TICK
 
 #: about this many times of comparison, which bounds the cost; with rarer outputs, comparisons are also between them
 SAMPLES = 180
-#: a body's motion is relative to its own largest, but at least to this fraction of the liveliest body's; smaller
-#: motions are rounding and drift of loops
-LEAST_LIVELY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -246,7 +243,9 @@ class Metric:
 
     def distance(self, one: np.ndarray, other: np.ndarray, largest: np.ndarray) -> np.ndarray:
         """Return the largest separation of a body at each time, as a fraction of its largest motion in the run."""
-        scale = np.maximum(largest, LEAST_LIVELY * largest.max(initial=0.0))
+        # 1e-3: a body's motion is relative to its own largest, but at least to this fraction of the liveliest body's;
+        # smaller motions are rounding and drift of loops
+        scale = np.maximum(largest, 1e-3 * largest.max(initial=0.0))
         return np.asarray((self.norms(one - other)[:, scale > 0.0] / scale[scale > 0.0]).max(axis=1, initial=0.0))
 
 
