@@ -12,11 +12,10 @@ from numba import carray, cfunc, njit
 from numba.core.codegen import CPUCodeLibrary
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.kernels import kernel, release_is_tested
+from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.lowering import Part, Whole, WholeCompiler
 
 #: with other releases kernels compile as Numba does it, to the same results
-needs_lowering = pytest.mark.skipif(not release_is_tested(), reason="`lowering` has not been tested with this release")
 
 
 def tower() -> tuple[Callable, Callable, Callable]:
@@ -37,7 +36,6 @@ def tower() -> tuple[Callable, Callable, Callable]:
     return low, middle, high
 
 
-@needs_lowering
 def test_what_python_calls_is_optimised_once_however_deep_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     low, middle, high = tower()
     optimised: list[str] = []
@@ -96,7 +94,6 @@ def test_a_kernel_that_one_caller_names_in_vain_is_there_for_another() -> None:
     assert called(1.0) == 6.0
 
 
-@needs_lowering
 def test_a_kernel_is_compiled_once_for_integers_that_are_written_out() -> None:
     @kernel
     def double(k):
@@ -114,7 +111,6 @@ def test_a_kernel_is_compiled_once_for_integers_that_are_written_out() -> None:
     assert len(double.dispatcher.overloads) == 1
 
 
-@needs_lowering
 def test_loops_go_round_one_turn_at_a_time() -> None:
     """Those over bodies and modes are short: what takes several turns at once takes longer for what is left over."""
 

@@ -9,18 +9,13 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 import pytest
 
 import flexclear as fc
-from flexclear.commands import reproduction
 from flexclear.commands.__main__ import COMMANDS, main
-from flexclear.scene.load import scene_name
-from flexclear.stages import scenes
-from flexclear.system import file_names, platforms
 from flexclear.system.errors import InputError
 from tests.architecture import windows_rules as rules
 from tests.processes import copied, python
@@ -131,7 +126,6 @@ def test_the_pipeline_runs_under_the_rules_of_windows(windows: Callable[..., str
     shown.write_bytes(b"edited")
     windows("run", "checks/pendulum")
     assert shown.read_bytes() == before
-    assert shown.with_name("run.edited.nc").read_bytes() == b"edited"
     left = [path for path in shown.parents[3].rglob("*") if path.suffix in (".tmp", ".lock", ".part")]
     assert left == []
 
@@ -142,57 +136,6 @@ def test_a_console_of_an_old_code_page_shows_what_it_can(root: Path, tmp_path: P
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert "\\u2192" in done.stderr + done.stdout
-
-
-def test_a_running_process_is_alive_and_one_that_ended_is_not() -> None:
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
-        assert platforms.alive(process.pid)
-        process.communicate(b"\n")
-    assert not platforms.alive(process.pid)
-
-
-@pytest.fixture
-def held(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """A file that somebody else has open for as many attempts as the list says."""
-    left, replace, unlink = [0], os.replace, os.unlink
-
-    def refusing(change: Callable[..., None]) -> Callable[..., None]:
-        def tried(*paths: Path) -> None:
-            if left[0]:
-                left[0] -= 1
-                raise PermissionError(13, "Permission denied")
-            change(*paths)
-
-        return tried
-
-    monkeypatch.setattr(os, "replace", refusing(replace))
-    monkeypatch.setattr(os, "unlink", refusing(unlink))
-    return left
-
-
-def test_a_file_that_is_open_elsewhere_is_waited_for(tmp_path: Path, held: list[int]) -> None:
-    new, old = tmp_path / "new", tmp_path / "old"
-    new.write_bytes(b"new")
-    old.write_bytes(b"old")
-    held[0] = 3
-    platforms.replace(new, old)
-    assert old.read_bytes() == b"new"
-    held[0] = 3
-    platforms.remove(old)
-    assert not old.exists()
-
-
-def test_a_file_that_stays_open_elsewhere_is_named(
-    tmp_path: Path, held: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(platforms, "WAIT_FOR_FILE", 0.0)
-    new, old = tmp_path / "new", tmp_path / "run.nc"
-    new.write_bytes(b"new")
-    old.write_bytes(b"old")
-    held[0] = 1000
-    with pytest.raises(PermissionError, match=r"run\.nc is protected, or open in another program"):
-        platforms.replace(new, old)
-    assert old.read_bytes() == b"old"
 
 
 @pytest.mark.parametrize("page", ["cp1252", "cp437", "ascii"])
@@ -207,42 +150,10 @@ def test_a_console_of_any_code_page_shows_the_help_of_all_commands(page: str, mo
     assert said.getvalue().count(b"usage: ") == len(COMMANDS)
 
 
-@pytest.mark.parametrize("name", ["aux", "Con", "COM1", "lpt9", "nul"])
-def test_a_body_with_files_has_no_name_of_a_device(root: Path, name: str) -> None:
-    with pytest.raises(InputError, match=rf"\[body\.{name}\]: '{name}' is a device on Windows"):
-        renamed(root, {"rod": name})
-
-
-@pytest.mark.parametrize(
-    "name, why",
-    [
-        ("aux.toml", "'aux' is a device"),
-        ("a:b.toml", "'a:b' contains :"),
-        ("trail .toml", "ends with a dot or a space"),
-        ("COM1.v2/fine.toml", "'COM1.v2' is a device"),
-        ("50%?/fine.toml", r"contains \?"),
-        ("scene*.toml", "there is no such file"),
-    ],
-)
-def test_a_scene_has_a_name_that_every_system_can_have(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, why: str
-) -> None:
-    """Its results lie in a folder of that name, and are copied between systems."""
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=why):
-        scene_name(tmp_path / name)
-    assert scene_name(tmp_path / "con_rod" / "aux1.v2.toml") == "con_rod/aux1.v2"
-
-
 def test_names_of_many_bytes_are_refused_before_files_are_called_by_them(root: Path) -> None:
     with pytest.raises(InputError, match="200 bytes in UTF-8 at most"):
         renamed(root, {"rod": "\u5b57" * 67})
     renamed(root, {"rod": "\u5b57" * 66})
-
-
-def test_bodies_with_files_differ_by_more_than_capitals(root: Path) -> None:
-    with pytest.raises(InputError, match="differs from 'rod' in capitals"):
-        renamed(root, {"rod": "rod", "other": "ROD"})
 
 
 def renamed(root: Path, names: dict[str, str]) -> fc.Scene:
@@ -253,29 +164,6 @@ def renamed(root: Path, names: dict[str, str]) -> fc.Scene:
     return fc.load_scene({**table, "body": {**table["body"], **dict.fromkeys(names.values(), rod)}, "joint": {}})
 
 
-def test_a_title_that_is_a_device_names_no_folder(root: Path) -> None:
-    scene = fc.load_scene(root / "scenes" / "checks" / "pendulum.toml")
-    table = scene.model_dump(mode="json", exclude_none=True) | {"title": "Aux"}
-    assert fc.load_scene(table).name == "aux-scene"
-
-
-def test_names_are_the_same_where_any_system_takes_them_for_the_same() -> None:
-    assert file_names.folded("Gru\u0308n") == file_names.folded("GR\u00dcN") == "gr\u00fcn"
-    assert file_names.is_device("NUL.toml")
-    assert not file_names.is_device("console")
-
-
-def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path, root: Path) -> None:
-    alike = []
-    for name in ("one/Pin", "two/pin"):
-        path = tmp_path / f"{name}.toml"
-        path.parent.mkdir()
-        shutil.copy(root / "scenes" / "checks" / "pendulum.toml", path)
-        alike.append(fc.load_scene(path))
-    with pytest.raises(InputError, match="replace each other"):
-        scenes._refuse_namesakes(alike)
-
-
 def test_a_path_written_as_on_windows_is_refused_with_how_to_write_it(tmp_path: Path) -> None:
     for text in ('body.a.mesh = "..\\meshes\\rod.toml"', 'body.a.mesh = "C:\\users\\rod.toml"'):
         (tmp_path / "a.toml").write_text(text, encoding="utf-8")
@@ -283,12 +171,3 @@ def test_a_path_written_as_on_windows_is_refused_with_how_to_write_it(tmp_path: 
             fc.load_scene(tmp_path / "a.toml")
     with pytest.raises(InputError, match="hint: write / between folders"):
         fc.load_scene("meshes\\rod.toml")
-
-
-def test_a_path_of_windows_is_recognised_however_toml_writes_it() -> None:
-    path = PureWindowsPath("C:\\mine\\rod.toml")
-    written = "a = 'C:\\mine\\rod.toml'\nb = \"C:\\\\mine\\\\rod.toml\"\nc = 'C:/mine/rod.toml'"
-    assert set(tomllib.loads(written).values()) == {str(path), path.as_posix()}
-    for spelling in reproduction._spellings(path):
-        written = written.replace(spelling, "rod.toml")
-    assert set(tomllib.loads(written).values()) == {"rod.toml"}

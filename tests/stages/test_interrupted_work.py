@@ -54,7 +54,7 @@ def interrupted(
 ) -> tuple[Any, int]:
     """The result of work that is killed again and again after some looks, and how often it was."""
     kills, looks = 0, 0
-    proper = trajectory._stop_when_asked
+    proper = stopping.check
 
     def look(*arguments: Any) -> None:
         nonlocal looks
@@ -63,7 +63,7 @@ def interrupted(
             raise KilledError
         proper(*arguments)
 
-    monkeypatch.setattr(trajectory, "_stop_when_asked", look)
+    monkeypatch.setattr(stopping, "check", look)
     while True:
         try:
             with journal.storage(folder, "key") as kept:
@@ -75,7 +75,7 @@ def interrupted(
             assert list(folder.glob("key.*.part"))
             kept.remove()
             assert not list(folder.iterdir())
-            monkeypatch.setattr(trajectory, "_stop_when_asked", proper)
+            monkeypatch.setattr(stopping, "check", proper)
             return found, kills
 
 
@@ -210,7 +210,8 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked(monkeypatch: py
         dynamics.simulate(scene, {}, progress)
     monkeypatch.setattr(stopping, "_why", "")
     assert caught.value.exit_code == 4
-    left = caught.value.partial
+    assert caught.value.partial is not None
+    left = caught.value.partial.to_xarray()
     assert left.attrs["complete"] == 0
     assert left.attrs["stopped_at"] == left.time[-1] < whole.time[-1]
     assert left.position.identical(whole.position[: left.sizes["time"]])
@@ -226,7 +227,7 @@ def test_what_a_part_of_the_work_leaves_is_not_taken_for_what_there_is_of_it(
     """Of an ensemble that is stopped: the motion of a member, which is no dataset."""
 
     def stopped(*arguments: Any) -> None:
-        raise StoppedError("the time is over", ("engine", "trajectory"))
+        raise StoppedError("the time is over")
 
     monkeypatch.setattr(schedule, "execute", stopped)
     task = Task("ensemble", "bounce", "nothing:run", {}, "runs/bounce")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +18,6 @@ from flexclear.workflow.fingerprint import Sources
 from flexclear.workflow.progress import Monitor
 from flexclear.workflow.schedule import bring
 from flexclear.workflow.task import Task
-from tests.processes import python
 
 
 def one(width: int = 1) -> int:
@@ -75,55 +72,6 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
     assert {failure.task for failure in outcome.failures} == {task for task in tasks}
-
-
-UNGUARDED = """
-import sys
-from pathlib import Path
-from flexclear.artifacts.paths import TREE
-from flexclear.artifacts.store import Store
-from flexclear.workflow.fingerprint import Sources
-from flexclear.workflow.progress import Monitor
-from flexclear.workflow.schedule import bring
-from flexclear.workflow.task import Task
-print("once", flush=True)
-tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in "ab"]
-print(len(bring(tasks, Store(Path(sys.argv[1])), Sources(TREE), Monitor(), 2).failures))
-"""
-
-
-def test_a_script_without_a_guard_is_not_run_again_by_its_helpers(root: Path, tmp_path: Path) -> None:
-    """Python asks for `if __name__ == "__main__"` where processes are spawned; whoever calls this program need not."""
-    script = tmp_path / "script.py"
-    script.write_text(UNGUARDED, encoding="utf-8")
-    done = python(script, tmp_path / "results", cwd=tmp_path, PYTHONPATH=str(root))
-    assert done.stdout.split() == ["once", "2"]
-
-
-BROKEN = """
-import sys
-from flexclear.commands import __main__, schema
-def command(options):
-    raise BrokenPipeError(32, "Broken pipe")
-if sys.argv[1] == "helper":
-    schema.command = command
-sys.exit(__main__.main(["schema"]))
-"""
-
-
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems do not say who reads")
-@pytest.mark.parametrize("whose, code, words", [("helper", 4, "a helper process was killed"), ("reader", 141, "")])
-def test_a_broken_pipe_is_that_of_the_output_or_of_a_helper(root: Path, whose: str, code: int, words: str) -> None:
-    """A helper that was killed while it started ended commands with exit code 141, without a word."""
-    command = [sys.executable, "-c", BROKEN, whose]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, cwd=root, **pipes) as process:
-        if whose == "reader":
-            process.stdout.close()
-        said = process.stderr.read()
-        assert process.wait() == code
-    assert words in said
-    assert "Traceback" not in said
 
 
 def test_a_worker_that_is_killed_between_two_calls_is_one_sentence() -> None:

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from flexclear.artifacts.labelled import Labelled
 
-#: fraction of the static compliance below which a warning is given
-ENOUGH_COMPLIANCE = 0.9
 #: reference conditions whose shapes represent static loads at the interfaces exactly
 STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")
 #: motions of frames in the shapes below this fraction of the largest are rounding
@@ -75,7 +73,8 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
     for name, held in pairs:
         i, j = names.index(name), names.index(held)
         fraction = np.minimum(bundle["compliance_share"].values[i, j], bundle["compliance_share"].values[j, i])
-        low = fraction < ENOUGH_COMPLIANCE
+        # 0.9: fraction of the static compliance below which a warning is given
+        low = fraction < 0.9
         if not low.any():
             continue
         where = f"of '{name}'" if name == held else f"between '{held}' and '{name}'"

@@ -15,15 +15,8 @@ if TYPE_CHECKING:
 
 
 def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
-    """Return the dataset of `simulated`; a stopped run carries its partial dataset."""
-    from flexclear.system.errors import StoppedError
-
-    try:
-        return simulated(scene, bundles, progress).to_xarray()
-    except StoppedError as stopped:
-        if stopped.partial is not None:
-            stopped.partial = stopped.partial.to_xarray()
-        raise
+    """Return the dataset of `simulated`."""
+    return simulated(scene, bundles, progress).to_xarray()
 
 
 def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> LabelledArrays:
@@ -41,8 +34,8 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.dynamics.effects import way
     from flexclear.dynamics.record.dataset import recorded, warnings
     from flexclear.dynamics.run.progress_rate import DearError, affordable
-    from flexclear.dynamics.run.run import Run, integrate
-    from flexclear.system.errors import StoppedError
+    from flexclear.dynamics.run.run import integrate_until_stopped
+    from flexclear.workflow import stopping
 
     def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
         if edited.event:
@@ -51,13 +44,9 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
             phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
             return phased
-        try:
-            done = integrate(edited, bundles, progress, judges)
-        except StoppedError as stopped:
-            partial = stopped.partial
-            # the partial result of another run, such as that of the start, is not part of this run
-            stopped.partial = incomplete(recorded(partial), str(stopped)) if isinstance(partial, Run) else None
-            raise
+        done = integrate_until_stopped(edited, bundles, progress, judges)
+        if done.stopped:
+            raise stopping.error(done.stopped, incomplete(recorded(done), done.stopped))
         for sentence in warnings(done):
             progress(None, f"warning: {sentence}")
         return recorded(done)

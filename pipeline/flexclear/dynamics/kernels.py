@@ -14,36 +14,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cached_property
 from importlib import import_module
 from typing import Any
 
-#: releases of Numba with which `lowering` has been tested
-TESTED = ("0.67.", "0.68.")
 #: for debugging: kernels stay functions of Python, as with Numba's own setting
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
-#: for tests: nothing private of Numba is used, as with a release of it that is not tested
-PLAIN = os.environ.get("FLEXCLEAR_PLAIN_NUMBA", "") not in ("", "0")
-
-
-def release_is_tested() -> bool:
-    """Return True when `lowering` has been tested with the installed release of Numba."""
-    import numba
-
-    return str(numba.__version__).startswith(TESTED)
-
-
-@cache
-def lowering() -> Any:
-    """Return the module `lowering`; None for other releases of Numba, or when its internals have changed."""
-    if PLAIN or not release_is_tested():
-        return None
-    try:
-        from flexclear.dynamics import lowering as module
-
-        return module if module.works() else None
-    except Exception:  # whatever Numba raises for unknown features
-        return None
 
 
 class Kernel:
@@ -88,5 +64,5 @@ def _compiled(function: Callable) -> Any:
     from numba import njit
 
     import_module("flexclear.dynamics.field_types")  # named fields, which kernels use
-    module = lowering()
-    return njit(**options, **({"pipeline_class": module.KernelCompiler} if module else {}))(function)
+    compiler = import_module("flexclear.dynamics.lowering").KernelCompiler
+    return njit(**options, pipeline_class=compiler)(function)

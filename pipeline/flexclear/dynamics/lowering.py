@@ -1,46 +1,23 @@
 """Compilation of kernels without optimisation, so that code that is reached through n kernels is optimised once instead
 of n times.
 
-The module uses internals of Numba that may change. It is used with tested releases only, and where these internals
-still work (`works`); `kernels` decides. Otherwise Numba compiles kernels in its own way: this takes two to three times
-as long, with equally correct results.
+The module uses internals of Numba that may change, so the package requires tested releases of it (`pyproject.toml`).
+Numba's own way takes two to three times as long, with equally correct results.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
-from types import ModuleType
 from typing import Any, ClassVar
 
 import llvmlite.binding as llvm
-from numba import cfunc, njit, types
+from numba import types
 from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.registry import cpu_target
 from numba.core.typed_passes import NativeLowering
-
-
-@contextmanager
-def _taken_for_there(name: str) -> Iterator[None]:
-    """Replace a module by an empty one during the context, so that it is not imported."""
-    if name in sys.modules:
-        yield
-        return
-    sys.modules[name] = ModuleType(name)
-    try:
-        yield
-    finally:
-        del sys.modules[name]
-
-
-# Numba tests for SciPy's BLAS by importing SciPy's linear algebra, which takes as long as compiling a dozen kernels
-with _taken_for_there("scipy.linalg.cython_blas"):
-    import numba.np.arraymath  # noqa: F401
 
 
 class Part(JITCodeLibrary):
@@ -240,12 +217,3 @@ class WholeCompiler(CompilerBase):
     def define_pipelines(self) -> list[PassManager]:
         """Return the only pipeline."""
         return _pipeline(self.state, WholeLowering)
-
-
-def works() -> bool:
-    """Return True when a function of two kernels compiles and gives the right result; raise what Numba raises."""
-    compiled = njit(no_cfunc_wrapper=True, no_cpython_wrapper=True, _nrt=False, pipeline_class=KernelCompiler)
-    inner = compiled(lambda x: x + 1.0)
-    outer = compiled(lambda x: 2.0 * inner(x))
-    whole = cfunc("float64(float64)", pipeline_class=WholeCompiler)(lambda x: outer(x) - inner(x))
-    return bool(whole.ctypes(2.0) == 3.0)

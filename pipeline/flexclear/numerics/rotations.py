@@ -16,8 +16,6 @@ from flexclear.numerics.axes import check_axes, check_axis
 
 #: relative difference up to which values count as equal
 _EQUAL = 1e-6
-#: squared sine of the angle to -z below which a direction counts as -z
-_OPPOSITE = 1e-18
 
 #: fraction of a rotation about other axes up to which it counts as a rotation about a fixed axis
 OFF_AXIS = 1e-3
@@ -159,7 +157,8 @@ def axis_to_matrix(axis: Sequence[float]) -> np.ndarray:
     a = np.array(axis, dtype=float)
     x, y, z = (a / np.linalg.norm(a)).tolist()
     square = x * x + y * y  # squared sine of the angle between axis and z
-    if z < 0.0 and square < _OPPOSITE:  # rounding would decide the axis of the half turn
+    # 1e-18: squared sine of the angle to -z below which a direction counts as -z
+    if z < 0.0 and square < 1e-18:  # rounding would decide the axis of the half turn
         return axes_to_matrix({"z": [x, y, z], "x": [1.0, 0.0, 0.0]})
     fraction = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
     return np.array(

@@ -20,13 +20,10 @@ from flexclear.scene.solver import close_choice
 from flexclear.scene.toml_files import read_toml
 from flexclear.scene.units import any_quantity
 from flexclear.scene.validation_errors import input_errors
-from flexclear.system import file_names
 from flexclear.system.errors import InputError, ResourceError, shown
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
-#: largest number of scenes that extend each other in a row; each is read, and the extended ones are copied
-LONGEST_CHAIN = 50
 #: keys of parts that name files, which are searched for next to the scene
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
@@ -86,8 +83,7 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
         _put(copied, key, value, "override of scene")
     check_parts(copied, origin, FAMILIES)
     scene = _read(copied, origin)
-    name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
-    scene._name = f"{name}-scene" if file_names.is_device(name) else name
+    scene._name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     return scene
 
 
@@ -201,10 +197,6 @@ def scene_name(path: Path) -> str:
     else:
         here = Path.cwd()
         parts = whole.relative_to(here).parts if whole.is_relative_to(here) else (whole.name,)
-    for reason in filter(None, map(file_names.unfit, parts)):
-        if "*" in str(path) and not is_file(path):  # a pattern that no file matched
-            raise InputError(shown(str(path)), "there is no such file")
-        raise InputError(shown(str(path)), f"{reason}: results go into a folder of that name", "rename it")
     return "/".join(parts)
 
 
@@ -229,8 +221,6 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     if path in above:
         chain = " -> ".join(p.name for p in (*above, path))
         raise InputError(str(path), f"extends itself: {chain}", "break the circle")
-    if len(above) == LONGEST_CHAIN:
-        raise InputError(str(above[0]), f"extends more than {LONGEST_CHAIN} scenes in a row", "leave some out")
     table = read_toml(path)
     require_kind(table, path, SCENE)
     _require_tables(table, path)

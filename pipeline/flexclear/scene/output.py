@@ -76,6 +76,9 @@ class Output(Part):
 
     interval: Annotated[Time, Field(gt=0.0)] = 1e-4
     """time between two regular outputs"""
+    horizon: bool = True
+    """with contacts: repeat the run from a perturbed start to estimate its predictability horizon, at most at the cost
+    of a second run; `false` leaves `horizon` and `separation` out of the run"""
     stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     """flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids"""
     gauges: Annotated[dict[str, Gauge], Field(min_length=1)] | None = None

@@ -21,9 +21,6 @@ LARGE = 3.0
 #: largest plausible ratio of a body's radius of gyration to the extent of its frames: with kg m^2 for kg mm^2 the ratio
 #: is 1000 times larger, with a flywheel on a short crank ten times
 FAR = 30.0
-#: density [kg/m^3], about that of air, above which a body may well be much larger than the extent of its frames, as a
-#: disc on a thin shaft
-AIRY = 1.0
 #: density [kg/m^3] above which no inertia is plausible; point masses of textbooks reach 1e8
 DENSE = 1e9
 #: the same limit for a body whose mass exceeds that of every other body of the scene by the second factor
@@ -92,7 +89,9 @@ def _inertias(scene: Scene) -> Iterator[InputError]:
         own = _extent([body.com, *(frame.position for frame in body.frames.values())])
         extent = own or whole
         gyration = sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass)
-        if extent > 0.0 and gyration > FAR * extent and least_density(body) < AIRY:
+        # 1.0: density [kg/m^3], about that of air, above which a body may well be much larger than the extent of its
+        # frames, as a disc on a thin shaft
+        if extent > 0.0 and gyration > FAR * extent and least_density(body) < 1.0:
             size = f"the body's frames span {own:.3g} m" if own else f"the whole scene spans {whole:.3g} m"
             text = f"mass and inertia give a radius of gyration of {gyration:.3g} m, but {size}"
             yield warning(scene, f"body.{name}.inertia", text, UNITS)

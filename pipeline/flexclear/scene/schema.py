@@ -31,7 +31,6 @@ from flexclear.scene.quantity import Quantity, parse, usual
 from flexclear.scene.solver import NAMING, Solver
 from flexclear.scene.start import Start
 from flexclear.scene.units import any_quantity, measured, quantity
-from flexclear.system import file_names
 
 #: types of joints with one freedom: driving it determines the whole relative motion
 SINGLE = ("revolute", "prismatic")
@@ -249,21 +248,6 @@ class Scene(Part):
                 known = ", ".join(self.flexible()) or "none"
                 raise ValueError(f"output.stress: '{name}' is not a flexible body of this scene; known: {known}")
 
-    def _bodies_have_files_of_their_own(self) -> None:
-        """Raise ValueError for a body whose name, also that of files, some operating system does not distinguish."""
-        names: dict[str, str] = {}
-        for name in self.recipes():
-            if file_names.is_device(name):
-                raise ValueError(
-                    f"body.{name}: '{name}' is a device on Windows, but files get this name: choose another"
-                )
-            other = names.setdefault(file_names.folded(name), name)
-            if other != name:
-                raise ValueError(
-                    f"body.{name}: differs from '{other}' in capitals or accents only, which file names on Windows and "
-                    f"macOS do not distinguish: choose another"
-                )
-
     @model_validator(mode="before")
     @classmethod
     def _method_by_need(cls, table: Any) -> Any:
@@ -296,7 +280,6 @@ class Scene(Part):
         self._quantities_are_there()
         check_formulas(self)
         self._stressed_bodies_are_flexible()
-        self._bodies_have_files_of_their_own()
         require_possible(self)
 
     def by_need(self) -> bool:

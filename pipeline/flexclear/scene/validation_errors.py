@@ -14,8 +14,6 @@ from pydantic import BaseModel, ValidationError
 from flexclear.scene.registry import suggestion
 from flexclear.system.errors import InputError, InputErrors
 
-#: largest number of errors that are reported: nobody reads more, and each takes a search for what could have been meant
-MOST_ERRORS = 500
 #: types of errors about a value that is no whole number
 WHOLE = ("int_type", "int_parsing", "int_from_float")
 #: type of error -> what was expected
@@ -57,7 +55,9 @@ TAGS = {
 def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
     """Return all validation errors of a file that should be a `model`."""
     places: dict[str, list[tuple[str, InputError]]] = {}
-    for e in error.errors(include_url=False)[:MOST_ERRORS]:
+    # 500: largest number of errors that are reported: nobody reads more, and each takes a search for what could have
+    # been meant
+    for e in error.errors(include_url=False)[:500]:
         invalid = _input_error(path, e, model)
         places.setdefault(invalid.place, []).append((e["type"], invalid))
     unique = {str(e): e for candidates in places.values() for e in _nearest(candidates)}

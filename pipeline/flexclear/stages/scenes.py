@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from flexclear.artifacts import maintenance
-from flexclear.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
+from flexclear.artifacts.disk import disk_limits, publish, sha256
 from flexclear.artifacts.paths import DATA, results_root
 from flexclear.artifacts.store import PARTIAL, Store
 from flexclear.post.pages import media
@@ -35,7 +34,6 @@ from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
 from flexclear.stages.meshing import kind_of
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
-from flexclear.system import file_names
 from flexclear.system.errors import InputError, ResourceError, SolverError, errors_from, errors_of, refuse
 from flexclear.system.external_files import reading, require_file
 from flexclear.system.version import DISTRIBUTION
@@ -45,8 +43,6 @@ from flexclear.workflow.schedule import Outcome
 if TYPE_CHECKING:
     import xarray as xr
 
-#: largest length of the `--set` changes in a folder's name [bytes]
-LONGEST_EDITS = 100
 #: parts without which the others form a scene as well
 ACTING = ("drive", "load", "stop", "gear")
 #: folder below a scene's results that is not for users
@@ -139,9 +135,6 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     )
     if not files:
         raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
-    changed = maintenance.shown_faults(Store(results_root()), folder)
-    if changed:
-        raise ResourceError(f"{changed[0]}: flexclear run {name}")
     if _of_another_run(folder):
         files = [path for path in files if path != folder / "post.nc"]
     # datasets are loaded and closed: the garbage collector closes open ones inside of whatever NetCDF call runs then
@@ -280,7 +273,8 @@ def with_edits(name: str, settings: Sequence[str]) -> str:
     if not settings:
         return name
     suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # Windows drops final dots
-    short = suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
+    # 100: largest length of the `--set` changes in a folder's name [bytes]
+    short = suffix if len(suffix.encode()) <= 100 else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
     return f"{name},{short}"
 
 
@@ -402,8 +396,6 @@ def check_target(target: Path, option: str = "--out") -> None:
             raise InputError(where, "its folder does not exist", f"mkdir -p {target.parent}")
         if target.is_dir():
             raise InputError(where, "is a folder", "name a file in it")
-        if target.exists() and not target.is_file():  # replacing a device by a file would destroy it
-            raise InputError(where, "is not an ordinary file", "name an ordinary file")
     except OSError as error:
         raise InputError(where, f"cannot be a file: {error.strerror}", "name another one") from None
 
@@ -412,30 +404,13 @@ def _refuse_namesakes(scenes: list[Scene]) -> None:
     """Raise InputError when two files given together have the same scene name."""
     folders: dict[str, Path] = {}
     for scene in scenes:
-        path, name = _file(scene), file_names.folded(scene.name)  # equal names on Windows and macOS
-        if path is not None and folders.setdefault(name, path) != path:
+        path = _file(scene)
+        if path is not None and folders.setdefault(scene.name, path) != path:
             raise InputError(
                 str(path),
-                f"is called '{scene.name}', as is {folders[name]}: their results would replace each other",
+                f"is called '{scene.name}', as is {folders[scene.name]}: their results would replace each other",
                 "rename one, or call the command from a folder above both, where their paths name them",
             )
-
-
-def claim(scene: Scene, store: Store) -> str | None:
-    """Note that results/runs/<name> belongs to this file; return a sentence when it belonged to another one."""
-    path = _file(scene)
-    if path is None:
-        return None
-    note = store.root / "runs" / scene.name / FACTS / "scene.owner"
-    before = (read_checked(note) or {}).get("file")
-    if before == str(path):
-        return None
-    with disk_limits(note.parent):
-        note.parent.mkdir(parents=True, exist_ok=True)
-        publish(note, checked({"file": str(path)}))
-    if not isinstance(before, str) or not is_file(Path(before)):
-        return None
-    return f"results/runs/{scene.name} showed {before} and now shows {path}, which has the same name"
 
 
 def _file(scene: Scene) -> Path | None:

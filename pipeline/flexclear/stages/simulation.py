@@ -33,8 +33,6 @@ UNLIMITED = {"rows": sys.maxsize, "members": sys.maxsize}
 ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
 #: copies of a run in memory at its end, measured 3.5 to 4.4; copies on disk, in the cache and shown
 TIMES_IN_MEMORY, TIMES_ON_DISK = 4.5, 2.0
-#: largest number of rows recorded of an ensemble member, which holds only some bodies' motion
-MEMBER_ROWS = 2000
 #: prefix of the inputs that hold rigid bodies of recipes; the body's name follows
 RIGID = "rigid/"
 REMEDY = "choose a longer output.interval, or raise [limits]"
@@ -93,7 +91,8 @@ def check_run(scene: Scene, results: Path) -> None:
     machine.require_disk(TIMES_ON_DISK * need, what, results, REMEDY, scene.limits.disk)
     if scene.ensemble is not None:
         n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
-        need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
+        # 2000: largest number of rows recorded of an ensemble member, which holds only some bodies' motion
+        need = scene.ensemble.members * min(rows, 2000) * n_bodies * BODY
         what = f"an ensemble of {scene.ensemble.members} members"
         machine.require_memory(
             TIMES_IN_MEMORY * need, what, "request fewer members, or raise [limits]", scene.limits.memory

@@ -32,8 +32,6 @@ CONDITIONS = {"fixed": [0, 1], "pinned": [0, 2], "guided": [1, 3], "free": [2, 3
 EVEN, ODD, MIRRORED = slice(0, 2), slice(2, 4), np.array([1.0, 1.0, -1.0, -1.0])
 #: step of the root search in beta l; neighbouring roots are about pi/2 apart
 STEP = math.pi / 64.0
-#: step number at which the search begins: no elastic root lies below beta l = pi/4 (pinned and guided ends)
-FIRST_STEP = 8
 #: end conditions of bending, torsion and extension, each two words with a hyphen
 Ends = tuple[str, str, str]
 #: mesh variables that exclude a closed form here
@@ -186,7 +184,8 @@ def _roots(rows: Callable[[np.ndarray], np.ndarray], span: Span, count: int) -> 
 
     roots: list[float] = []
     # rigid modes have roots at zero, below the first step
-    step = FIRST_STEP
+    # 8: step number at which the search begins: no elastic root lies below beta l = pi/4 (pinned and guided ends)
+    step = 8
     low = _omega(span, step * STEP / (0.5 * span.length))
     while len(roots) < count:
         step += 1

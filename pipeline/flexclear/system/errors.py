@@ -124,7 +124,7 @@ class ResourceError(FlexclearError):
 class StoppedError(FlexclearError):
     """The work was asked to stop before its end, and left its partial results in good order.
 
-    interrupted: by Ctrl-C, not by a time limit. partial: dataset up to the stop, for work that has one.
+    interrupted: by Ctrl-C, not by a time limit. partial: `LabelledArrays` of a single run up to the stop.
     """
 
     def __init__(self, why: str, partial: Any = None, *, interrupted: bool = False) -> None:

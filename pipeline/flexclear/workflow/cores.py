@@ -19,8 +19,6 @@ __all__ = ["cores", "free", "meanwhile", "set_idle", "side_by_side", "width"]
 Result = TypeVar("Result")
 #: time of one wait for a thread, after which Ctrl-C is checked [s]: some systems do not interrupt a wait
 TICK = 0.1
-#: number of threads while other tasks run, at most the number of cores: these tasks will end and free theirs
-THREADS_WHILE_BUSY = 4
 
 _others_idle: bool | None = None
 
@@ -40,7 +38,8 @@ def free() -> bool:
 
 def width() -> int:
     """Return the number of threads of compiled code to run concurrently."""
-    return cores() if free() else min(cores(), THREADS_WHILE_BUSY)
+    # 4: number of threads while other tasks run, at most the number of cores: these tasks will end and free theirs
+    return cores() if free() else min(cores(), 4)
 
 
 def side_by_side(

@@ -16,10 +16,6 @@ from typing import TextIO
 
 from flexclear.system.log import LOG, write_to
 
-#: least time between two permanent lines of one task [s]
-SPARSE = 10.0
-#: least time between two redraws of the line on a terminal [s]
-REDRAW = 0.1
 #: least number of samples for an estimate of the remaining time, and least fraction of the work in each
 SAMPLES, ENOUGH = 3, 0.01
 #: weight of each sample relative to the next, so that the last one counts most
@@ -106,7 +102,8 @@ class Monitor:
             job.advanced = FADING * job.advanced + fraction - job.since[1]
             job.since, job.samples = (self.clock(), fraction), job.samples + 1
         job.fraction, job.text = fraction, text
-        if self.rewrites or self.verbose or news or self.clock() - job.last_line >= SPARSE:
+        # 10.0: least time between two permanent lines of one task [s]
+        if self.rewrites or self.verbose or news or self.clock() - job.last_line >= 10.0:
             job.last_line = self.clock()
             self._show(f"{self._count()}{self._line(job)}")
 
@@ -156,7 +153,8 @@ class Monitor:
             return
         if not self.rewrites:
             LOG.info("%s", text)
-        elif self.clock() - self.drawn >= REDRAW or not text:
+        # 0.1: least time between two redraws of the line on a terminal [s]
+        elif self.clock() - self.drawn >= 0.1 or not text:
             self.drawn = self.clock()
             line = self._count() + " | ".join(self._line(job) for job in self.jobs.values())
             self._write(_clear(self.out) + line[: _columns(self.out)])

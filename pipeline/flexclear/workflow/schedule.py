@@ -211,7 +211,7 @@ def _end_in_good_order(
 def _leave_waiting(plan: _Plan, why: str) -> None:
     """Abandon all unfinished tasks when the command must stop, and report this once."""
     if plan.waiting:
-        code = StoppedError(why, interrupted=why == stopping.INTERRUPTED).exit_code
+        code = stopping.error(why).exit_code
         rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks were not run: {why}")
         plan.failed |= {task: rest for task in plan.waiting}
         plan.waiting.clear()
@@ -248,7 +248,7 @@ def _submit(
             monitor.finish(name, failed=False)
             continue
         where = (store.root, sources.root, sources.memo)
-        with workers.lost(), workers.without_main():  # an idle worker may die; a script without guard must not rerun
+        with workers.lost():  # an idle worker may die
             future = pool.submit(_work, task, inputs, name, where, others_idle)
         running[future] = _Running(task, key, name)
 
@@ -267,8 +267,7 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
             if stopping.requested():  # Ctrl-C ends a worker that has just started and does not ignore it yet
                 plan.waiting.append(task)
                 continue
-            text = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
-            raise ResourceError(text) from None
+            raise ResourceError(f"{task.scene} {task.label}: {workers.LOST}") from None
         _note(plan, task, result)
         monitor.finish(name, failed=isinstance(result, Failure))
     plan.give_up_below_failures()
@@ -337,11 +336,8 @@ def _failure(task: Task, error: FlexclearError) -> Failure:
 
 def _stopped_message(task: Task, stopped: StoppedError, store: Store) -> str:
     """Return the message about a stopped task, and write its partial result, if any, next to the shown files."""
-    time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
-    if time is None:  # the partial result is of a piece of the work, such as an ensemble member, and no dataset
+    if stopped.partial is None:
         return f"{stopped}; run it again: finished parts are not computed again"
     path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
-    partial = (
-        f"; the partial result up to t = {time:.6g} s is in {path} (attribute complete = 0)" if path is not None else ""
-    )
-    return f"{stopped}; run it again{partial}"
+    until = f"; the partial result up to t = {stopped.partial.attrs['stopped_at']:.6g} s is in"
+    return f"{stopped}; run it again" + ("" if path is None else f"{until} {path} (attribute complete = 0)")

@@ -11,7 +11,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from flexclear.artifacts.labelled import LabelledArrays
 
 from flexclear.system.errors import StoppedError
 
@@ -41,7 +44,12 @@ def check() -> None:
     """Raise StoppedError when the work must stop."""
     why = requested()
     if why:
-        raise StoppedError(why, interrupted=why == INTERRUPTED)
+        raise error(why)
+
+
+def error(why: str, partial: LabelledArrays | None = None) -> StoppedError:
+    """Return the error of work that stops for this reason. partial: arrays of a run up to the stop."""
+    return StoppedError(why, partial, interrupted=why == INTERRUPTED)
 
 
 def heeds() -> bool:

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from flexclear.system.errors import ResourceError
@@ -23,8 +21,11 @@ if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
 
-#: message about a worker process that was killed
-LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to continue"
+#: message about a worker process that was killed, or that runs a script again: each imports its parent's main module
+LOST = (
+    "a helper process was killed; is the memory full, or does the calling script lack `if __name__ == '__main__':`? "
+    "Finished results are stored: run again to continue"
+)
 
 
 @dataclass(frozen=True)
@@ -177,14 +178,3 @@ def team(width: int) -> Iterator[Team]:
 def _team(width: int) -> Team:
     channel = Channel.made()
     return Team(width, pool(width, channel), channel)
-
-
-@contextmanager
-def without_main() -> Iterator[None]:
-    """Prevent workers started inside this context from running the caller's script again."""
-    main = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = main

@@ -1,7 +1,4 @@
-"""Folder of compiled kernels: its owner, its processor, and the limit of its size.
-
-Loading a kernel runs code, so a folder in which other users could write is refused.
-"""
+"""Folder of compiled kernels: its processor, and the limit of its size."""
 
 from __future__ import annotations
 
@@ -15,19 +12,13 @@ from tempfile import TemporaryDirectory
 
 from flexclear.artifacts.disk import sweep
 from flexclear.dynamics.compile.files import CODE, file_lock, remove_code
-from flexclear.dynamics.kernels import PLAIN
-from flexclear.system.errors import InputError
-from flexclear.system.platforms import others_can_write
 
 #: kernels unused for this time [s] are removed, and the least recently used ones beyond this many bytes
 UNUSED, LARGEST = 90 * 86400.0, 2 << 30
 
 
 def writable(root: Path, report: Callable[[str], None]) -> Path:
-    """Return the folder for this processor below `root`; if it cannot be written, a temporary one of this process.
-
-    Raises InputError when other users could write there.
-    """
+    """Return the folder for this processor below `root`; if it cannot be written, a temporary one of this process."""
     folder = root / processor()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -37,19 +28,7 @@ def writable(root: Path, report: Callable[[str], None]) -> Path:
     if problem:
         report(f"compiled kernels cannot be stored in {folder} ({problem}); every process will compile its own")
         return Path(_temporary().name)
-    refuse_shared(folder)
     return folder
-
-
-def refuse_shared(folder: Path) -> None:
-    """Raise InputError when anyone but this user and the system's can write to a folder of kernels, or replace it."""
-    for part in (folder, *folder.parents):
-        if others_can_write(part, inside=part == folder):
-            raise InputError(
-                str(folder),
-                f"compiled kernels are not loaded from this folder, since others can write to {part}",
-                f"chmod go-w {part}, or name another folder with FLEXCLEAR_KERNELS",
-            )
 
 
 @cache
@@ -58,7 +37,7 @@ def processor() -> str:
     import llvmlite.binding as llvm
 
     settings = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
-    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings, *["plain"][: int(PLAIN)])
+    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings)
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
 
 

@@ -8,14 +8,11 @@ two processes may be equal.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sys
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
-
-from flexclear.dynamics.kernels import PLAIN
 
 #: names that only the exits of functions refer to which raise Python exceptions; no kernel does, and reaching one ends
 #: the process
@@ -48,13 +45,8 @@ NOTHING = b"{}\n"
 
 def image(function: Any) -> bytes:
     """Return the code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
-    if PLAIN:
-        return stored(function.native_name, *assembled(function.inspect_llvm()))
-    try:  # private attributes of Numba, which another release may not have
-        module, binary = function._library._final_module, bytes(function._library._get_compiled_object())
-    except (AttributeError, TypeError, ValueError, RuntimeError):
-        module, binary = assembled(function.inspect_llvm())
-    return stored(function.native_name, module, binary)
+    library = function._library  # private attributes of Numba, as those in `dynamics.lowering`
+    return stored(function.native_name, library._final_module, bytes(library._get_compiled_object()))
 
 
 def stored(name: str, module: Any, binary: bytes) -> bytes:
@@ -63,7 +55,6 @@ def stored(name: str, module: Any, binary: bytes) -> bytes:
     facts = {
         "name": name,
         "foreign": sorted(name for name in foreign if not name.startswith("llvm.")),
-        "sha256": hashlib.sha256(binary).hexdigest(),
     }
     return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
@@ -94,8 +85,6 @@ def load(stored: bytes) -> Code:
     facts = json.loads(line)
     if not facts:
         return Code(0, None)
-    if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM ends the process over a damaged object file
-        raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))
     for name in facts["foreign"]:
         _register(llvm, name)

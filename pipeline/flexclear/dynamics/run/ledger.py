@@ -19,20 +19,11 @@ from flexclear.system.errors import SolverError
 #: losses of an effect, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
 #: dimension; for each loss its two sites, and its cause in words
 Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
-#: roundings of the largest energies, which may cancel in the balance
-BALANCE_ROUNDING = 1e-12
-#: roundings of the work that the largest force does over the size of the mechanism: a force that holds it at rest does
-#: work by the rounding of its positions
-WORK_ROUNDING = 1e-14
-#: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
-NO_ENERGY = 1e-30
 #: no contact law is known to a thousandth of its energy; a larger error of a run with adaptive steps has another cause.
 #: Tighter tolerances have a better balance: of three hundred hard cases at rtol 1e-10 (benchmarks/atlas.py) none is off
 #: by 1e-6, unless something is wrong; numerical damping is not distinguished from a fault that soon. Fixed steps serve
 #: comparisons: their error is to be visible, up to a tenth of all energy
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
-#: fraction of the exchanged energy above which an error is a warning: forces and speeds are wrong by about a per cent
-DOUBTFUL = 1e-2
 #: speed above which a run diverges [m/s]: a hundredth of that of light, where Newton's mechanics is off by 1e-4
 DIVERGED = 3e6
 #: remedy for an unbounded motion
@@ -156,7 +147,11 @@ def balance(model: Model, seen: Observed, component: int | None = None) -> Balan
         mechanism = model.mechanism
         body = next(n for n in mechanism.moving_bodies if mechanism.components.of(mechanism.link_of[n]) == component)
         of = f" of body {body} and what it is connected to"
-    rounding = max(BALANCE_ROUNDING * largest, WORK_ROUNDING * _largest_work(model, seen, component), NO_ENERGY)
+    # 1e-12: roundings of the largest energies, which may cancel in the balance
+    # 1e-14: roundings of the work that the largest force does over the size of the mechanism: a force that holds it at
+    # rest does work by the rounding of its positions
+    # 1e-30: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
+    rounding = max(1e-12 * largest, 1e-14 * _largest_work(model, seen, component), 1e-30)
     return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, rounding)
 
 
@@ -208,11 +203,13 @@ def _require(model: Model, trajectory: Trajectory, result: Balance, exchanged: f
 
 def warnings(model: Model, seen: Observed) -> list[str]:
     """Warn of an energy error above a hundredth of the exchanged energy, which the scene's tolerance allows."""
+    # 1e-2: fraction of the exchanged energy above which an error is a warning: forces and speeds are wrong by about a
+    # per cent
     return [
         f"the energy balance{one.of} is off by {error:.3g} J, {100.0 * error / one.exchanged:.2g} % of the "
         f"{one.exchanged:.3g} J that are exchanged: choose a smaller rtol or step"
         for one in balances(model, seen)
-        if not (error := float(one.error[one.worst])) <= DOUBTFUL * one.exchanged + one.rounding
+        if not (error := float(one.error[one.worst])) <= 1e-2 * one.exchanged + one.rounding
     ]
 
 

@@ -26,12 +26,13 @@ from flexclear.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.dynamics.run.ledger import require_closed
 from flexclear.dynamics.run.progress_rate import Judges, Panel
-from flexclear.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
+from flexclear.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, asked, never
 from flexclear.scene.load import edited
 from flexclear.scene.registry import lookup, module_of
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError, StoppedError, refuse
 from flexclear.system.progress import Progress
+from flexclear.workflow import stopping
 from flexclear.workflow.cores import meanwhile
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ class Run:
     perturbed: the same run from a perturbed start, for scenes with contacts.
     mended: differences of the start from the scene's, in words.
     switched: time and reason of the change to another integrator; empty without a change.
+    stopped: why it ended before its time, or lacks its perturbed run; empty for a complete run.
     """
 
     scene: Scene
@@ -59,6 +61,7 @@ class Run:
     perturbed: PerturbedRun | None = None
     switched: str = ""
     mended: tuple[str, ...] = ()
+    stopped: str = ""
 
     @property
     def model(self) -> Model:
@@ -128,7 +131,15 @@ def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     return made
 
 
-def integrate(
+def integrate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Run:
+    """Return the complete run of `integrate_until_stopped`; raise StoppedError on a request to stop."""
+    run = integrate_until_stopped(scene, bundles, progress)
+    if run.stopped:
+        raise stopping.error(run.stopped)
+    return run
+
+
+def integrate_until_stopped(
     scene: Scene,
     bundles: Mapping[str, Labelled],
     progress: Progress,
@@ -138,8 +149,8 @@ def integrate(
 
     bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default explicit
     methods hand over when they would be too slow.  The perturbed run of a scene with contacts steps concurrently when a
-    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run cannot continue,
-    StoppedError with the run so far as `partial` on a request to stop.
+    processor is free.  On a request to stop the run so far is returned, with the reason.
+    Raises InputError for a scene that cannot be built, SolverError when the run cannot continue.
     """
     made = maker(scene, bundles, progress)
     engine = made()
@@ -156,33 +167,28 @@ def integrate(
         return follow(mine, y, tell, lambda name: made(name, tell), panel, stop, outputs)
 
     def seen(last: Engine, trajectory: Trajectory, switched: str = "") -> Run:
-        return Run(scene, last, trajectory, observed(last, trajectory), None, switched, mended)
+        run = Run(scene, last, trajectory, observed(last, trajectory), None, switched, mended)
+        if last.control[m.TIME] < last.end:
+            return replace(run, stopped=stopping.requested())
+        require_shallow(run.model, run.trajectory, run.observed)
+        require_closed(run.model, *run.judged)
+        return run
 
-    def checked(followed: Callable[[], Followed]) -> Run:
-        try:
-            done = seen(*followed())
-        except StoppedError as stopped:
-            if stopped.partial is not None:
-                stopped.partial = seen(*stopped.partial)
-            raise
-        require_shallow(done.model, done.trajectory, done.observed)
-        require_closed(done.model, *done.judged)
-        return done
-
-    if not engine.model.contacts:
-        return checked(lambda: steps(engine, start, progress, ours, never))
+    if not engine.model.contacts or not scene.output.horizon:
+        return seen(*steps(engine, start, progress, ours, asked))
     pair = way(scene, "horizon")(engine)
 
     def neighbour(alive: Progress) -> PerturbedRun:
         return pair.perturbed_run(start, lambda mine, y, *text: steps(mine, y, alive, others, *text), alive)
 
     with meanwhile(neighbour) as perturbed:
-        done = checked(lambda: pair.run(lambda *text: steps(engine, start, progress, ours, *text)))
+        done = seen(*pair.run(lambda *text: steps(engine, start, progress, ours, *text)))
+        if done.stopped:
+            return done
         try:
             return replace(done, perturbed=perturbed())
         except StoppedError as stopped:
-            stopped.partial = done
-            raise
+            return replace(done, stopped=str(stopped))
 
 
 def follow(

@@ -21,7 +21,7 @@ from flexclear.dynamics.run.pieces import Handover, Jumps, Moment, Selections, T
 from flexclear.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.dynamics.run.refusals import refusal
 from flexclear.dynamics.run.refusals.reach import require_shallow
-from flexclear.system.errors import SolverError, StoppedError
+from flexclear.system.errors import SolverError
 from flexclear.system.progress import Progress
 from flexclear.workflow import stopping
 
@@ -46,6 +46,11 @@ Stop = Callable[[np.ndarray], bool]
 def never(rows: np.ndarray) -> bool:
     """Return False: the run continues to its end."""
     return False
+
+
+def asked(rows: np.ndarray) -> bool:
+    """Return True on a request to stop: the run ends with its rows so far."""
+    return bool(stopping.requested())
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,7 @@ def integrate(
     outputs: times of output [s], the start first; by default the scene's.
     judge: decides whether another method continues; by default when an explicit one would take far too long.
     jumps: changes of the state at events and breaks.
-    Raises StoppedError on a request to stop, with the engine and the trajectory so far, if any, as `partial`.
+    Raises StoppedError on a request to stop, unless `stop` heeds it.
     """
     judge, begun = judge or Judge(SLICE, crawls), engine.start if left is None else left.time
     if outputs is None:
@@ -288,14 +293,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
             _warn(engine, tape, progress)
             if stop(_so_far(engine, tape)):
                 return True
-            _stop_when_asked(engine, tape)
-
-
-def _stop_when_asked(engine: Engine, tape: Tape) -> None:
-    """Raise StoppedError with the trajectory so far, when there is a request to stop."""
-    why = stopping.requested()
-    if why:
-        raise StoppedError(why, (engine, _collect(engine, tape)), interrupted=why == stopping.INTERRUPTED)
+            stopping.check()
 
 
 def _warn(engine: Engine, tape: Tape, progress: Progress) -> None:

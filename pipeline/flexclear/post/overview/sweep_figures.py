@@ -20,8 +20,6 @@ from flexclear.scene.quantity import KINDS
 
 COLUMNS = 2
 LINE, REFUSED = "#0072B2", "#D55E00"
-#: ratio of a parameter's largest to its least value above which its axis is logarithmic
-DECADE = 8.0
 #: largest number of values along the axis of a map that are all written
 FEW = 8
 #: factors for handy numbers on an axis
@@ -180,7 +178,8 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 def _in_decades(values: np.ndarray) -> bool:
     """Return True for values that a logarithmic axis shows better."""
-    return bool(values.min() > 0.0 and values.max() > DECADE * values.min())
+    # 8.0: ratio of a parameter's largest to its least value above which its axis is logarithmic
+    return bool(values.min() > 0.0 and values.max() > 8.0 * values.min())
 
 
 def _edges(values: np.ndarray) -> np.ndarray:

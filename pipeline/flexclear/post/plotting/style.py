@@ -23,8 +23,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 INK, SOFT, GRID = "#222222", "#6b6b6b", "#e3e3e3"
 #: letters per inch of a line of a heading
 TITLE_LETTERS, SUBTITLE_LETTERS = 9.4, 14.0
-#: decades of a logarithmic axis that have space for numbers between the powers of ten
-FEW_DECADES = 2.2
 
 RC: dict[str, Any] = {
     "figure.dpi": 100,
@@ -128,7 +126,8 @@ def plain(axis: Axis) -> None:
     def written(value: float, _: int | None) -> str:
         low, high = axis.get_view_interval()
         power = bool(np.isclose(np.log10(value) % 1.0, (0.0, 1.0), atol=1e-6).any())
-        return f"{value:g}" if power or abs(np.log10(high / low)) < FEW_DECADES else ""
+        # 2.2: decades of a logarithmic axis that have space for numbers between the powers of ten
+        return f"{value:g}" if power or abs(np.log10(high / low)) < 2.2 else ""
 
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(written))

@@ -29,8 +29,6 @@ from flexclear.scene.output import table
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
 #: K of the 0-1 test below which a motion is regular, and above which chaotic; in between a finite series cannot tell
 REGULAR, CHAOTIC = 0.2, 0.8
-#: fraction of the variance that few lines hold in the spectrum of a motion with few frequencies
-DISCRETE = 0.95
 #: number of states below which the 0-1 test and the spectrum show nothing
 ENOUGH = 200
 
@@ -105,7 +103,8 @@ def _rule(
     if grows and K > CHAOTIC:
         return "chaotic", (f"{text}, above the {least:.2g} of freedoms without influence", tested)
     lined = f"{100 * discrete:.0f} % of the variance in {chaos.LINES} lines of the spectrum"
-    if still and K < REGULAR and discrete > DISCRETE and not after:
+    # 0.95: fraction of the variance that few lines hold in the spectrum of a motion with few frequencies
+    if still and K < REGULAR and discrete > 0.95 and not after:
         return "quasi-periodic", (text, tested, lined)
     back = f"the states return to {distance:.2g} of the motion at best"
     return "undecided", (text, tested, lined, back)

@@ -20,20 +20,13 @@ from flexclear.workflow.schedule import TICK
 
 #: seconds of work in a batch, largest number of points in a batch, submitted batches per worker
 BATCH_SECONDS, MOST_POINTS, QUEUED = 0.5, 1000, 2
-#: least seconds of work in a batch: towards the end batches shrink with the remaining work, so that all workers finish
-#: together
-LEAST_SECONDS = 0.02
 #: least evaluations of a point that is run together with others, and of all waiting points that are worth compiling for
 WORTH_TOGETHER, WORTH_CODE = 5_000, 5_000_000
 #: points evaluated together, where each worker gets as many; seconds of work in their batches, long enough for several
 #: groups, since each group waits for its last point
 POINTS_TOGETHER, BATCH_SECONDS_TOGETHER = 8, 5.0
-#: least seconds of work in a batch per worker: many workers with less would exceed the scheduler's capacity
-PER_WORKER = 5e-3
 #: seconds within which a scheduler must answer
 SCHEDULER_TIMEOUT = 10.0
-#: interval at which a cluster is asked for its number of workers [s]
-POLL_INTERVAL = 5.0
 #: losses of worker processes in a row after which the sweep stops
 MOST_LOSSES = 3
 
@@ -129,9 +122,12 @@ def _portion(left: int, seconds_each: float, width: int, together: bool) -> int:
 
     together: whether points are evaluated together; with few in a batch, most would wait for the last point.
     """
-    asking = PER_WORKER * width
+    # 5e-3: least seconds of work in a batch per worker: many workers with less would exceed the scheduler's capacity
+    asking = 5e-3 * width
     seconds_of_work = BATCH_SECONDS_TOGETHER if together else BATCH_SECONDS
-    seconds = min(max(seconds_of_work, asking), max(LEAST_SECONDS, asking, left * seconds_each / (QUEUED * width)))
+    # 0.02: least seconds of work in a batch: towards the end batches shrink with the remaining work, so that all
+    # workers finish together
+    seconds = min(max(seconds_of_work, asking), max(0.02, asking, left * seconds_each / (QUEUED * width)))
     if together and left < POINTS_TOGETHER * width:  # the last points
         return max(POINTS_TOGETHER // 2, ceil(left / width))
     if together:
@@ -162,8 +158,7 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
     pools: list[ProcessPoolExecutor] = [workers.pool(width)]
 
     def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
-        with workers.without_main():
-            return pools[-1].submit(work, family, packed, *rest)
+        return pools[-1].submit(work, family, packed, *rest)
 
     def renew() -> None:
         workers.kill(pools[-1])
@@ -245,7 +240,8 @@ def _on_cluster(client: Any, where: str) -> Engine:
 
     def width() -> int:
         """Return the current number of threads; workers may join and leave."""
-        if time.monotonic() - last_poll[0] > POLL_INTERVAL:
+        # 5.0: interval at which a cluster is asked for its number of workers [s]
+        if time.monotonic() - last_poll[0] > 5.0:
             last_poll[:] = time.monotonic(), sum(client.nthreads().values())
         return max(1, int(last_poll[1]))
 

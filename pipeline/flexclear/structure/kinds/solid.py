@@ -17,8 +17,6 @@ from flexclear.structure.kinds.kind import Kind
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
-#: a mode is torsion where the swirl about the axis has this many times the energy of all other motion
-SWIRL = 4.0
 
 
 def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
@@ -39,7 +37,8 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
 
 
 def _word(along: float, out: float, turn: float) -> str:
-    if turn > SWIRL * (along + out):
+    # 4.0: a mode is torsion where the swirl about the axis has this many times the energy of all other motion
+    if turn > 4.0 * (along + out):
         return "torsion"
     return "axial" if along > out + turn else "bending"
 

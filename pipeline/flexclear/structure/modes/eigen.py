@@ -21,8 +21,6 @@ from flexclear.system.errors import InputError, SolverError
 DENSE_LIMIT = 900
 #: relative difference below which two frequencies are equal
 EQUAL = 1e-6
-#: modal masses that deviate from one by more are recomputed from the modes themselves
-ORTHONORMAL = 1e-12
 #: rigid eigenvalues are zero up to rounding; elastic ones lie at least this factor above them
 RIGID_GAP = 1e4
 
@@ -78,7 +76,8 @@ def rediagonalise(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarray
     """
     values, vectors = _rayleigh_ritz(stiffness, mass, basis)
     spread = vectors.T @ (mass @ vectors)
-    if np.abs(spread - np.eye(len(values))).max() > ORTHONORMAL:
+    # 1e-12: modal masses that deviate from one by more are recomputed from the modes themselves
+    if np.abs(spread - np.eye(len(values))).max() > 1e-12:
         # attachment modes of neighbouring frames are nearly parallel; the first result is a well-conditioned start
         values, vectors = _rayleigh_ritz(stiffness, mass, vectors)
     return values, vectors

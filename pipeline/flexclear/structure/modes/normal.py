@@ -21,8 +21,6 @@ from flexclear.system.progress import Progress
 DENSE_MOST = 6000
 NOBODY = np.empty(0)
 WHERE = "modes.count"
-#: relative residual of a rough eigenvalue; the error of the frequency is at most its square
-ROUGH = 1e-6
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,8 @@ def _sparse(
         progress(None, f"{count} normal modes of {model.size} coordinates")
         return inverse(loads.reshape(-1, 1)).ravel()
 
-    values, shapes = eigen.inverted(model.stiffness, model.mass, count, compliance, ROUGH if rough else 0.0)
+    # 1e-6: relative residual of a rough eigenvalue; the error of the frequency is at most its square
+    values, shapes = eigen.inverted(model.stiffness, model.mass, count, compliance, 1e-6 if rough else 0.0)
     # ARPACK leaves a trace of the held motions in the shapes; one more step of the iteration removes it
     shapes = inverse(model.mass @ shapes) * values
     rigid = NOBODY

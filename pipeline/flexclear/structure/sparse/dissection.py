@@ -12,11 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-#: largest set of nodes that is not divided further; small dense blocks are faster than deeper trees
-LEAF = 32
-#: a node with this many times the usual number of neighbours is a hub (a rigid face) and is eliminated last
-HUB = 8
-
 
 @dataclass(frozen=True)
 class Tree:
@@ -64,7 +59,8 @@ def _quotient(pattern: sp.csr_array, group: np.ndarray, count: int) -> sp.csr_ar
 def _blocks(graph: sp.csr_array, points: np.ndarray, last: int) -> tuple[list[np.ndarray], np.ndarray]:
     """Return the groups in each block and the parent of each block, children first."""
     degree = np.diff(graph.indptr)
-    hub = degree > HUB * np.median(degree)
+    # 8: a node with this many times the usual number of neighbours is a hub (a rigid face) and is eliminated last
+    hub = degree > 8 * np.median(degree)
     hub[len(points) - last :] = True
     root, rest = np.flatnonzero(hub), np.flatnonzero(~hub)
     # from the root downwards; reversed at the end
@@ -76,7 +72,8 @@ def _blocks(graph: sp.csr_array, points: np.ndarray, last: int) -> tuple[list[np
         nodes, parent = waiting.pop()
         parts: list[np.ndarray] = []
         separator = nodes
-        if len(nodes) > LEAF:
+        # 32: largest set of nodes that is not divided further; small dense blocks are faster than deeper trees
+        if len(nodes) > 32:
             *parts, separator = _halves(graph, points, nodes, side)
         blocks.append(separator)
         above.append(parent)

@@ -20,8 +20,6 @@ from flexclear.system.errors import InputError, SolverError, together
 
 #: impact rate of a contact at rest: its damping no longer depends on the past impact [m/s]
 NO_IMPACT = 1e300
-#: surfaces that overlap by less than this fraction of the clearance touch
-TOUCHING = 1e-9
 
 
 def consistent_start(engine: Engine) -> np.ndarray:
@@ -128,4 +126,5 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
         return {}
     closure_rows.evaluate(engine, y, engine.start)
     gaps = engine.table(m.TOUCH)["gap"]
-    return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -TOUCHING * joint.clearance}
+    # 1e-9: surfaces that overlap by less than this fraction of the clearance touch
+    return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -1e-9 * joint.clearance}

@@ -34,16 +34,13 @@ from flexclear.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.dynamics.run.evaluation.engine import Engine, another
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import per_speed, project, rates_at_speeds
-from flexclear.dynamics.run.trajectory import Followed, Stop
-from flexclear.system.errors import SolverError, StoppedError
+from flexclear.dynamics.run.trajectory import Followed, Stop, asked
+from flexclear.system.errors import SolverError
 from flexclear.system.progress import Progress
 from flexclear.workflow.cores import TICK
 
 #: about this many times of comparison, which bounds the cost; with rarer outputs, comparisons are also between them
 SAMPLES = 180
-#: a body's motion is relative to its own largest, but at least to this fraction of the liveliest body's; smaller
-#: motions are rounding and drift of loops
-LEAST_LIVELY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -89,11 +86,6 @@ class Pair:
             engine, trajectory, switched = steps(self._store_rows, self.outputs)
             self._store_rows(trajectory.rows)
             self._between, self._complete = trajectory.between, True
-        except StoppedError as stopped:
-            if stopped.partial is not None:
-                engine, trajectory = stopped.partial
-                stopped.partial = engine, trajectory.without(self.added)
-            raise
         finally:
             self._ended.set()
         return engine, trajectory.without(self.added), switched
@@ -125,9 +117,9 @@ class Pair:
         return PerturbedRun(time, separation, engine.end if horizon is None else horizon)
 
     def _store_rows(self, rows: np.ndarray) -> bool:
-        """Store the rows that the run has so far, and return False: it continues."""
+        """Store the rows that the run has so far, and return True on a request to stop."""
         self._run.rows = rows
-        return False
+        return asked(rows)
 
     def _enough(self, other: _Side, alive: Progress) -> bool:
         """Return True when the two have diverged, so that the horizon is known.
@@ -251,7 +243,9 @@ class Metric:
 
     def distance(self, one: np.ndarray, other: np.ndarray, largest: np.ndarray) -> np.ndarray:
         """Return the largest separation of a body at each time, as a fraction of its largest motion in the run."""
-        scale = np.maximum(largest, LEAST_LIVELY * largest.max(initial=0.0))
+        # 1e-3: a body's motion is relative to its own largest, but at least to this fraction of the liveliest body's;
+        # smaller motions are rounding and drift of loops
+        scale = np.maximum(largest, 1e-3 * largest.max(initial=0.0))
         return np.asarray((self.norms(one - other)[:, scale > 0.0] / scale[scale > 0.0]).max(axis=1, initial=0.0))
 
 

@@ -33,8 +33,6 @@ from flexclear.system.progress import silent
 WAYPOINTS = 16
 #: distance of the neighbour in units of the relative tolerance: errors of steps are then a thousandth of the distance
 NEIGHBOUR = 1e3
-#: growth of the distance between two waypoints above which it is not linear, which is reported
-NOT_LINEAR = 1e4
 
 
 @dataclass(frozen=True)
@@ -200,7 +198,8 @@ def rescaled(
     fraction = separation / distance
     y = _closed(part, here.y + fraction * difference)
     latched = here.latched + fraction * (neighbour.latched - here.latched)
-    return replace(neighbour, y=y, latched=latched), (-float(np.log(fraction)), int(distance > NOT_LINEAR * separation))
+    # 1e4: growth of the distance between two waypoints above which it is not linear, which is reported
+    return replace(neighbour, y=y, latched=latched), (-float(np.log(fraction)), int(distance > 1e4 * separation))
 
 
 def _closed(part: Engine, y: np.ndarray) -> np.ndarray:

@@ -29,15 +29,9 @@ from flexclear.system.errors import SolverError
 END_OF_REACH, SINGULAR = 0.1, 1e-3
 #: a rest: least part of a row in the dependent combination, and largest speeds as fraction of the largest before
 REST_FRACTION, DYING = 0.1, 0.1
-#: at the end of reach speeds grow without bound: elsewhere no loop moves faster than the drives by this factor
-FASTER = 40.0
-#: number of times ahead at which the least depth is computed
-TIMES_AHEAD = 60
 #: a search uses at most so many boxes of one of these half widths, in fractions of the mechanism's size or in rad: the
 #: coordinates of a box are those of the loops' tangents in its middle
 BOXES, HALF_WIDTHS = 60, (0.1, 0.05, 0.025, 0.0125)
-#: a depth is the least when another box reduces it by less than this fraction
-LEAST_GAIN = 1e-3
 #: tolerance of the search in a box; depths are fractions of that in its middle, independent of the mechanism's size
 OPTIONS: Any = {"eps": 1e-6}
 
@@ -157,7 +151,8 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     pulled = pulled / closure_rows.row_units(model, engine.h, model.length)
     if values[-1] > END_OF_REACH * values[0]:
         return ""
-    if not abs(U[:, len(values) - 1] @ pulled) > FASTER * values[-1] * np.linalg.norm(pulled) > 0.0:
+    # 40.0: at the end of reach speeds grow without bound: elsewhere no loop moves faster than the drives by this factor
+    if not abs(U[:, len(values) - 1] @ pulled) > 40.0 * values[-1] * np.linalg.norm(pulled) > 0.0:
         return ""
     joint = closure_rows.worst_joint(engine, U[:, len(values) - 1])
     return (
@@ -185,7 +180,8 @@ def forced_depth(engine: Engine, contact: int, shallow: float) -> tuple[float, f
     model, t = engine.model, float(engine.control[m.TIME])
     radius, y = model.contacts[contact].joint.radius, engine.view(m.Y).copy()
     try:
-        for time in np.linspace(t, engine.end, TIMES_AHEAD + 1)[:-1]:
+        # 60: number of times ahead at which the least depth is computed
+        for time in np.linspace(t, engine.end, 60 + 1)[:-1]:
             y, depth = _shallowest(replace(engine, start=float(time)), y, contact, shallow)
             if depth > radius:
                 return float(time), depth
@@ -205,7 +201,8 @@ def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> t
         if depth <= enough:
             break
         there, less = _shallower(engine, y, contact, depth)
-        if not less < (1.0 - LEAST_GAIN) * depth:
+        # 1e-3: a depth is the least when another box reduces it by less than this fraction
+        if not less < (1.0 - 1e-3) * depth:
             break
         y, depth = there, less
     return y, depth

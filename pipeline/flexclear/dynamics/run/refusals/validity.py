@@ -24,8 +24,6 @@ BENT = 0.05
 SECTION_ROTATION = 0.15
 #: angular speed, as fraction of the first frequency, above which a warning follows for a body without stiffening
 SPIN = 0.2
-#: square of the first frequency that tension adds to a clamped beam, over that of the speed
-TENSION = 1.19
 #: rows whose shapes are superposed at a time
 ROWS = 16
 
@@ -133,9 +131,10 @@ def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
         f"natural frequency ({body.first:.4g} rad/s)"
     )
     if body.sections_turn:
+        # 1.19: square of the first frequency that tension adds to a clamped beam, over that of the speed
         yield (
             f"{turns}, and nothing stiffens it: clamped to a small hub, that frequency would be higher by "
-            f"{100.0 * (np.sqrt(1.0 + TENSION * fraction**2) - 1.0):.2g} %; linear modes hold below {SPIN:g} and "
+            f"{100.0 * (np.sqrt(1.0 + 1.19 * fraction**2) - 1.0):.2g} %; linear modes hold below {SPIN:g} and "
             "diverge close to 1: give the body stiffening = {}"
         )
     else:

@@ -32,24 +32,11 @@ from flexclear.system.errors import InputError, SolverError
 
 #: the polynomial is first as long as the fastest coordinate takes for this fraction of its unit, then half, and so on
 FIRST_WAY, WAY_HALVINGS = 0.3, 9
-#: given velocities may differ from those of a branch by this fraction: they have few digits
-EQUAL_VELOCITIES = 1e-6
-#: computed directions have an error of some hundredths
-ANY = 0.5
-#: changes of a coordinate on two branches, known to some hundredths, are equal when they differ by less than this
-#: fraction
-EQUAL_CHANGES = 0.05
 #: distance of the displaced states, in units of the coordinates; singular values below this fraction of the largest are
 #: zero
 WAY, ZERO_SINGULAR = 1e-2, 1e-6
-#: free directions whose second order part is below this fraction belong to no branch
-SILENT = 1e-3
 #: most directions among which branches are computed, starts of the iteration for each, its steps, and its tolerance
 MOST_DIRECTIONS, SEARCH_STARTS, SEARCH_STEPS, EQUAL_DIRECTIONS = 6, 60, 40, 1e-3
-#: fraction of the time since the start for finite differences of rates
-RATE_INTERVAL = 1e-4
-#: halvings of the time in which the drives move that distance
-TIME_HALVINGS = 60
 
 
 def start_motion(engine: Engine, y: np.ndarray) -> Collocation:
@@ -59,9 +46,11 @@ def start_motion(engine: Engine, y: np.ndarray) -> Collocation:
     """
     choices = engine.model.scene.start.branch if engine.model.scene.start is not None else ()
     if np.any(y[engine.model.speeds] != 0.0) and not choices:
-        motions, turn = [by_speeds(engine, y)], EQUAL_VELOCITIES
+        # 1e-6: given velocities may differ from those of a branch by this fraction: they have few digits
+        motions, turn = [by_speeds(engine, y)], 1e-6
     else:
-        motions, turn = _chosen(engine, directions(engine, y), choices), ANY
+        # 0.5: computed directions have an error of some hundredths
+        motions, turn = _chosen(engine, directions(engine, y), choices), 0.5
     way = _along(engine, motions[0], turn) if motions else None
     if way is None:
         raise SolverError(engine.mobility.start_refusal)
@@ -99,7 +88,9 @@ def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) 
             scene = engine.model.scene
             joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, path)
             requested = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
-            best_ways = [max(requested) - value <= EQUAL_CHANGES * max(map(abs, requested)) for value in requested]
+            # 0.05: changes of a coordinate on two branches, known to some hundredths, are equal when they differ by
+            # less than this fraction
+            best_ways = [max(requested) - value <= 0.05 * max(map(abs, requested)) for value in requested]
             ways = [way for way, best in zip(ways, best_ways, strict=True) if best]
             changes = [change for change, best in zip(changes, best_ways, strict=True) if best]
         if len(ways) > 1:
@@ -168,7 +159,8 @@ class Direction:
         progress = self.progress(t)
         if self.speeds is None or t == self.begin:
             return np.asarray(self.start + progress * self.way)
-        back = RATE_INTERVAL * (t - self.begin)
+        # 1e-4: fraction of the time since the start for finite differences of rates
+        back = 1e-4 * (t - self.begin)
         rate = (progress - self.progress(t - back)) / back
         return np.asarray(self.start + progress * self.way + rate * self.speeds)
 
@@ -266,7 +258,8 @@ class _Pose:
         span = end - begin
         if opened(span) < ZERO_SINGULAR and opened(0.5 * span) < ZERO_SINGULAR:
             return None
-        for _ in range(TIME_HALVINGS):
+        # 60: halvings of the time in which the drives move that distance
+        for _ in range(60):
             if opened(span) <= WAY:
                 break
             span *= 0.5
@@ -349,7 +342,8 @@ def _heard(forms: _Forms, free: np.ndarray) -> np.ndarray:
     if not rows.size or not np.any(rows):
         return np.zeros((0, len(free)))
     _, values, Vt = np.linalg.svd(rows)
-    return np.asarray(Vt[: int(np.sum(values > SILENT * values[0]))])
+    # 1e-3: free directions whose second order part is below this fraction belong to no branch
+    return np.asarray(Vt[: int(np.sum(values > 1e-3 * values[0]))])
 
 
 def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:

@@ -32,8 +32,6 @@ NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
 #: points where a closure row has less than this fraction of its independence at the best point are omitted; or less
 #: than the second fraction when the first omits more than MANY_POINTS: a slow motion is near the pose for long
 LEAST_INDEPENDENCE, LEAST_WHERE_SLOW, MANY_POINTS = 0.05, 0.005, 2
-#: least number of remaining points
-FEWEST_POINTS = 6
 #: out of a singular pose, slopes of so many points predict the next; corrections of the start's speeds to the branch
 LED, SPEED_CORRECTIONS = 2, 4
 #: most iterations; they end when the change is below CONVERGED, or below STAGNATED without further progress
@@ -44,10 +42,6 @@ WORSE, EARLY_ITERATIONS = 10.0, 6
 #: admissible error of the polynomial, in units of the coordinates and in fractions of the mechanism's size; admissible
 #: change of its end without one of the points, at least ten times its error
 POLYNOMIAL_ERROR, SENSITIVE = 1e-10, 1e-9
-#: these bounds are larger by this factor for a motion from rest out of a pose: it is near the pose for long
-SLOW_START = 100.0
-#: and, when a row has less than this fraction of its independence at the ends, by the square of their ratio
-SHORT_FRACTION = 0.03
 
 #: pivot ratios of the closures at which accelerations have eight digits when loops are closed to 1e-14, and six digits,
 #: which must suffice when the row's own pose gives none
@@ -155,10 +149,13 @@ def collocate(
     used = _far_from_singular(samples, LEAST_INDEPENDENCE)
     if lead is None and used.sum() < POINTS - MANY_POINTS:
         used = _far_from_singular(samples, LEAST_WHERE_SLOW)
-    if used.sum() < FEWEST_POINTS:
+    # 6: least number of remaining points
+    if used.sum() < 6:
         return None
     evaluated, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
-    blur = SLOW_START if lead is not None and lead.turn == 0.0 else max(1.0, (SHORT_FRACTION / fraction) ** 2)
+    # 100.0: these bounds are larger by this factor for a motion from rest out of a pose: it is near the pose for long
+    # 0.03: and, when a row has less than this fraction of its independence at the ends, by the square of their ratio
+    blur = 100.0 if lead is not None and lead.turn == 0.0 else max(1.0, (0.03 / fraction) ** 2)
     for _ in range(SPEED_CORRECTIONS if lead is not None and lead.turn > 0.0 else 1):
         size = _sizes(sampler.engine, y, [s.slope for s in evaluated])
         iterated = _iterate(sampler, t, y, span, nodes, evaluated, blur * size)

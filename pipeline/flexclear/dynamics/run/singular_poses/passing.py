@@ -19,24 +19,12 @@ from flexclear.system.errors import SolverError
 #: without a predicted pose the polynomial is first as long as the fastest coordinate takes for this fraction of its
 #: unit, then half, and so on
 FIRST_REACH, REACH_HALVINGS = 0.3, 10
-#: backward step of the fastest coordinate, in its unit, for the rate of the rows' independence
-BACKWARD_STEP = 1e-4
-#: least independence of a row, over its largest, with which a polynomial may begin: with other fast motions it is short
-LEAST_FRACTION = 3e-4
-#: admissible error of speeds in a pose at the end of a polynomial, as a fraction of the fastest
-TURNING_BACK = 1e-6
-#: without a polynomial, and with less than this fraction of a row's independence, the end of a loop's reach is checked
-OBVIOUS = 0.02
-#: a polynomial that leaves less than this fraction of its length to the segment's end is extended to that end
-REMAINDER = 1e-3
 #: samples of a polynomial in the search for its poses; singular values below this fraction of the largest are zero
 SAMPLED_TIMES, VANISHED = 32, 1e-6
 #: tolerance of a pose's time, and distance of the samples on both sides, as fractions of the polynomial
 POSE_TOLERANCE, SIDE_DISTANCE = 1e-7, 1e-4
 #: poses at times that differ by less than this fraction of the polynomial are the same
 EQUAL_TIMES = 1e-6
-#: a loop whose speeds in the pose are below this fraction of those next to it is at rest
-LOOP_AT_REST = 1e-5
 
 
 @dataclass(frozen=True)
@@ -66,7 +54,9 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     sampler.restore()
     control[m.REACH] = control[m.MOST_REACH] = reach
     if made is None:
-        text = beyond_reach(engine) if control[m.LEFT] < OBVIOUS else ""
+        # 0.02: without a polynomial, and with less than this fraction of a row's independence, the end of a loop's
+        # reach is checked
+        text = beyond_reach(engine) if control[m.LEFT] < 0.02 else ""
         if text:
             raise SolverError(text)
         return None, ()
@@ -91,7 +81,8 @@ def foresee_at_start(engine: Engine) -> bool:
     t, sampler = float(control[m.TIME]), Sampler(engine)
     here = sampler.sample(t, engine.view(m.Y).copy())
     fastest = float(np.max(np.abs(here.slope / model.state_scales)[: model.nq], initial=0.0))
-    back = BACKWARD_STEP / fastest if fastest > 0.0 else np.inf
+    # 1e-4: backward step of the fastest coordinate, in its unit, for the rate of the rows' independence
+    back = 1e-4 / fastest if fastest > 0.0 else np.inf
     before = sampler.sample(t - back, here.y - back * here.slope) if here.sound and fastest > 0.0 else here
     sampler.restore()
     fall = before.independence - here.independence
@@ -110,7 +101,9 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
     """
     control = sampler.engine.control
     ahead, reach, fraction = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
-    nearest = LEAST_FRACTION / fraction * ahead
+    # 3e-4: least independence of a row, over its largest, with which a polynomial may begin: with other fast motions it
+    # is short
+    nearest = 3e-4 / fraction * ahead
     while reach >= max(ahead, nearest):
         made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, fraction=fraction * reach / ahead)
         if made is not None:
@@ -125,7 +118,8 @@ def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
     sampler.attempt(t, y)
     rate = np.append(sampler.slope()[:nq], np.zeros(len(y) - nq))
     fastest = float(np.max(np.abs(rate / sampler.engine.model.state_scales), initial=0.0))
-    lead = Lead(lambda at: y + (at - t) * rate, TURNING_BACK)
+    # 1e-6: admissible error of speeds in a pose at the end of a polynomial, as a fraction of the fastest
+    lead = Lead(lambda at: y + (at - t) * rate, 1e-6)
     for k in range(REACH_HALVINGS if fastest > 0.0 else 0):
         made = collocate(sampler, t, y, _within(sampler, t, FIRST_REACH / fastest * 0.5**k), lead)
         if made is not None:
@@ -136,7 +130,8 @@ def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
 def _within(sampler: Sampler, t: float, span: float) -> float:
     """Return the span, or the rest of the segment."""
     left = float(sampler.engine.control[m.END]) - t
-    return left if (1.0 + REMAINDER) * span >= left else span
+    # 1e-3: a polynomial that leaves less than this fraction of its length to the segment's end is extended to that end
+    return left if (1.0 + 1e-3) * span >= left else span
 
 
 # Poses on a polynomial ----------------------------------------------------------------------------------------------
@@ -198,5 +193,6 @@ def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray)
     speeds = engine.model.speeds
     times = np.append(np.linspace(made.start, made.end, SAMPLED_TIMES + 1), one.time)
     rates = np.max(np.abs(made.states(times)[:, speeds] / engine.model.speed_scales)[:, moving], axis=1, initial=0.0)
-    if rates[-1] <= LOOP_AT_REST * np.max(rates):
+    # 1e-5: a loop whose speeds in the pose are below this fraction of those next to it is at rest
+    if rates[-1] <= 1e-5 * np.max(rates):
         raise SolverError(rest(one.time, f"joint {one.joint}, condition number {one.condition:.3g}"))

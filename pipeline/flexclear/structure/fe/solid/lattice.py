@@ -6,8 +6,6 @@ import numpy as np
 
 from flexclear.structure.fe.solid.elements import ELEMENTS, HEX_FACES, TET_EDGES, shape_functions
 
-#: half side of the square core of a cylinder's section, as a fraction of the radius
-CORE = 0.55
 #: outward bulge of the core's sides, as a fraction of its half side; evens out the angles at its corners
 BULGE = 0.12
 
@@ -23,7 +21,8 @@ def cylinder(radius: float, length: float, along: int, across: int, rings: int) 
 
     across: cells along each side of the core.  rings: of cells around the core; the outermost nodes lie on the circle.
     """
-    half = CORE * radius
+    # 0.55: half side of the square core of a cylinder's section, as a fraction of the radius
+    half = 0.55 * radius
     patches = [_patch(lambda s, t: _core(2.0 * s - 1.0, 2.0 * t - 1.0) * half, across, across)]
     for quarter in range(4):
         turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), quarter)
