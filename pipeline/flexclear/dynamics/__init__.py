@@ -44,7 +44,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.dynamics.run.run import Run, integrate
     from flexclear.system.errors import StoppedError
 
-    def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
+    def once(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> LabelledArrays:
         if edited.event:
             from flexclear.dynamics.effects import EVENTS
             from flexclear.scene.registry import lookup
@@ -52,7 +52,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
             return phased
         try:
-            done = integrate(edited, bundles, progress, judges)
+            done = integrate(edited, bundles, progress, judges, alone=alone)
         except StoppedError as stopped:
             partial = stopped.partial
             # the partial result of another run, such as that of the start, is not part of this run
@@ -70,8 +70,8 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             progress(None, str(dear))
     accuracy = way(scene, "accuracy")
 
-    def compared(edited: Scene, judges: Judges | None = None) -> xr.Dataset:
-        return once(edited, judges).to_xarray()
+    def compared(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> xr.Dataset:
+        return once(edited, judges, alone=alone).to_xarray()
 
     if not scene.by_need():
         return of(accuracy.deliver(scene, compared, progress))

@@ -133,13 +133,15 @@ def integrate(
     bundles: Mapping[str, Labelled],
     progress: Progress,
     judges: Judges | None = None,
+    *,
+    alone: bool = False,
 ) -> Run:
     """Build, start, integrate and observe a scene; actuators of a path are driven so that they produce it.
 
     bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default explicit
     methods hand over when they would be too slow.  The perturbed run of a scene with contacts steps concurrently when a
-    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run cannot continue,
-    StoppedError with the run so far as `partial` on a request to stop.
+    processor is free; alone: it is left out.  Raises InputError for a scene that cannot be built, SolverError when the
+    run cannot continue, StoppedError with the run so far as `partial` on a request to stop.
     """
     made = maker(scene, bundles, progress)
     engine = made()
@@ -169,7 +171,7 @@ def integrate(
         require_closed(done.model, *done.judged)
         return done
 
-    if not engine.model.contacts:
+    if alone or not engine.model.contacts:
         return checked(lambda: steps(engine, start, progress, ours, never))
     pair = way(scene, "horizon")(engine)
 
