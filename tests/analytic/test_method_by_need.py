@@ -15,7 +15,7 @@ from flexclear.dynamics import analyses
 from flexclear.dynamics.effects import schemes
 from flexclear.dynamics.record.point import Runner
 from flexclear.dynamics.run import progress_rate, trajectory
-from flexclear.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search, by_default
+from flexclear.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search, _climb, by_default
 from flexclear.dynamics.run.method_choice.method_selection import Costs, Rates
 from flexclear.dynamics.run.progress_rate import Look, limited, pace
 from flexclear.scene.load import edited, with_numbers
@@ -317,14 +317,39 @@ def test_it_can_be_said_in_words(given: bool, chosen: bool) -> None:
 def refused_below(least: float, run: xr.Dataset) -> xr.Dataset:
     """What a default search delivers of a run that looser tolerances give alike, and tighter ones not at all."""
 
-    def once(scene: Scene, judges: object) -> xr.Dataset:
+    def once(scene: Scene, judges: object, *, alone: bool = False) -> xr.Dataset:
         if scene.solver.rtol < least:
             raise SolverError("the limit of evaluations is reached")
         return run
 
     by_need = SimpleNamespace(best=lambda rtol: "dop853", why=lambda rtol: "", judges=lambda rtol: None)
-    by_need.learn = lambda rtol, name, run: None
+    by_need.learn, by_need.span = lambda rtol, name, run, part: None, 1.0
     return by_default(load_scene(TREE / "scenes/checks/pendulum.toml"), once, silent, lambda scene: by_need)
+
+
+def test_runs_that_serve_comparisons_are_made_once_and_end_at_the_horizon() -> None:
+    """A motion whose speed errs by 300 times the tolerance, and which is another one beyond a horizon of half the run.
+
+    The error is 150 times the tolerance there: 15, 1.5 and 0.15 times the default request on the ladder's decades.
+    """
+    runs = list[tuple[float, float, bool]]()
+
+    def once(scene: Scene, judges: object, *, alone: bool = False) -> xr.Dataset:
+        rtol, end = scene.solver.rtol, scene.time.end
+        runs.append((rtol, end, alone))
+        time = np.linspace(0.0, end, 101)
+        x = time * (1.0 + 300.0 * rtol) + np.where(time > 0.5, np.sqrt(rtol), 0.0)
+        position = (("time", "body", "axis"), x[:, None, None] * np.ones((1, 1, 3)))
+        frames = (("time", "frame", "axis"), position[1])
+        made = xr.Dataset({"position": position, "frame_position": frames}, {"time": time, "body": ["platform"]})
+        return made if alone else made.assign(horizon=0.5)
+
+    request = {"quantities": {"platform.position": {"relative": 1e-3}}}
+    best = _climb(Search(load_scene(RIGID, {"time.end": 1.0, "accuracy": request}), once, predictable=True), silent)
+    assert best.rtol == 1e-6
+    assert best.fraction == pytest.approx(0.15 / 1.04, rel=1e-6)  # of the range at 1e-4, 1 + 0.03 + 0.01
+    whole, until_horizon = [(1e-4, 1.0, False), (1e-6, 1.0, False)], [(r, 0.5, True) for r in (1e-5, 1e-6, 1e-7)]
+    assert sorted(runs) == sorted([*whole, *until_horizon])
 
 
 def test_a_run_that_none_can_be_compared_with_is_delivered_with_an_unknown_error() -> None:

@@ -37,14 +37,14 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.dynamics.run.run import integrate_until_stopped
     from flexclear.workflow import stopping
 
-    def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
+    def once(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> LabelledArrays:
         if edited.event:
             from flexclear.dynamics.effects import EVENTS
             from flexclear.scene.registry import lookup
 
             phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
             return phased
-        done = integrate_until_stopped(edited, bundles, progress, judges)
+        done = integrate_until_stopped(edited, bundles, progress, judges, alone=alone)
         if done.stopped:
             raise stopping.error(done.stopped, incomplete(recorded(done), done.stopped))
         for sentence in warnings(done):
@@ -59,8 +59,8 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             progress(None, str(dear))
     accuracy = way(scene, "accuracy")
 
-    def compared(edited: Scene, judges: Judges | None = None) -> xr.Dataset:
-        return once(edited, judges).to_xarray()
+    def compared(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> xr.Dataset:
+        return once(edited, judges, alone=alone).to_xarray()
 
     if not scene.by_need():
         return of(accuracy.deliver(scene, compared, progress))

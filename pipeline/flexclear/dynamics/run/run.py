@@ -144,12 +144,14 @@ def integrate_until_stopped(
     bundles: Mapping[str, Labelled],
     progress: Progress,
     judges: Judges | None = None,
+    *,
+    alone: bool = False,
 ) -> Run:
     """Build, start, integrate and observe a scene; actuators of a path are driven so that they produce it.
 
     bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default explicit
     methods hand over when they would be too slow.  The perturbed run of a scene with contacts steps concurrently when a
-    processor is free.  On a request to stop the run so far is returned, with the reason.
+    processor is free; alone: it is left out.  On a request to stop the run so far is returned, with the reason.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot continue.
     """
     made = maker(scene, bundles, progress)
@@ -174,7 +176,7 @@ def integrate_until_stopped(
         require_closed(run.model, *run.judged)
         return run
 
-    if not engine.model.contacts or not scene.output.horizon:
+    if alone or not engine.model.contacts or not scene.output.horizon:
         return seen(*steps(engine, start, progress, ours, asked))
     pair = way(scene, "horizon")(engine)
 

@@ -14,7 +14,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import xarray as xr
@@ -45,10 +45,19 @@ SAVED = 0.25
 REFUSED_FOR_GOOD, TIGHTER_AFTER_REFUSAL = 1e-9, 0.1
 #: an error that does not fall below this fraction at FINER_TOLERANCE has another cause than the steps
 STUCK = 0.3
-#: default requested accuracy, as a fraction of each quantity's range; largest number of tolerances tried for it
-BY_DEFAULT, FEW_TRIES = 1e-3, 4
+#: default requested accuracy, as a fraction of each quantity's range; the loosest and the tightest tolerance of the
+#: ladder that is climbed for it; and the ratio of neighbouring ones in scenes with contacts: twice the runs, but those
+#: that serve comparisons end at the horizon, and the delivered run need not be tighter than necessary
+BY_DEFAULT, LOOSEST_RUNG, TIGHTEST_RUNG, FINER_RUNG = 1e-3, 1e-4, 1e-10, 0.1
 #: motions below this fraction of their natural size are rounding, which stiff rods magnify in forces
 ROUNDING_OF_MOTION = 1e-9
+
+
+class Make(Protocol):
+    """Makes the run of a scene, under judges of its integrators."""
+
+    def __call__(self, scene: Scene, judges: Judges | None, /, *, alone: bool = False) -> xr.Dataset:
+        """Return the run. alone: without the perturbed run that gives the predictability horizon."""
 
 
 @dataclass(frozen=True)
@@ -66,27 +75,37 @@ class Search:
     """Runs made so far, by tolerance, and the request.
 
     predictable: True for the default request, for which runs are compared only up to the predictability horizon, and
-    quantities that never change meet the request.
+    quantities that never change meet the request. shorter: runs that end at a horizon, by tolerance.
     """
 
     scene: Scene
-    make: Callable[[Scene, Judges | None], xr.Dataset]
+    make: Make
     costs: Costs | None = None
     runs: dict[float, xr.Dataset] = field(default_factory=dict)
+    shorter: dict[float, xr.Dataset] = field(default_factory=dict)
     predictable: bool = False
 
     def run(self, rtol: float) -> xr.Dataset:
         """Return the run at a tolerance, made once."""
         if rtol not in self.runs:
-            self.runs[rtol] = self._made(rtol)
+            self.runs[rtol] = self._made(self.scene, rtol)
         return self.runs[rtol]
 
-    def _made(self, rtol: float) -> xr.Dataset:
+    def until(self, rtol: float, horizon: float) -> xr.Dataset:
+        """Return the run at a tolerance, which may end at the horizon [s] or later, made once."""
+        if rtol in self.runs or horizon >= self.scene.time.end:
+            return self.run(rtol)
+        if rtol not in self.shorter or float(self.shorter[rtol]["time"][-1]) < horizon:
+            end = max(horizon, self.scene.time.start + self.scene.output.interval)
+            self.shorter[rtol] = self._made(edited(self.scene, {"time.end": end}), rtol, alone=True)
+        return self.shorter[rtol]
+
+    def _made(self, scene: Scene, rtol: float, **how: bool) -> xr.Dataset:
         if self.costs is None:
-            return self.make(edited(self.scene, {"solver.rtol": rtol}), None)
+            return self.make(edited(scene, {"solver.rtol": rtol}), None, **how)
         name, why = self.costs.best(rtol), self.costs.why(rtol)
-        run = self.make(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.costs.judges(rtol))
-        self.costs.learn(rtol, name, run)
+        run = self.make(edited(scene, {"solver.rtol": rtol, "solver.integrator": name}), self.costs.judges(rtol), **how)
+        self.costs.learn(rtol, name, run, (scene.time.end - scene.time.start) / self.costs.span)
         return run.assign_attrs(method_reason=why)
 
     def attempt(self, rtol: float) -> Attempt:
@@ -128,9 +147,28 @@ class Search:
         fraction = max((errors[q.name] / w for q, w in requested.items()), default=0.0)
         return Attempt(finer, other, errors, fraction) if fraction <= ACCEPTED else attempt
 
+    @property
+    def ratio(self) -> float:
+        """Ratio of neighbouring tolerances of the ladder."""
+        return FINER_RUNG if self.scene.contacts() or self.scene.stop else FINER_TOLERANCE
+
+    def next_rung(self, rtol: float) -> float:
+        """Return the next tighter tolerance of the ladder."""
+        return float(f"{self.ratio * rtol:.1e}")
+
+    def rung(self, rtol: float, until: float) -> Attempt:
+        """Return the run at a tolerance, compared up to a time [s] with the one at the next tighter tolerance.
+
+        The difference of the two is the error less that of the other, which is `ratio` of it.
+        """
+        run, other = self.until(rtol, until), self.until(self.next_rung(rtol), until)
+        requested = self.requested(self.runs[min(self.runs)])
+        errors = {q.name: quantities.error(run, other, q, until) / (1.0 - self.ratio) for q in requested}
+        return Attempt(rtol, run, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
+
     def uncompared(self, refusal: SolverError) -> Attempt:
-        """Return the tightest run of a default request, without an estimate; raise the refusal where none exists."""
-        if not self.runs or not self.predictable:
+        """Return the tightest run, without an estimate; raise the refusal where none exists."""
+        if not self.runs:
             raise refusal
         rtol = min(self.runs)
         return Attempt(rtol, self.runs[rtol], {}, math.inf)
@@ -171,26 +209,24 @@ class Search:
         return requested
 
 
-def deliver(
-    scene: Scene, make: Callable[[Scene, Judges | None], xr.Dataset], progress: Progress, costs: Costs | None = None
-) -> xr.Dataset:
+def deliver(scene: Scene, make: Make, progress: Progress, costs: Costs | None = None) -> xr.Dataset:
     """Return the cheapest run whose estimated errors meet the request, or the most accurate one with an explanation.
 
-    make: makes the run of a scene, under judges of its integrators.  costs: costs for method selection; None where the
-    scene names an integrator.  The dataset's attributes state requested and estimated errors, the verdict, and the
-    reason of the method.
+    costs: costs for method selection; None where the scene names an integrator.  The dataset's attributes state
+    requested and estimated errors, the verdict, and the reason of the method.
     """
-    return _delivered(Search(scene, make, costs), progress)
+    search = Search(scene, make, costs)
+    return _delivered(search, search.cheapest(_search(search, progress)), progress)
 
 
-def at_tolerance(scene: Scene, make: Callable[[Scene, Judges | None], xr.Dataset], costs: Costs) -> xr.Dataset:
+def at_tolerance(scene: Scene, make: Make, costs: Costs) -> xr.Dataset:
     """Return the run of a scene at its own tolerance, by the method that is predicted to be cheapest."""
     return Search(scene, make, costs).run(scene.solver.rtol)
 
 
 def by_default(
     scene: Scene,
-    make: Callable[[Scene, Judges | None], xr.Dataset],
+    make: Make,
     progress: Progress,
     costs: Callable[[Scene], Costs],
 ) -> xr.Dataset:
@@ -202,18 +238,53 @@ def by_default(
     names = [q.name for q in scene.requested() if q.over_time]
     request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
     wanting = edited(scene, {"accuracy": request})
-    return _delivered(Search(wanting, make, costs(wanting), predictable=True), progress)
+    search = Search(wanting, make, costs(wanting), predictable=True)
+    return _delivered(search, _climb(search, progress), progress)
 
 
-def _delivered(search: Search, progress: Progress) -> xr.Dataset:
-    best = search.cheapest(_search(search, progress))
-    requested = {q.name: w for q, w in search.requested(best.run).items()}
+def _climb(search: Search, progress: Progress) -> Attempt:
+    """Return the run at the loosest tolerance of the ladder that meets the request, or the one with the least error.
+
+    Runs that serve comparisons end at the horizon of the run at the loosest tolerance, unless the delivered run has a
+    later one.
+    """
+    rtol, until, nearest, refusal = LOOSEST_RUNG, -math.inf, list[Attempt](), SolverError("")
+    while rtol > TIGHTEST_RUNG:
+        try:
+            if until < 0.0 or rtol in search.runs:
+                until = max(until, _horizon(search, search.run(rtol)))
+            now = search.rung(rtol, until)
+            if now.fraction <= ACCEPTED and _horizon(search, search.run(rtol)) > until:
+                continue  # compare up to its own horizon
+        except SolverError as error:
+            refusal, rtol = error, search.next_rung(rtol)
+            continue
+        progress(None, f"tolerance {rtol:.1e}: error {now.fraction:.2g} of the requested accuracy")
+        nearest.append(now)
+        if now.fraction <= ACCEPTED:
+            break
+        rtol = search.next_rung(rtol)
+    if not nearest:
+        return search.uncompared(refusal)
+    best = min(nearest, key=lambda one: (one.fraction, one.rtol))
+    return replace(best, run=search.run(best.rtol))
+
+
+def _horizon(search: Search, run: xr.Dataset) -> float:
+    """Return the predictability horizon of a run [s], its end where it has none."""
+    return float(run["horizon"]) if "horizon" in run else search.scene.time.end
+
+
+def _delivered(search: Search, best: Attempt, progress: Progress) -> xr.Dataset:
+    sizes = search.runs[min(search.runs)] if search.predictable else best.run
+    requested = {q.name: w for q, w in search.requested(sizes).items() if q.name in best.errors or not best.errors}
     met = best.fraction <= ACCEPTED
     verdict = "met" if met else _missed(search, best, requested)
     progress(None, f"accuracy {verdict} (relative tolerance {best.rtol:.1e})")
     if "method_reason" in best.run.attrs:
         progress(None, str(best.run.attrs["method_reason"]))
-    meaning = "largest error of the time integration, estimated by two runs with a tolerance ratio of 100"
+    ratio = 1.0 / (search.ratio if search.predictable else FINER_TOLERANCE)
+    meaning = f"largest error of the time integration, estimated by two runs with a tolerance ratio of {ratio:g}"
     if search.predictable:
         meaning += f"; requested by default: {BY_DEFAULT:g} of the range, up to the predictability horizon"
     return best.run.assign_attrs(
@@ -221,7 +292,7 @@ def _delivered(search: Search, progress: Progress) -> xr.Dataset:
         accuracy_estimated=json.dumps({name: f"{e:.3g}" for name, e in best.errors.items()}, sort_keys=True),
         accuracy_verdict=verdict,
         accuracy_rtol=best.rtol,
-        accuracy_runs=len(search.runs),
+        accuracy_runs=len(search.runs) + len(search.shorter),
         accuracy_meaning=meaning,
     )
 
@@ -231,16 +302,13 @@ def _search(search: Search, progress: Progress) -> Attempt:
     rtol = _first(search.scene)
     enough: Attempt | None = None
     nearest: Attempt | None = None
-    too_loose, refusal = math.inf, SolverError("")
-    for _ in range(FEW_TRIES if search.predictable else TOLERANCE_TRIES):
+    too_loose = math.inf
+    for _ in range(TOLERANCE_TRIES):
         try:
             now = search.attempt(rtol)
-        except SolverError as error:
-            refusal = error
+        except SolverError:
             if rtol <= REFUSED_FOR_GOOD:
-                if not search.predictable:
-                    raise
-                break
+                raise
             # the tolerance is so loose that the run is refused, as when its energy ledger does not close
             too_loose = min(too_loose, rtol)
             rtol = _next(rtol, 1.0 / TIGHTER_AFTER_REFUSAL, enough, too_loose)
@@ -250,7 +318,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
             nearest = now
         if now.fraction <= ACCEPTED:
             enough = now if enough is None or now.rtol > enough.rtol else enough
-            if now.fraction >= WASTEFUL or rtol >= LOOSEST_TOLERANCE or search.predictable:
+            if now.fraction >= WASTEFUL or rtol >= LOOSEST_TOLERANCE:
                 return now
         else:
             too_loose = min(too_loose, rtol)
@@ -261,7 +329,8 @@ def _search(search: Search, progress: Progress) -> Attempt:
             return enough
         if enough is not None and too_loose < 1.05 * enough.rtol:
             break  # the error jumps between two neighbouring tolerances
-    return enough or nearest or search.uncompared(refusal)
+    assert nearest is not None
+    return enough or nearest
 
 
 def _first(scene: Scene) -> float:

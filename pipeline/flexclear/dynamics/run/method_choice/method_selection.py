@@ -235,15 +235,15 @@ class Costs:
 
         return verdict
 
-    def learn(self, rtol: float, name: str, run: xr.Dataset) -> None:
-        """Store the cost of a run that began with an integrator."""
+    def learn(self, rtol: float, name: str, run: xr.Dataset, part: float = 1.0) -> None:
+        """Store the cost of a run that began with an integrator. part: fraction of the motion that it covers."""
         if DEFAULT in self.expected:  # where stability limits the steps, the progress rate gives the whole cost
             self.seen.setdefault(DEFAULT, {})[rtol] = self.expected[DEFAULT]
         if run.attrs["method"] != name and not (name == DEFAULT and name in self.expected):
             self.handed_over[name] = max(rtol, self.handed_over.get(name, 0.0))
         used, done = self.left if self.expected else (0.0, 0.0)
-        if done < CHARACTERISTIC:
-            rest = (float(run.attrs["evaluations"]) - used) / (1.0 - done)
+        if done < CHARACTERISTIC * part:
+            rest = (float(run.attrs["evaluations"]) - used) / (part - done)
             self.seen.setdefault(run.attrs["method"], {})[rtol] = max(rest, 1.0)
 
 
