@@ -86,7 +86,7 @@ def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | 
         opened = [path, *companions(path)]
         for file in opened:
             require_file(file, where)
-            _require_whole(file, where)
+            require_whole(file, where)
         return _parsed(path)
 
 
@@ -105,7 +105,7 @@ def _require_mesh(path: Path, where: str, largest: int | None) -> None:
             raise InputError(where, f"'{path.name}' declares a grid of {count:.3g} points, more than {MOST_POINTS}")
 
 
-def _require_whole(path: Path, where: str) -> None:
+def require_whole(path: Path, where: str) -> None:
     """Raise InputError for an HDF5 file with parts in other files, whose edits would go unnoticed."""
     if not _is_hdf5(path):
         return
