@@ -156,7 +156,7 @@ def test_files_that_do_not_fit_together_are_refused(tmp_path: Path, solid: xr.Da
     ):
         with pytest.raises(InputError, match=message):
             build(recipe(THREE, frames | change), tmp_path)
-    with pytest.raises(InputError, match="either `file`, or all of"):
+    with pytest.raises(InputError, match="either `file`, or both of"):
         build(recipe({"stiffness": "stiffness.mtx"}, frames), tmp_path)
     bare = recipe(THREE, frames)
     del bare["shape"]["units"]

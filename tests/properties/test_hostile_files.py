@@ -23,6 +23,7 @@ from flexclear.scene.load import load_scene
 from flexclear.scene.sweep import read_sweep
 from flexclear.stages import scenes
 from flexclear.structure.fe.exchange import files
+from flexclear.structure.fe.recipe import Matrices
 from flexclear.structure.fe.solid import imported
 from flexclear.structure.fe.solid.recipe import MeshFile
 from flexclear.study import cost
@@ -194,11 +195,10 @@ def test_a_packed_matrix_is_not_read_beyond_what_its_header_says(tmp_path: Path)
             file.write(b"1 1 1\n" * 100_000)
     (tmp_path / "m.mtx").write_bytes(header + b"1 1 1\n")
     (tmp_path / "u.csv").write_text("node,x,y,z,component\n1,0,0,0,ux\n" + "1,0,0,0,ux\n" * 300_000)
-    paths = [tmp_path / name for name in ("k.mtx.gz", "m.mtx", "u.csv")]
-    with refused("2 entries where its header says 1"):
-        files.read_matrix_market(paths[0], paths[1], paths[2], "recipe")
-    with refused("does not match the lines"):
-        files.read_matrix_market(paths[1], paths[1], paths[2], "recipe")
+    for stiffness, words in (("k.mtx.gz", "2 entries where its header says 1"), ("m.mtx", "does not match the lines")):
+        shape = Matrices(type="matrices", units="m-kg-s", stiffness=stiffness, mass="m.mtx", unknowns="u.csv")
+        with refused(words):
+            files.read(shape, tmp_path, "recipe")
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"s": [{"name": 1, "seconds": [NaN], "error": {}}]}', ""])

@@ -33,6 +33,7 @@ def table(bundle: xr.Dataset) -> str:
         f"  frequencies of the free body within 1 %: up to {resolved:.6g} Hz"
         if resolved
         else f"  frequencies of the free body within 1 %: none; the first is at {first:.6g} Hz",
+        *_imported(bundle),
         "  static compliance, per cent of the full model, axes of the frame",
         _row("frame", "held", bundle["direction"].values.tolist()),
     ]
@@ -52,6 +53,17 @@ def table(bundle: xr.Dataset) -> str:
     lines += ["  effective mass of all modes, kg and kg m2"]
     lines.append(_row("", "", [f"{value:.3g}" for value in total]))
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _imported(bundle: xr.Dataset) -> list[str]:
+    """Return lines on the matrices of a body from another program, with its frequencies next to the program's."""
+    if "imported" not in bundle.attrs:
+        return []
+    lines = [f"  {line}" for line in bundle.attrs["imported"].split("\n")]
+    for name, words in (("free_frequency", "of the free body"), ("listed_frequency", "in the listing")):
+        if name in bundle:
+            lines.append(f"  frequencies {words}, Hz: " + " ".join(f"{value:.7g}" for value in bundle[name].values))
+    return lines
 
 
 def _row(frame: str, held: str, values: Sequence[object]) -> str:

@@ -70,6 +70,9 @@ frame_position | frame axis | m | origin of the named frame in the mesh frame
 frame_rotation | frame axis axis2 | 1 | rotation matrix, frame to mesh frame
 tie_node | tie | 1 | number of the node whose motion, or mean motion, is the frame's
 tie_frame | tie | 1 | index of the frame
+given_shape? | unknown shape | 1 | shape that came with the body, for the reference condition "given"
+listed_frequency? | listed | Hz | frequencies of the free body in the program's listing
+listed_mass? | | kg | mass there
 body_mass? | | kg | mass
 first_moment? | axis | kg m | integral of rho X
 second_moment? | axis axis2 | kg m2 | integral of rho X X^T
@@ -113,6 +116,8 @@ error_bound? | frame direction bound_frequency | m N-1, rad N-1 m-1 | largest er
     harmonic load on it, axes of the frame
 effective_mass? | direction mode | kg, kg m2 | squared momentum of the mode per unit rigid motion about the centre of
     mass, over its modal mass
+free_frequency? | free_mode | Hz | first frequencies of the free body, where another program assembled it
+listed_frequency? | listed | Hz | elastic frequencies in that program's listing
 """)
 
 #: stage 1: nodes and two-node beam cells in the mesh frame

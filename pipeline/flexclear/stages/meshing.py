@@ -25,7 +25,7 @@ KINDS = "flexclear.structure.kinds"
 #: place in errors of the kinds of bodies, which do not know the recipe's file
 PLACE = "mesh recipe"
 #: keys of a recipe's shape that name files
-FILES = ("file", "stiffness", "mass", "unknowns")
+FILES = ("file", "stiffness", "mass", "unknowns", "nodes", "basis", "listing")
 
 
 def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:

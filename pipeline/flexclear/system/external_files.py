@@ -21,6 +21,8 @@ COPIES = 5.0
 #: entry that meshio puts among the cell sets of a Gmsh 4 file, although it holds numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
 
+#: first bytes of an HDF5 file, or of one after a user block
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HDF5 = "MED and other formats in HDF5 need h5py: pip install 'flexclear[med]'"
 
 
@@ -63,6 +65,40 @@ def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | 
         for file in companions(path):
             require_file(file, where)
         return _parsed(path)
+
+
+def require_whole(path: Path, where: str) -> None:
+    """Raise InputError for an HDF5 file with parts in other files, whose edits would go unnoticed."""
+    if not _is_hdf5(path):
+        return
+    import h5py
+
+    outside: list[str] = []
+
+    def look_at_link(name: str, link: object) -> None:
+        if isinstance(link, h5py.ExternalLink):
+            outside.append(name)
+
+    def look_at_data(name: str, node: object) -> None:
+        if isinstance(node, h5py.Dataset) and (node.external or node.is_virtual):
+            outside.append(name)
+
+    with h5py.File(path, "r") as file:
+        file.visititems_links(look_at_link)
+        file.visititems(look_at_data)
+    if outside:
+        problem = f"'{path.name}' has parts in other files, such as '{outside[0]}'"
+        raise InputError(where, problem, "write it again as one file")
+
+
+def _is_hdf5(path: Path) -> bool:
+    """Return True when the HDF5 signature is at the start, or after a user block of 512, 1024, 2048, ... bytes."""
+    with path.open("rb") as file:
+        for start in (0, *(512 << k for k in range(path.stat().st_size.bit_length()))):
+            file.seek(start)
+            if file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
+                return True
+    return False
 
 
 def _parsed(path: Path) -> meshio.Mesh:

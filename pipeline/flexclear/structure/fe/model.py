@@ -116,6 +116,7 @@ class Model:
     position: of each degree of freedom [m], shape (ndof, 3).
     interfaces: every named frame.  ends: the two ends that a fixed-fixed condition clamps.
     integrate: volume integrals of vectors, shape (ndof, n); exact but for rounding.
+    given: shapes that came with the body, shape (ndof, n); None where none did.
     """
 
     stiffness: sp.csr_array
@@ -127,6 +128,7 @@ class Model:
     integrate: Callable[[np.ndarray], Integrals]
     families: Families
     drawn: Drawn
+    given: np.ndarray | None = None
 
     @property
     def size(self) -> int:
@@ -191,6 +193,12 @@ def rigid_motions(positions: np.ndarray, component: np.ndarray, about: np.ndarra
 def symmetric(matrix: sp.csr_array) -> sp.csr_array:
     """Return the symmetric part: eigensolvers need exact symmetry; rounding differs above and below the diagonal."""
     return sp.csr_array(0.5 * (matrix + matrix.T))
+
+
+def strain(stiffness: sp.csr_array, rigid: np.ndarray) -> np.ndarray:
+    """Return the largest force of each rigid motion, relative to the largest term of the sums, shape (6,)."""
+    left: np.ndarray = np.abs(stiffness @ rigid).max(axis=0) / (abs(stiffness) @ np.abs(rigid)).max(axis=0)
+    return left
 
 
 def rows(interfaces: tuple[Interface, ...], size: int) -> sp.csr_array:

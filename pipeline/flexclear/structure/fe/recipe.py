@@ -21,29 +21,34 @@ from flexclear.system.errors import InputError
 
 
 class Matrices(Part):
-    """Stiffness and mass of a free body, with a table of their rows.
+    """Stiffness and mass of a free body from another program, in one `file` or in the two `stiffness` and `mass`.
 
-    Either `file`, an npz that `exchange.files.write_npz` wrote, or `stiffness` and `mass` (MatrixMarket) and
-    `unknowns` (CSV with the columns node, x, y, z, component, one line per row of the matrices).
+    The end of a name decides the format: docs/exchange.md lists them. Paths are relative to the recipe.
     """
 
     type: Literal["matrices"]
     units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms"]
-    """consistent units of all numbers in the files, which do not state them. Paths are relative to the recipe"""
+    """consistent units of all numbers in the files, which do not state them"""
     file: str | None = None
-    """npz file with matrices, table and integrals"""
+    """one file with both matrices: npz, HDF5, DMIG in .pch, .op4, .full"""
     stiffness: str | None = None
-    """MatrixMarket files"""
+    """file of the stiffness matrix: MatrixMarket, .sti, .mtx of Abaqus, .pch, .op4"""
     mass: str | None = None
-    """MatrixMarket files"""
+    """file of the mass matrix, in the same format"""
     unknowns: str | None = None
-    """CSV table of the rows"""
+    """rows of matrices that have numbers only: .dof, or a CSV table with the columns node, x, y, z, component"""
+    nodes: str | None = None
+    """deck with positions and sets of the nodes: .inp, .cdb, or entries GRID of Nastran"""
+    basis: str | None = None
+    """MatrixMarket file of shapes by columns, such as a Craig-Bampton basis; for modes of the reference "given"."""
+    listing: str | None = None
+    """the program's list of the free body's frequencies (.dat, .f06), which are compared with those computed here"""
 
     @model_validator(mode="after")
     def _one_way(self) -> Matrices:
-        three = [name for name in ("stiffness", "mass", "unknowns") if getattr(self, name) is not None]
-        if (self.file is None) == (not three) or (three and len(three) < 3):
-            raise ValueError("give either `file`, or all of `stiffness`, `mass` and `unknowns`")
+        two = [name for name in ("stiffness", "mass") if getattr(self, name) is not None]
+        if (self.file is None) == (not two) or len(two) == 1:
+            raise ValueError("give either `file`, or both of `stiffness` and `mass`")
         return self
 
 
@@ -51,14 +56,16 @@ class TableFrame(TurnedFrame):
     """A named frame at a node with six unknowns, or following the mean motion of several (RBE3, equal weights)."""
 
     node: int | None = None
-    """number from the table of unknowns"""
+    """number of a node"""
     nodes: tuple[int, ...] = ()
-    """numbers from the table of unknowns"""
+    """numbers of several nodes"""
+    set: str | None = None
+    """name of a set of nodes in the deck"""
 
     @model_validator(mode="after")
     def _one_way(self) -> TableFrame:
-        if (self.node is None) == (not self.nodes):
-            raise ValueError("give either `node` or `nodes`")
+        if [self.node is not None, bool(self.nodes), self.set is not None].count(True) != 1:
+            raise ValueError("give either `node` or `nodes` or `set`")
         return self
 
 

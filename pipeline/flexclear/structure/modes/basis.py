@@ -67,6 +67,8 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
         body = replace(body, condition=replace(body.condition, loaded=body.condition.loaded[:0]))
     static = _static(body)
     free = available(body.model, body.condition)
+    if body.condition.shapes is not None and requested.count is None and requested != ModeRequest():
+        raise InputError(WHERE, "given shapes are taken as they are, all of them", 'write count = "all"')
     if requested.count is not None or requested == ModeRequest():
         count = request(requested.count, free, static.shape[1])
         none = Normal(np.empty(0), np.empty((body.model.size, 0)), np.empty(0))
@@ -124,6 +126,8 @@ def whole(values: np.ndarray, n: int, static: int = 0) -> int:
 
 def available(model: Model, condition: Condition) -> int:
     """Return the number of normal modes of a mesh under a reference condition."""
+    if condition.shapes is not None:
+        return 0
     held = condition.held.shape[0]
     return model.size - (held or 6) - (0 if held else condition.loaded.shape[0])
 
@@ -131,6 +135,8 @@ def available(model: Model, condition: Condition) -> int:
 def _static(body: Body) -> np.ndarray:
     """Return constraint modes of the moved functionals, or attachment modes of the loaded ones, shape (ndof, s)."""
     condition = body.condition
+    if condition.shapes is not None:
+        return condition.shapes
     if len(condition.moved):
         body.progress(None, "static shapes")
         return border(body.flexibility(), condition.held).shapes(condition.moved)

@@ -47,7 +47,7 @@ def build(
         "frequency": modes["frequency"].values,
     }
     data: dict[str, Any] = {name: (BUNDLE[name].dims, value) for name, value in values.items()}
-    data |= {name: modes[name] for name in DEFICITS} | dict(extra or {})
+    data |= {name: modes[name] for name in DEFICITS if name in modes} | dict(extra or {})
     return conform(xr.Dataset(data, coords={"frame": modes["frame"].values}), BUNDLE, **modes.attrs)
 
 

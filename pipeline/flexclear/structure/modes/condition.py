@@ -36,6 +36,7 @@ class Condition:
     loaded: functionals whose unit loads give attachment modes, shape (s, ndof).
     residual: True to remove the retained normal modes' part from the attachment modes.
     mean_axes: True to remove rigid motion from every shape (Tisserand's condition: no momentum).
+    shapes: static shapes that are given, with no normal modes next to them, shape (ndof, s).
     note: text on the removed rigid-body motion and the method.
     """
 
@@ -45,6 +46,12 @@ class Condition:
     loaded: sp.csr_array
     residual: bool = False
     mean_axes: bool = False
+    shapes: np.ndarray | None = None
+
+    @property
+    def static(self) -> int:
+        """Number of static shapes."""
+        return len(self.moved) or self.loaded.shape[0] if self.shapes is None else self.shapes.shape[1]
 
 
 def interfaces_of(given: Given, count: int, needs: str) -> tuple[Interface, ...]:

@@ -14,7 +14,7 @@ from flexclear.scene.registry import lookup, suggestion
 from flexclear.structure.fe.model import DOFS, Interface, Model
 from flexclear.structure.fe.statics import Flexibility, support
 from flexclear.structure.kinds.kind import of_mesh
-from flexclear.structure.modes import basis, deficits, eigen
+from flexclear.structure.modes import basis, deficits, eigen, imported
 from flexclear.structure.modes.basis import ModeRequest
 from flexclear.structure.modes.condition import Condition, Given, check
 from flexclear.system.errors import InputError
@@ -70,6 +70,8 @@ def solve(
     if rigid_frequency.size:
         data["rigid_frequency"] = (("rigid_mode",), rigid_frequency)
     lacks, attributes = deficits.measure(flexibility(), vectors, progress)
+    checked, remarks = imported.measure(mesh, flexibility(), progress)
+    data, attributes = data | checked, attributes | remarks
     attributes |= {name: mesh.attrs[name] for name in CARRIED}
     attributes |= {"reference": reference, "count": len(values), "interfaces": " ".join(names)}
     attributes["rigid_motion"] = condition.note
@@ -93,8 +95,7 @@ def require_possible(model: Model, modes: Modes, names: Sequence[str]) -> None:
     """
     _, condition = _held(model, modes.reference, modes.interfaces or names, modes.held, modes.of)
     if isinstance(modes.count, int) and modes.count:
-        static = len(condition.moved) or condition.loaded.shape[0]
-        basis.request(modes.count, basis.available(model, condition), static)
+        basis.request(modes.count, basis.available(model, condition), condition.static)
 
 
 def _frame(model: Model, name: str) -> Interface:

@@ -1,4 +1,4 @@
-"""Files of mass and stiffness matrices: npz (complete models), and MatrixMarket with a table of unknowns."""
+"""Files of mass and stiffness matrices: npz and HDF5 (complete models), MatrixMarket, those of `exchange.programs`."""
 
 from __future__ import annotations
 
@@ -7,19 +7,24 @@ import csv
 import gzip
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
+from flexclear.structure.fe.exchange import nodes, programs
+from flexclear.structure.fe.exchange.programs import KEY, SMALLER, Entries
 from flexclear.structure.fe.model import DOFS, Model
 from flexclear.system import machine
 from flexclear.system.errors import InputError
-from flexclear.system.external_files import reading, require_file
+from flexclear.system.external_files import reading, require_file, require_whole
+
+if TYPE_CHECKING:
+    from flexclear.structure.fe.recipe import Matrices
 
 COMPONENTS = (*DOFS, "internal")
 COLUMNS = ("node", "x", "y", "z", "component")
@@ -27,7 +32,7 @@ COLUMNS = ("node", "x", "y", "z", "component")
 MOMENTS_UP_TO = 1500
 #: peak memory of reading a file, as a multiple of its content: checks and conversion to SI units make copies
 COPIES = 4.0
-SMALLER = "condense the body, or remove parts that no frame needs"
+HDF5 = (".h5", ".hdf5")
 OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
@@ -45,12 +50,17 @@ class Table:
 
 @dataclass(frozen=True)
 class Contents:
-    """Matrices and table of a file; moments by their names in schema MATRICES, empty where the file has none."""
+    """Matrices and table of a file; moments by their names in schema MATRICES, empty where the file has none.
+
+    sets: node numbers by name.  basis: shapes given with the body, (n, shapes).
+    """
 
     stiffness: sp.coo_array
     mass: sp.coo_array
     table: Table
     moments: dict[str, np.ndarray]
+    sets: dict[str, np.ndarray] = field(default_factory=dict)
+    basis: np.ndarray | None = None
 
 
 def table(model: Model) -> Table:
@@ -107,8 +117,64 @@ def moments(model: Model) -> dict[str, Any]:
     }
 
 
+def read(shape: Matrices, folder: Path, where: str) -> Contents:
+    """Read the files that a recipe names; raise InputError unless they describe one body."""
+    known = nodes.Nodes() if shape.nodes is None else nodes.read(folder / shape.nodes, where)
+    if shape.file is not None and (folder / shape.file).suffix.lower() in (".npz", *HDF5):
+        contents = read_npz(folder / shape.file, where)
+    else:
+        paths = [folder / str(name or shape.file) for name in (shape.stiffness, shape.mass)]
+        parts = [_entries(path, letter, where) for path, letter in zip(paths, "KM", strict=True)]
+        content = _rows(shape, folder, parts, known, where)
+        keys = KEY * content.node + content.component
+        K, M = (part.matrix(keys, len(content.node), where) for part in parts)
+        contents = Contents(K, M, content, {})
+    contents = replace(contents, sets=known.sets)
+    if shape.basis is None:
+        return contents
+    basis = _matrix(folder / shape.basis, where).toarray()
+    if len(basis) != len(contents.table.node) or not np.isfinite(basis).all():
+        problem = f"'{shape.basis}' is no basis: {len(basis)} rows of numbers for {len(contents.table.node)} unknowns"
+        raise InputError(where, problem, "write its rows in the order of the unknowns, each finite")
+    return replace(contents, basis=basis)
+
+
+def _entries(path: Path, letter: str, where: str) -> Entries:
+    """Return the entries of a MatrixMarket file, or of a file of another program."""
+    require_file(path, where)
+    with reading(path, where, f"'{path.name}' cannot be read"), path.open("rb") as file:
+        first = file.read(14)
+    if not first.startswith(b"%%") and path.suffix not in OPENERS:
+        return programs.read(path, letter, where)
+    matrix = _matrix(path, where)
+    return Entries(matrix.row, matrix.col, matrix.data, False, path.name, matrix.shape)
+
+
+def _rows(shape: Matrices, folder: Path, parts: list[Entries], known: nodes.Nodes, where: str) -> Table:
+    """Return the table of unknowns: of its own file, or of nodes and components that the matrices name."""
+    if shape.unknowns is not None and not shape.unknowns.lower().endswith(".dof"):
+        return _table(folder / shape.unknowns, where, max(part.size for part in parts))
+    if shape.unknowns is not None:
+        keys, source = programs.unknowns(folder / shape.unknowns, where), shape.unknowns
+    elif all(part.keyed for part in parts):
+        keys, source = np.unique(np.concatenate([part.row for part in parts])), parts[0].name
+    else:
+        name = next(part.name for part in parts if not part.keyed)
+        problem = f"the rows of '{name}' have numbers only, which do not say their nodes and components"
+        raise InputError(where, problem, "give `unknowns`: a CSV table, or the .dof file of CalculiX")
+    if shape.nodes is None:
+        raise InputError(where, f"'{source}' does not say where its nodes are", "give `nodes`, the deck of the model")
+    node, component = np.divmod(keys, KEY)
+    missing = [k for k, number in enumerate(node.tolist()) if number not in known.position]
+    if missing:
+        problem = f"node {node[missing[0]]}, row {missing[0] + 1} of '{source}', is none of the {len(known.position)}"
+        remedy = "give the deck from which the matrices were made, without shells or beams that were expanded"
+        raise InputError(where, f"{problem} nodes of '{shape.nodes}'", remedy)
+    return Table(node, component, np.array([known.position[number] for number in node.tolist()]))
+
+
 def read_npz(path: Path, where: str) -> Contents:
-    """Read a file that `write_npz` wrote; raise InputError when an array is missing."""
+    """Read a file that `write_npz` wrote, or its arrays in HDF5; raise InputError when an array is missing."""
     require_file(path, where)
     with reading(path, where, f"'{path.name}' holds no matrices", "write it with exchange.files"):
         data = _unpacked(path, where)
@@ -130,7 +196,16 @@ def read_npz(path: Path, where: str) -> Contents:
 
 
 def _unpacked(path: Path, where: str) -> dict[str, np.ndarray]:
-    """Return all arrays of an npz file by name; refuse pickled objects, which could run code."""
+    """Return all arrays of an npz or HDF5 file by name; refuse pickled objects, which could run code."""
+    if path.suffix.lower() in HDF5:
+        require_whole(path, where)
+        import h5py
+
+        with h5py.File(path, "r") as held:
+            machine.require_memory(
+                COPIES * sum(one.nbytes for one in held.values()), f"{where}: '{path.name}'", SMALLER
+            )
+            return {name: one[()] for name, one in held.items()}
     with zipfile.ZipFile(path) as packed:
         need = COPIES * sum(entry.file_size for entry in packed.infolist())
     machine.require_memory(need, f"{where}: '{path.name}' unpacked", SMALLER)
@@ -152,17 +227,6 @@ def _array(
     if array.dtype.kind not in kinds or not fits:
         raise ValueError(f"'{name}' is an array of {array.dtype.name}, {array.shape}")
     return array
-
-
-def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) -> Contents:
-    """Read matrices of any code; raise InputError when matrices and table do not fit together."""
-    matrices = [_matrix(path, where) for path in (stiffness, mass)]
-    content = _table(unknowns, where, max(matrix.shape[0] for matrix in matrices))
-    for path, matrix in zip((stiffness, mass), matrices, strict=True):
-        if matrix.shape != (len(content.node),) * 2:
-            problem = f"'{path.name}' has the shape {matrix.shape}, which does not match the lines of '{unknowns.name}'"
-            raise InputError(where, problem)
-    return Contents(matrices[0], matrices[1], content, {})
 
 
 def _matrix(path: Path, where: str) -> sp.coo_array:

@@ -14,11 +14,12 @@ import xarray as xr
 
 from flexclear.artifacts.schema import MATRICES, conform
 from flexclear.numerics.rotations import skew
+from flexclear.scene.registry import suggestion
 from flexclear.structure.fe import model as models
-from flexclear.structure.fe.exchange import files
+from flexclear.structure.fe.exchange import files, programs
 from flexclear.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from flexclear.structure.fe.model import Drawn, Integrals, Model
-from flexclear.structure.fe.recipe import Matrices, MatricesRecipe
+from flexclear.structure.fe.recipe import MatricesRecipe
 from flexclear.structure.fe.slices import Slices, at_centres, integrate, spread
 from flexclear.structure.fe.solid import ties
 from flexclear.structure.fe.solid.model import families, integrals
@@ -28,6 +29,9 @@ from flexclear.system.errors import InputError, SolverError
 
 #: units of length [m], mass [kg] and time [s] of each consistent system
 SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
+#: mass per volume of the box around a body [kg/m^3], and rough speed of sound [m/s], between which it is of a material
+DENSITY = (1e-3, 1e6)
+SPEED = (20.0, 3e5)
 #: asymmetry of a matrix, relative to its largest entry, that counts as rounding in the file
 SYMMETRIC = 1e-9
 WHERE = "mesh recipe [shape]"
@@ -40,32 +44,38 @@ UNSTRAINED = 1e-6
 def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
     """Build the dataset (schema MATRICES); raise InputError for files that do not fit together."""
     where = f"{path} [shape]"
-    contents = _read(recipe.shape, folder, where)
+    contents = files.read(recipe.shape, folder, where)
     stiffness, mass, position = _in_si(contents, recipe.shape.units, where)
+    _require_plausible(stiffness, mass, position, contents.table, recipe.shape.units, where)
     data: dict[str, Any] = {
         "unknown_node": (("unknown",), contents.table.node),
         "unknown_component": (("unknown",), np.array(COMPONENTS)[contents.table.component]),
         "unknown_position": (("unknown", "axis"), position),
     }
+    asymmetry = 0.0
     for name, matrix in (("stiffness", stiffness), ("mass", mass)):
-        entries = sp.coo_array(_symmetric(matrix, name, where))
+        entries, away = _symmetric(matrix, name, where)
+        asymmetry = max(asymmetry, away)
         for part, values in (("row", entries.row), ("column", entries.col), ("value", entries.data)):
             data[f"{name}_{part}"] = ((f"{name}_entry",), values)
     data |= {name: (MATRICES[name].dims, values) for name, values in contents.moments.items() if name in MATRICES}
-    data |= _frames(recipe, contents.table, position, path)
+    data |= _frames(recipe, contents, position, path)
+    if contents.basis is not None:
+        per_unit = np.where(contents.table.component < 3, SYSTEMS[recipe.shape.units][0], 1.0)
+        data["given_shape"] = (("unknown", "shape"), per_unit[:, None] * contents.basis)
+    if recipe.shape.listing is not None:
+        _, unit, time = SYSTEMS[recipe.shape.units]
+        frequency, total = programs.listed(folder / recipe.shape.listing, where)
+        data["listed_frequency"] = (("listed",), frequency / time)
+        data |= {} if total is None else {"listed_mass": ((), unit * total)}
     try:
         dataset = xr.Dataset(data)
     except ValueError as error:  # integrals in a file have other sizes than its unknowns
         raise InputError(where, f"the arrays do not fit together: {error}") from None
     kind = dict.fromkeys(("body_kind", "section", "inertia_section"), "matrices")
-    return conform(dataset, MATRICES, title=recipe.title, interfaces=" ".join(recipe.interfaces), **kind)
-
-
-def _read(shape: Matrices, folder: Path, where: str) -> Contents:
-    if shape.file is not None:
-        return files.read_npz(folder / shape.file, where)
-    stiffness, mass, unknowns = (folder / str(name) for name in (shape.stiffness, shape.mass, shape.unknowns))
-    return files.read_matrix_market(stiffness, mass, unknowns, where)
+    return conform(
+        dataset, MATRICES, title=recipe.title, asymmetry=asymmetry, interfaces=" ".join(recipe.interfaces), **kind
+    )
 
 
 def _in_si(contents: Contents, system: str, where: str) -> tuple[sp.csr_array, sp.csr_array, np.ndarray]:
@@ -79,20 +89,52 @@ def _in_si(contents: Contents, system: str, where: str) -> tuple[sp.csr_array, s
     return sp.csr_array(energy * K), sp.csr_array(energy * time**2 * M), length * contents.table.position
 
 
-def _symmetric(matrix: sp.csr_array, name: str, where: str) -> sp.csr_array:
+def _require_plausible(
+    K: sp.csr_array, M: sp.csr_array, position: np.ndarray, table: Table, units: str, where: str
+) -> None:
+    """Raise InputError where density and speed of sound are those of no material, but would be in other units."""
+    moved = table.component < 3
+    stiff, heavy = K.diagonal()[moved], M.diagonal()[moved]
+    if not (stiff > 0.0).any() or not (heavy > 0.0).any():
+        return
+    X, total = position[moved], float(M[moved][:, moved].sum()) / 3.0
+    sides = np.maximum(np.ptp(X, axis=0), 0.1 * np.ptp(X, axis=0).max())
+    density = total / float(np.prod(sides)) if sides.all() else 0.0
+    # the stiffness of a node against its neighbours is some E h, its mass some rho h^3
+    spacing = (np.prod(sides) / len(np.unique(X, axis=0))) ** (1.0 / 3.0)
+    speed = float(spacing * np.sqrt(np.median(stiff[stiff > 0.0]) / np.median(heavy[heavy > 0.0])))
+    if _is_material(density, speed):
+        return
+    length, mass, time = SYSTEMS[units]
+    for other, (l, m, t) in SYSTEMS.items():
+        factors = (m / mass * (length / l) ** 3, l / length * time / t)
+        if _is_material(density * factors[0], speed * factors[1]):
+            problem = f"in {units} the body has some {density:.1g} kg/m3 and a speed of sound of {speed:.1g} m/s"
+            raise InputError(where, problem, f'the files look as if units = "{other}"')
+
+
+def _is_material(density: float, speed: float) -> bool:
+    return DENSITY[0] < density < DENSITY[1] and SPEED[0] < speed < SPEED[1]
+
+
+def _symmetric(matrix: sp.csr_array, name: str, where: str) -> tuple[sp.coo_array, float]:
+    """Return the symmetric part of a matrix, and how far entries differ, relative to the largest."""
     if matrix.nnz == 0 or not np.isfinite(matrix.data).all():
         raise InputError(where, f"the {name} matrix is empty or has entries that are not finite")
-    away = abs(matrix - matrix.T).max() / abs(matrix).max()
+    away = float(abs(matrix - matrix.T).max() / abs(matrix).max())
     if away > SYMMETRIC:
         raise InputError(where, f"the {name} matrix is not symmetric: entries differ by {away:.2g} of the largest")
-    return models.symmetric(matrix)
+    return sp.coo_array(models.symmetric(matrix)), away
 
 
-def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: str) -> dict[str, Any]:
-    tied, origins = [], []
+def _frames(recipe: MatricesRecipe, contents: Contents, position: np.ndarray, path: str) -> dict[str, Any]:
+    tied, origins, table = [], [], contents.table
     for name, frame in recipe.frames.items():
         chosen, where = frame.nodes or (frame.node,), f"{path} [frames.{name}]"
-        needed, remedy = (6, "tie the frame to the mean of `nodes`") if frame.node is not None else (3, "name others")
+        if frame.set is not None:
+            chosen = _set(contents.sets, frame.set, where)
+        single = frame.node is not None or (frame.set is not None and len(chosen) == 1)
+        needed, remedy = (6, "tie the frame to the mean of `nodes`") if single else (3, "name others")
         for node in chosen:
             own = np.bincount(table.component[table.node == node], minlength=6)
             if not own.any():
@@ -116,6 +158,14 @@ def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: st
         "tie_node": (("tie",), nodes),
         "tie_frame": (("tie",), frames),
     }
+
+
+def _set(sets: dict[str, np.ndarray], name: str, where: str) -> tuple[int, ...]:
+    known = {other.upper(): other for other in sets}
+    if name.upper() not in known:
+        remedy = suggestion(name, sets) if sets else "give `nodes`, a deck with node sets"
+        raise InputError(where, f"unknown set of nodes '{name}'", remedy)
+    return tuple(sets[known[name.upper()]].tolist())
 
 
 def as_vtu(mesh: xr.Dataset) -> bytes:
@@ -144,6 +194,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         integrate=_integrate(mesh, M, component),
         families=families(positions, component),
         drawn=_drawn(mesh, component),
+        given=mesh["given_shape"].values if "given_shape" in mesh else None,
     )
 
 
@@ -153,7 +204,7 @@ def _matrix(mesh: xr.Dataset, name: str, n: int) -> sp.csr_array:
 
 
 def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positions: np.ndarray) -> None:
-    left = np.abs(K @ rigid).max(axis=0) / (abs(K) @ np.abs(rigid)).max(axis=0)
+    left = models.strain(K, rigid)
     if left.max() > UNSTRAINED:
         worst = COMPONENTS[int(np.argmax(left))]
         problem = f"a rigid motion along {worst} strains the body ({left.max():.2g} of the largest term)"

@@ -12,6 +12,7 @@ NAMES = {
     "constrained": "held:constrained",
     "mean-axis": "floating:mean_axis",
     "craig-bampton": "held:craig_bampton",
+    "given": "held:given_shapes",
     "craig-chang": "floating:craig_chang",
     "residual-flexibility": "floating:residual_flexibility",
 }

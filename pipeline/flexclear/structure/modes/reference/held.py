@@ -13,6 +13,9 @@ from flexclear.structure.fe.model import DIRECTIONS, Interface, Model, rows
 from flexclear.structure.modes.condition import WHERE, Condition, Given, distinct, in_own_axes, interfaces_of
 from flexclear.system.errors import InputError
 
+#: given shapes depend on each other where a combination of them has this fraction of the largest mass
+DEPENDENT = 1e-10
+
 
 def cantilever(model: Model, given: Given) -> Condition:
     """Return the condition for normal modes with the first interface clamped; raise InputError without interfaces."""
@@ -32,6 +35,30 @@ def craig_bampton(model: Model, given: Given) -> Condition:
     first = given.interfaces[0].name
     note = f"the body frame moves with '{first}', where all shapes vanish; no rigid motion is left"
     return _holding(held, note, moved=np.arange(6, held.shape[0]))
+
+
+def given_shapes(model: Model, given: Given) -> Condition:
+    """Return the condition for shapes that came with the body, in all combinations that leave the first interface at
+    rest; raise InputError without them or without an interface.
+
+    Such a basis, as Craig and Bampton's with constraint modes of every interface, contains the rigid motions, which the
+    body frame takes over.
+    """
+    first = interfaces_of(given, 1, "the body frame moves with the first interface")[0]
+    if model.given is None:
+        raise InputError(WHERE, "the recipe gives no shapes", "name their file as `basis` of its [shape]")
+    vectors = np.hstack([model.rigid, model.given])
+    size = np.sqrt(np.einsum("ij,ij->j", vectors, model.mass @ vectors))
+    if not size.all():
+        raise InputError(WHERE, f"column {int(np.argmin(size[6:])) + 1} of `basis` is zero", "remove it")
+    vectors = vectors / size
+    values, turned = np.linalg.eigh(vectors.T @ (model.mass @ vectors))
+    independent = values > DEPENDENT * values[-1]
+    vectors = vectors @ (turned[:, independent] / np.sqrt(values[independent]))
+    still = np.linalg.svd(first.motion @ vectors)[2][6:].T
+    note = f"the body frame moves with '{first.name}', where all given shapes vanish"
+    none = sp.csr_array((0, model.size))
+    return Condition(none, note, np.empty(0, dtype=int), none, shapes=vectors @ still)
 
 
 def fixed_fixed(model: Model, given: Given) -> Condition:

@@ -1,0 +1,402 @@
+"""Bodies from files of other finite element programs, against the program itself, our own elements, and each other.
+
+The files in `tests/reference/programs`: a block of one cell by CalculiX 2.20, and its matrices by pyNastran 1.4.1.
+"""
+
+import importlib.util
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.linalg
+import xarray as xr
+
+from flexclear.artifacts.deficits import table
+from flexclear.commands.__main__ import main
+from flexclear.structure.fe.exchange import ansys, files, nodes, programs
+from flexclear.structure.kinds import kind
+from flexclear.structure.kinds.kind import of_mesh
+from flexclear.structure.modes import bundle
+from flexclear.structure.modes.basis import ModeRequest
+from flexclear.structure.modes.imported import rigid_properties
+from flexclear.structure.modes.solution import solve
+from flexclear.system.errors import FlexclearError, InputError
+from tests.analytic.solid_models import ALUMINIUM, block, build
+
+FILES = Path(__file__).parents[1] / "reference" / "programs"
+CALCULIX = {"stiffness": "part.sti", "mass": "part.mas", "unknowns": "part.dof", "nodes": "part.inp"}
+SMALL = {name: value.replace("part", "block") for name, value in CALCULIX.items()}
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX: apt-get install calculix-ccx")
+needs_ansys = pytest.mark.skipif(
+    importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader: pip install -e '.[fe]'"
+)
+
+
+def recipe(shape: dict[str, Any], frames: dict[str, Any] | None = None, units: str = "mm-t-s") -> dict[str, Any]:
+    frames = frames or {"start": {"set": "START"}, "end": {"set": "end"}}
+    return {"shape": {"type": "matrices", "units": units} | shape, "frames": frames, "interfaces": list(frames)}
+
+
+def dense(data: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    model = of_mesh(data).assemble(data)
+    return model.stiffness.toarray(), model.mass.toarray()
+
+
+# The program itself ------------------------------------------------------------------------------------------------
+
+
+def deck(solid: xr.Dataset, step: str) -> str:
+    """The mesh of quadratic bricks as an input file in mm, t and s: the nodes' order is VTK's."""
+    X = solid["node_position"].values * 1e3
+    rows = (", ".join(map(str, [k, *cell])) for k, cell in enumerate((solid["cell_node"].values + 1).tolist(), 1))
+    cells = [", ".join(row.split(", ")[:10]) + ",\n" + ", ".join(row.split(", ")[10:]) for row in rows]
+    lines = ["*NODE, NSET=ALL", *(f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(X.tolist(), 1))]
+    lines += ["*ELEMENT, TYPE=C3D20, ELSET=BLOCK", *cells]
+    for name, x in (("START", 0.0), ("END", 100.0)):
+        lines += [f"*NSET, NSET={name}", *(f"{k}," for k in np.flatnonzero(np.abs(X[:, 0] - x) < 1e-6) + 1)]
+    E, rho = ALUMINIUM["youngs_modulus"] * 1e-6, ALUMINIUM["density"] * 1e-12
+    lines += ["*MATERIAL, NAME=M", "*ELASTIC", f"{E!r}, {ALUMINIUM['poisson']}", "*DENSITY", repr(rho)]
+    lines += ["*SOLID SECTION, ELSET=BLOCK, MATERIAL=M", "*STEP", step, "16", "*END STEP"]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture(scope="module")
+def solid() -> xr.Dataset:
+    """A box with sides of three lengths, in quadratic bricks."""
+    return build(block("hex20", (4, 2, 2), (0.1, 0.02, 0.03), "mean"))
+
+
+@pytest.fixture(scope="module")
+def part(solid: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder in which CalculiX wrote matrices of that mesh, and the frequencies that it computes itself."""
+    folder = tmp_path_factory.mktemp("calculix")
+    for name, step in (("part", "*FREQUENCY, SOLVER=MATRIXSTORAGE"), ("free", "*FREQUENCY")):
+        (folder / f"{name}.inp").write_text(deck(solid, step))
+        subprocess.run(["ccx", name], cwd=folder, check=True, capture_output=True, timeout=300)
+    return folder
+
+
+@needs_ccx
+def test_calculix_and_this_program_have_the_same_body(part: Path, solid: xr.Dataset) -> None:
+    found = kind.build(recipe(CALCULIX | {"listing": "free.dat"}), part)
+    modes = solve(found, "free-free", 10)
+    # its listing has eight digits; its Lanczos iteration differs from its matrices by 4e-7
+    np.testing.assert_allclose(modes["frequency"], modes["listed_frequency"], rtol=1e-6)
+    # quadratic bricks with straight sides: both programs integrate them exactly; fourteen digits in its files
+    np.testing.assert_allclose(modes["frequency"], solve(solid, "free-free", 10)["frequency"], rtol=1e-9)
+    data = bundle.build(found, modes)
+    whole = bundle.build(solid, solve(solid, "free-free", 10))
+    for name in ("mass", "first_moment", "second_moment"):
+        scale = np.abs(whole[name].values).max()
+        np.testing.assert_allclose(data[name], whole[name], rtol=0.0, atol=1e-11 * scale)
+    np.testing.assert_allclose(data["mass"], 2740.0 * 0.1 * 0.02 * 0.03, rtol=1e-12)
+    text = table(data)
+    assert "mass 0.1644 kg (0.1644 kg in the program's file)" in text
+    assert "symmetric to 0" in text
+    assert "frequencies in the listing, Hz: " in text
+
+
+@needs_ccx
+@pytest.mark.parametrize("units, words", [("m-kg-s", "mm-t-s"), ("mm-kg-ms", "mm-t-s")])
+def test_files_in_other_units_are_refused(part: Path, units: str, words: str) -> None:
+    with pytest.raises(InputError, match=rf'kg/m3 and a speed of sound.*\n.*units = "{words}"'):
+        kind.build(recipe(CALCULIX, units=units), part)
+
+
+@needs_ccx
+def test_a_listing_of_another_model_is_refused(part: Path, tmp_path: Path) -> None:
+    text = (part / "free.dat").read_text().split("P A R T")[0]
+    lines = text.splitlines()
+    row = next(k for k, line in enumerate(lines) if line.split()[:1] == ["7"])
+    words = lines[row].split()
+    lines[row] = "  ".join([*words[:3], f"{1.05 * float(words[3]):.7E}", words[4]])
+    (tmp_path / "free.dat").write_text("\n".join(lines))
+    mesh = kind.build(recipe(CALCULIX | {"listing": str(tmp_path / "free.dat")}), part)
+    with pytest.raises(InputError, match=r"by the matrices and .* by the program's file"):
+        solve(mesh, "free-free", 4)
+
+
+def craig_bampton(K: np.ndarray, M: np.ndarray, held: np.ndarray, count: int) -> np.ndarray:
+    """Constraint modes of the held unknowns and the lowest modes with these held, shapes (n, held + count)."""
+    inner = np.setdiff1d(np.arange(len(K)), held)
+    shapes = np.zeros((len(K), len(held) + count))
+    shapes[held, range(len(held))] = 1.0
+    shapes[inner, : len(held)] = -np.linalg.solve(K[np.ix_(inner, inner)], K[np.ix_(inner, held)])
+    _, modes = scipy.linalg.eigh(K[np.ix_(inner, inner)], M[np.ix_(inner, inner)], subset_by_index=[0, count - 1])
+    shapes[inner, len(held) :] = modes
+    return shapes
+
+
+def test_a_given_craig_bampton_basis_is_taken_as_it_is(tmp_path: Path) -> None:
+    """The free body's frequencies in the basis are those of the matrices that SciPy reduces with it."""
+    data = build(block("hex8", (4, 2, 2), (0.1, 0.02, 0.03), "mean"))
+    model = of_mesh(data).assemble(data)
+    files.write_matrix_market(model, tmp_path)
+    rows = files.table(model)
+    ends = {name: np.unique(rows.node[np.abs(rows.position[:, 0] - x) < 1e-9]) for name, x in (("a", 0.0), ("b", 0.1))}
+    held = np.flatnonzero(np.isin(rows.node, np.concatenate(list(ends.values()))))
+    K, M = model.stiffness.toarray(), model.mass.toarray()
+    T = craig_bampton(K, M, held, 6)
+    scipy.io.mmwrite(tmp_path / "basis.mtx", T, precision=17)
+    shape = {"stiffness": "stiffness.mtx", "mass": "mass.mtx", "unknowns": "unknowns.csv", "basis": "basis.mtx"}
+    frames = {name: {"nodes": numbers.tolist()} for name, numbers in ends.items()}
+    found = kind.build(recipe(shape, frames, "m-kg-s"), tmp_path)
+    modes = solve(found, "given")
+    assert modes.sizes["mode"] == T.shape[1] - 6
+    reduced = bundle.build(found, modes)
+    # with the six rigid motions the coordinates span the given shapes again: the same free body
+    rigid, vectors = of_mesh(found).assemble(found).rigid, modes["vector"].values
+    again = np.hstack([rigid / np.linalg.norm(rigid, axis=0), vectors / np.linalg.norm(vectors, axis=0)])
+    free = [np.sqrt(np.abs(scipy.linalg.eigvalsh(B.T @ K @ B, B.T @ M @ B))[6:]) for B in (T, again)]
+    np.testing.assert_allclose(free[1], free[0], rtol=1e-8)
+    moved = np.abs(reduced["frame_translation_shape"].values).max(axis=(1, 2))
+    assert moved[0] < 1e-9 * moved[1]
+    with pytest.raises(InputError, match="taken as they are"):
+        solve(found, "given", requested=ModeRequest(up_to=1e4))
+    with pytest.raises(InputError, match="the recipe gives no shapes"):
+        solve(data, "given")
+
+
+# Files of all programs hold the same block ----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def small() -> xr.Dataset:
+    """The block of one cell in the files of CalculiX."""
+    return kind.build(recipe(SMALL), FILES)
+
+
+def unknowns(folder: Path) -> str:
+    """A table of unknowns of the block's files, in its folder."""
+    deck = nodes.read(FILES / "block.inp", "deck")
+    rows = [line.split(".") for line in (FILES / "block.dof").read_text().split()]
+    lines = [",".join([n, *map(repr, deck.position[int(n)]), ("ux", "uy", "uz")[int(k) - 1]]) for n, k in rows]
+    (folder / "unknowns.csv").write_text("\n".join(["node,x,y,z,component", *lines]))
+    return str(folder / "unknowns.csv")
+
+
+def abaqus(folder: Path, labelled: bool, triangle: Callable[[np.ndarray], np.ndarray] | None) -> dict[str, str]:
+    """Files as `*MATRIX OUTPUT` writes them: labels and directions (one triangle), or numbers of rows (both)."""
+    shape = (
+        {"nodes": str(FILES / "block.inp")}
+        if labelled
+        else {"unknowns": unknowns(folder), "nodes": str(FILES / "block.inp")}
+    )
+    rows = [line.replace(".", ",") for line in (FILES / "block.dof").read_text().split()]
+    for name, file in (("stiffness", "block.sti"), ("mass", "block.mas")):
+        entries = np.loadtxt(FILES / file)
+        matrix = np.zeros((24, 24))
+        i, j = entries[:, :2].astype(int).T - 1
+        matrix[i, j] = matrix[j, i] = entries[:, 2]
+        matrix = matrix if triangle is None else triangle(matrix)
+        label = rows if labelled else [str(k + 1) for k in range(24)]
+        sep = "," if labelled else " "
+        lines = [f"{label[r]}{sep}{label[c]}{sep} {matrix[r, c]:.15e}" for r, c in np.argwhere(matrix)]
+        (folder / f"{name}.mtx").write_text("\n".join(lines) + "\n")
+        shape[name] = str(folder / f"{name}.mtx")
+    return shape
+
+
+FORMS: dict[str, Callable[[Path], dict[str, str]]] = {
+    "punch": lambda folder: {"file": "block.pch", "nodes": "block.inp"},
+    "output4": lambda folder: {
+        "stiffness": "stiffness.op4",
+        "mass": "mass.op4",
+        "unknowns": unknowns(folder),
+        "nodes": "block.inp",
+    },
+    "abaqus lower": lambda folder: abaqus(folder, True, np.tril),
+    "abaqus upper": lambda folder: abaqus(folder, True, np.triu),
+    "abaqus coordinate": lambda folder: abaqus(folder, False, None),
+    "abaqus coordinate lower": lambda folder: abaqus(folder, False, np.tril),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_holds_the_same_matrices(form: str, small: xr.Dataset, tmp_path: Path) -> None:
+    found = kind.build(recipe(FORMS[form](tmp_path)), FILES)
+    for a, b in zip(dense(found), dense(small), strict=True):
+        # pyNastran writes ten digits of negative numbers in a punch file
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-9 * np.abs(b).max())
+    mass, centre, inertia = rigid_properties(of_mesh(found).assemble(found))
+    m, (a, b, c) = 7800.0 * 0.06 * 0.015 * 0.01, (0.06, 0.015, 0.01)
+    np.testing.assert_allclose(mass, m, rtol=1e-10)
+    np.testing.assert_allclose(centre, [0.03, 0.0075, 0.005], rtol=1e-9)
+    # a cell of eight nodes bends no side: its inertia is the box's
+    exact = m / 12.0 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
+    np.testing.assert_allclose(np.diag(inertia), exact, rtol=1e-9)
+
+
+def test_hdf5_holds_the_arrays_of_an_npz(small: xr.Dataset, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    model = of_mesh(small).assemble(small)
+    files.write_npz(model, tmp_path / "body.npz")
+    with np.load(tmp_path / "body.npz") as data, h5py.File(tmp_path / "body.h5", "w") as file:
+        for name in data.files:
+            file[name] = data[name]
+    numbers = files.table(model).node
+    frames = {"all": {"nodes": np.unique(numbers).tolist()}}
+    a, b = (kind.build(recipe({"file": f"body.{end}"}, frames, "m-kg-s"), tmp_path) for end in ("npz", "h5"))
+    xr.testing.assert_identical(a, b)
+
+
+GRIDS = (
+    "$ a comment",
+    "GRID".ljust(8) + "1".rjust(8) + " " * 8 + "0.".rjust(8) + "0.".rjust(8) + "1.5-3".rjust(8),
+    "GRID*".ljust(8) + "2".rjust(16) + " " * 16 + "1.000000D+01".rjust(16) + "0.".rjust(16),
+    "*".ljust(8) + "-2.".rjust(16),
+    "GRID,3,,4.,5.,6.",
+)
+
+
+def test_grids_are_read_in_all_three_forms(tmp_path: Path) -> None:
+    (tmp_path / "m.bdf").write_text("\n".join(GRIDS))
+    found = nodes.read(tmp_path / "m.bdf", "deck").position
+    assert found == {1: (0.0, 0.0, 1.5e-3), 2: (10.0, 0.0, -2.0), 3: (4.0, 5.0, 6.0)}
+
+
+@needs_ansys
+def test_files_of_ansys_that_the_reader_ships() -> None:
+    """Its bar is clamped: away from the clamp no rigid motion strains the rows, in positions of its deck."""
+    from ansys.mapdl.reader import examples
+
+    deck = nodes.read(Path(examples.hexarchivefile), "deck")
+    assert (len(deck.position), len(deck.sets["NCOMP2"])) == (321, 98)
+    data = ansys.arrays(Path(examples.fullfile), "full")
+    K = scipy.sparse.coo_array(
+        (data["stiffness_value"], (data["stiffness_row"], data["stiffness_column"])), shape=(963, 963)
+    )
+    K = (K + scipy.sparse.triu(K, 1).T).tocsr()
+    rigid = np.zeros((963, 6))
+    for row, (node, k) in enumerate(zip(data["node"], data["component"], strict=True)):
+        rigid[row, k] = 1.0
+        rigid[row, 3:] = np.cross(np.eye(3), deck.position[int(node)])[:, k]
+    z = np.array([deck.position[int(node)][2] for node in data["node"]])
+    left = np.abs(K @ rigid).max(axis=1) / np.abs(K).max()
+    assert left[np.abs(z - z.min()) > 2.0].max() < 1e-12 or left[np.abs(z - z.max()) > 2.0].max() < 1e-12
+    with pytest.raises(InputError, match="constraints hold 63 unknowns"):
+        programs.read(Path(examples.fullfile), "K", "recipe")
+
+
+# Damaged and hostile files --------------------------------------------------------------------------------------------
+
+
+def text(name: str) -> str:
+    return (FILES / name).read_text()
+
+
+def cut(name: str) -> str:
+    return text(name)[: len(text(name)) * 2 // 3]
+
+
+DAMAGED: dict[str, tuple[dict[str, str | bytes], str]] = {
+    "cut in a line": ({"block.sti": text("block.sti")[:-35]}, "'block.sti'"),
+    "cut after a line": ({"block.sti": "".join(text("block.sti").splitlines(True)[:-30])}, "no diagonal entry in row"),
+    "cut list of rows": ({"block.dof": text("block.dof")[:40]}, "there are 10 unknowns"),
+    "no number": ({"block.mas": text("block.mas").replace("1 1 ", "1 x ", 1)}, "'block.mas'"),
+    "not a number": ({"block.mas": "1 1 nan\n" + text("block.mas")}, "entry 1 is nan"),
+    "a huge row": ({"block.sti": text("block.sti") + "1000000000 1000000000 1.0\n"}, "row or column 1000000000"),
+    "other bytes": ({"block.sti": np.arange(3000.0).byteswap().tobytes()}, "'block.sti'"),
+    "a node missing": (
+        {"block.inp": text("block.inp").replace("8, 60, 15, 10\n", "")},
+        "node 8, row 22 of 'block.dof'",
+    ),
+    "a node twice": ({"block.inp": text("block.inp").replace("8, 60,", "7, 60,")}, "line 11 of 'block.inp': node 7"),
+    "a node at NaN": ({"block.inp": text("block.inp").replace("8, 60,", "8, nan,")}, "finite"),
+    "huge sets": (
+        {"block.inp": text("block.inp").replace("1, 4, 1", "1, 1000000000, 1").replace("START", "REST")},
+        "unknown set of nodes 'START'",
+    ),
+    "axes of nodes": ({"block.inp": text("block.inp") + "*TRANSFORM, NSET=ALL\n1,0,0,0,1,0\n"}, r"line 28 .*TRANSFORM"),
+    "an include of itself": ({"block.inp": "*INCLUDE, INPUT=block.inp\n"}, "in a circle"),
+    "a direction of heat": ({"block.dof": text("block.dof").replace("8.3", "8.0")}, "is no motion of a node"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_damaged_files_of_calculix_are_refused_in_a_sentence(name: str, tmp_path: Path) -> None:
+    changes, words = DAMAGED[name]
+    for file in SMALL.values():
+        shutil.copy(FILES / file, tmp_path / file)
+    for file, content in changes.items():
+        (tmp_path / file).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(FlexclearError, match=words) as caught:
+        kind.build(recipe(SMALL), tmp_path)
+    assert len(str(caught.value)) < 400
+
+
+OTHERS: dict[str, tuple[str, str, str]] = {
+    "cut punch": ("block.pch", cut("block.pch"), "'block.pch'"),
+    "no matrix": ("block.pch", text("block.pch").replace("KAAX", "VAAX"), "name begins with K"),
+    "complex": ("block.pch", text("block.pch").replace("6               2", "6               4", 1), "square and real"),
+    "scalar points": ("block.pch", text("block.pch").replace("8               3", "8               0"), "of a node"),
+    "cut output4": ("stiffness.op4", cut("stiffness.op4"), "before column 25"),
+    "announced rows": ("mass.op4", text("mass.op4").replace("      24      24", "99999999 9999999", 1), "'mass.op4'"),
+    "binary output4": ("mass.op4", "\x18\x00\x00\x00" * 50, "'mass.op4'"),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_damaged_files_of_nastran_are_refused_in_a_sentence(name: str, tmp_path: Path) -> None:
+    file, content, words = OTHERS[name]
+    for other in ("block.inp", "block.pch", "stiffness.op4", "mass.op4"):
+        shutil.copy(FILES / other, tmp_path / other)
+    (tmp_path / file).write_text(content)
+    with pytest.raises(FlexclearError, match=words) as caught:
+        kind.build(recipe(FORMS["punch" if file.endswith("pch") else "output4"](tmp_path)), tmp_path)
+    assert len(str(caught.value)) < 400
+
+
+@needs_ansys
+@pytest.mark.parametrize("damage", ["cut", "swapped"])
+def test_damaged_files_of_ansys_end_no_process(damage: str, tmp_path: Path) -> None:
+    from ansys.mapdl.reader import examples
+
+    data = Path(examples.fullfile).read_bytes()
+    changed = data[:40_000] if damage == "cut" else np.frombuffer(data, "<i4").byteswap().tobytes()
+    (tmp_path / "a.full").write_bytes(changed)
+    with pytest.raises(FlexclearError, match=r"'a\.full'"):
+        programs.read(tmp_path / "a.full", "K", "recipe")
+
+
+SCENE = """title = "A block from another program"
+time.end = 1e-3
+[body.block]
+type = "flexible"
+mesh = "block.toml"
+modes = { reference = "free-free", count = 4 }
+"""
+RECIPE = """interfaces = ["start", "end"]
+[shape]
+type = "matrices"
+units = "mm-t-s"
+stiffness = "block.sti"
+mass = "block.mas"
+unknowns = "block.dof"
+nodes = "block.inp"
+[frames.start]
+set = "START"
+[frames.end]
+set = "END"
+"""
+
+
+def test_the_command_prints_the_body_and_refuses_damage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    for file in SMALL.values():
+        shutil.copy(FILES / file, tmp_path / file)
+    (tmp_path / "s.toml").write_text(SCENE)
+    (tmp_path / "block.toml").write_text(RECIPE)
+    assert main(["run", str(tmp_path / "s.toml"), "--to", "bundle"]) == 0
+    assert "mass 0.0702 kg" in capsys.readouterr().out
+    (tmp_path / "block.mas").write_text(cut("block.mas"))
+    assert main(["run", str(tmp_path / "s.toml"), "--to", "bundle"]) == 2
+    told = capsys.readouterr().err
+    assert "'block.mas' has no diagonal entry in row" in told or "'block.mas' holds no matrix" in told
