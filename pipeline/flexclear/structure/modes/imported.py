@@ -83,4 +83,5 @@ def _require_same(what: str, found: float, stated: float, unit: str) -> None:
 
 
 def _listed(values: np.ndarray) -> str:
-    return " ".join(f"{value:.6g}" for value in values)
+    rounding = 1e-12 * np.abs(values).max()
+    return " ".join(f"{value if abs(value) > rounding else 0.0:.6g}" for value in values)
