@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.linalg
+import scipy.sparse
 import xarray as xr
 
 from flexclear.artifacts.deficits import table
@@ -160,6 +161,50 @@ def test_a_given_craig_bampton_basis_is_taken_as_it_is(tmp_path: Path) -> None:
         solve(found, "given", requested=ModeRequest(up_to=1e4))
     with pytest.raises(InputError, match="the recipe gives no shapes"):
         solve(data, "given")
+
+
+def test_a_stiffness_of_negative_energy_is_refused(tmp_path: Path) -> None:
+    """Symmetric, and rigid motions do not strain it."""
+    model = of_mesh(data := build(block("hex8", (2, 1, 1), (0.1, 0.02, 0.03), "mean"))).assemble(data)
+    files.write_matrix_market(model, tmp_path)
+    K, M = model.stiffness.toarray(), model.mass.toarray()
+    values, modes = scipy.linalg.eigh(K, M)
+    push = M @ modes[:, 8]
+    changed = scipy.sparse.coo_array(K - 2.0 * values[8] * np.outer(push, push))
+    scipy.io.mmwrite(tmp_path / "stiffness.mtx", changed, symmetry="symmetric", precision=17)
+    shape = {"stiffness": "stiffness.mtx", "mass": "mass.mtx", "unknowns": "unknowns.csv"}
+    frames = {"all": {"nodes": np.unique(files.table(model).node).tolist()}}
+    with pytest.raises(InputError, match="no or negative energy"):
+        solve(kind.build(recipe(shape, frames, "m-kg-s"), tmp_path), "free-free", 2)
+
+
+LISTINGS = {
+    "part.dat": (
+        "                              E I G E N V A L U E    O U T P U T\n\n"
+        " MODE NO      EIGENVALUE              FREQUENCY         GENERALIZED MASS   COMPOSITE MODAL DAMPING\n"
+        "                             (RAD/TIME)   (CYCLES/TIME)\n\n"
+        "       1      3.94784E+05   628.32        100.00        1.0000        0.0000\n"
+        "       2      1.57914E+06   1256.6        200.00        1.0000        0.0000\n\n"
+        "                              P A R T I C I P A T I O N   F A C T O R S\n       3  1. 2. 3. 4.\n"
+    ),
+    "part.f06": (
+        "                                              R E A L   E I G E N V A L U E S\n"
+        "   MODE    EXTRACTION      EIGENVALUE            RADIANS             CYCLES            GENERALIZED\n"
+        "    NO.       ORDER                                                                       MASS\n"
+        "        1         1        3.947842E+05        6.283185E+02        1.000000E+02        1.000000E+00\n"
+        "        2         2        1.579137E+06        1.256637E+03        2.000000E+02        1.000000E+00\n"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LISTINGS)
+def test_listings_of_abaqus_and_nastran_state_cycles(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(LISTINGS[name])
+    found, mass = programs.listed(tmp_path / name, "recipe")
+    assert (found.tolist(), mass) == ([100.0, 200.0], None)
+    (tmp_path / name).write_text(LISTINGS[name][:60])
+    with pytest.raises(InputError, match="no table of frequencies"):
+        programs.listed(tmp_path / name, "recipe")
 
 
 # Files of all programs hold the same block ----------------------------------------------------------------------------

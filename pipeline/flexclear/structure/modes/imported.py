@@ -3,6 +3,7 @@ the program states."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,19 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
         f"inertia about it, xx yy zz yz xz xy {_listed(inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])} kg m2",
     )
     return data, {"imported": "\n".join(lines)}
+
+
+def require_definite(mesh: xr.Dataset, flexibility: Callable[[], Flexibility]) -> None:
+    """Raise InputError for a stiffness matrix from another program with less than positive energy in elastic motion."""
+    if mesh.attrs.get("body_kind") != "matrices":
+        return
+    try:
+        flexibility()
+    except InputError:
+        problem = "the stiffness matrix has motions of no or negative energy besides the six rigid ones"
+        raise InputError(
+            WHERE, problem, "write the stiffness of the whole unloaded body; parts must share faces"
+        ) from None
 
 
 def rigid_properties(model: Model) -> tuple[float, np.ndarray, np.ndarray]:

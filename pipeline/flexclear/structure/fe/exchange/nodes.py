@@ -98,7 +98,7 @@ def _lines(path: Path) -> Iterator[tuple[Path, int, str]]:
             text = line.strip()
             if not text or text.startswith("**"):
                 continue
-            if text.partition(",")[0].replace(" ", "").upper() == "*INCLUDE":
+            if text.partition(",")[0].strip().replace("*", "").upper() == "INCLUDE":
                 name = Path(text.split("=")[-1].strip())
                 yield from _lines(name if name.exists() else path.parent / name)
             else:
