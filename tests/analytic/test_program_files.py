@@ -203,7 +203,7 @@ def test_listings_of_abaqus_and_nastran_state_cycles(name: str, tmp_path: Path) 
     found, mass = programs.listed(tmp_path / name, "recipe")
     assert (found.tolist(), mass) == ([100.0, 200.0], None)
     (tmp_path / name).write_text(LISTINGS[name][:60])
-    with pytest.raises(InputError, match="no table of frequencies"):
+    with pytest.raises(InputError, match="no table of finite frequencies"):
         programs.listed(tmp_path / name, "recipe")
 
 
@@ -359,6 +359,8 @@ DAMAGED: dict[str, tuple[dict[str, str | bytes], str]] = {
     ),
     "axes of nodes": ({"block.inp": text("block.inp") + "*TRANSFORM, NSET=ALL\n1,0,0,0,1,0\n"}, r"line 28 .*TRANSFORM"),
     "an include of itself": ({"block.inp": "*INCLUDE, INPUT=block.inp\n"}, "in a circle"),
+    "no rows at all": ({"block.dof": ""}, "'block.dof'|there are 0 unknowns"),
+    "an empty matrix": ({"block.sti": ""}, "'block.sti'"),
     "a direction of heat": ({"block.dof": text("block.dof").replace("8.3", "8.0")}, "is no motion of a node"),
 }
 
@@ -382,6 +384,11 @@ OTHERS: dict[str, tuple[str, str, str]] = {
     "scalar points": ("block.pch", text("block.pch").replace("8               3", "8               0"), "of a node"),
     "cut output4": ("stiffness.op4", cut("stiffness.op4"), "before column 25"),
     "announced rows": ("mass.op4", text("mass.op4").replace("      24      24", "99999999 9999999", 1), "'mass.op4'"),
+    "a row before the first": (
+        "stiffness.op4",
+        text("stiffness.op4").replace("\n       1       1", "\n       1      -7", 1),
+        "row or column -7",
+    ),
     "binary output4": ("mass.op4", "\x18\x00\x00\x00" * 50, "'mass.op4'"),
 }
 
@@ -395,6 +402,15 @@ def test_damaged_files_of_nastran_are_refused_in_a_sentence(name: str, tmp_path:
     with pytest.raises(FlexclearError, match=words) as caught:
         kind.build(recipe(FORMS["punch" if file.endswith("pch") else "output4"](tmp_path)), tmp_path)
     assert len(str(caught.value)) < 400
+
+
+def test_the_reader_of_ansys_is_asked_for_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    (tmp_path / "a.full").write_bytes(b"")
+    with pytest.raises(InputError, match=r"ansys-mapdl-reader is not installed\n.*pip install 'flexclear\[fe\]'"):
+        programs.read(tmp_path / "a.full", "K", "recipe")
+    with pytest.raises(InputError, match=r"superelements are not read\n.*as \.full"):
+        programs.read((tmp_path / "a.full").rename(tmp_path / "a.sub"), "K", "recipe")
 
 
 @needs_ansys
