@@ -342,6 +342,7 @@ def cut(name: str) -> str:
 DAMAGED: dict[str, tuple[dict[str, str | bytes], str]] = {
     "cut in a line": ({"block.sti": text("block.sti")[:-35]}, "'block.sti'"),
     "cut after a line": ({"block.sti": "".join(text("block.sti").splitlines(True)[:-30])}, "no diagonal entry in row"),
+    "lines twice": ({"block.mas": text("block.mas") + text("block.mas").splitlines()[-1]}, r"column \d+ twice"),
     "cut list of rows": ({"block.dof": text("block.dof")[:40]}, "there are 10 unknowns"),
     "no number": ({"block.mas": text("block.mas").replace("1 1 ", "1 x ", 1)}, "'block.mas'"),
     "not a number": ({"block.mas": "1 1 nan\n" + text("block.mas")}, "entry 1 is nan"),

@@ -28,7 +28,12 @@ from flexclear.structure.sparse.multifrontal import cholesky
 from flexclear.system.errors import InputError, SolverError
 
 #: units of length [m], mass [kg] and time [s] of each consistent system
-SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
+SYSTEMS = {
+    "m-kg-s": (1.0, 1.0, 1.0),
+    "mm-t-s": (1e-3, 1e3, 1.0),
+    "mm-kg-ms": (1e-3, 1.0, 1e-3),
+    "in-slinch-s": (0.0254, 4.4482216152605 / 0.0254, 1.0),
+}
 #: mass per volume of the box around a body [kg/m^3], and rough speed of sound [m/s], between which it is of a material
 DENSITY = (1e-3, 1e6)
 SPEED = (20.0, 3e5)

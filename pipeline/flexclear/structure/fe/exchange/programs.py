@@ -80,12 +80,16 @@ class Entries:
         return place
 
     def _require_rows(self, row: np.ndarray, column: np.ndarray, count: int, where: str) -> None:
-        """Raise InputError for entries beyond the unknowns, and for rows without an entry of a file that was cut."""
+        """Raise InputError for entries beyond the unknowns or given twice, and for rows without a diagonal entry."""
         first, last = min(row.min(), column.min()), max(row.max(), column.max())
         if first < 0 or last >= count:
             wrong = first if first < 0 else last
             problem = f"'{self.name}' has an entry in row or column {wrong + 1}, but there are {count} unknowns"
             raise InputError(where, problem, "give the files of one model")
+        place, times = np.unique(row * count + column, return_counts=True)
+        if times.max() > 1:
+            i, j = np.divmod(place[times > 1][0], count)
+            raise InputError(where, f"'{self.name}' has the entry of row {i + 1}, column {j + 1} twice", AGAIN)
         empty = np.flatnonzero(np.bincount(row[row == column], minlength=count) == 0)
         if len(empty):
             problem = f"'{self.name}' has no diagonal entry in row {empty[0] + 1} of {count}"
