@@ -45,12 +45,13 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
         _require_same("frequency 1 of the free body", free[0], listed[0], "Hz")
     if np.isfinite(stated):
         _require_same("the mass", mass, stated, "kg")
+    six = inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
     lines = (
         f"matrices: symmetric to {mesh.attrs['asymmetry']:.1g}, both positive definite but for six rigid motions, "
         f"which strain to {strain(model.stiffness, model.rigid).max():.1g} of the largest term",
         f"mass {mass:.7g} kg" + (f" ({stated:.7g} kg in the program's file)" if np.isfinite(stated) else ""),
         f"centre of mass {_listed(centre)} m",
-        f"inertia about it, xx yy zz yz xz xy {_listed(inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])} kg m2",
+        f"inertia about it, xx yy zz yz xz xy {_listed(six)} kg m^2",
     )
     return data, {"imported": "\n".join(lines)}
 

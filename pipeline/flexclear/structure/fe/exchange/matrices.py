@@ -107,14 +107,14 @@ def _require_plausible(
     density = total / float(np.prod(sides)) if sides.all() else 0.0
     # the stiffness of a node against its neighbours is some E h, its mass some rho h^3
     spacing = (np.prod(sides) / len(np.unique(X, axis=0))) ** (1.0 / 3.0)
-    speed = float(spacing * np.sqrt(np.median(stiff[stiff > 0.0]) / np.median(heavy[heavy > 0.0])))
-    if _is_material(density, speed):
+    sound = float(spacing * np.sqrt(np.median(stiff[stiff > 0.0]) / np.median(heavy[heavy > 0.0])))
+    if _is_material(density, sound):
         return
     length, mass, time = SYSTEMS[units]
     for other, (l, m, t) in SYSTEMS.items():
         factors = (m / mass * (length / l) ** 3, l / length * time / t)
-        if _is_material(density * factors[0], speed * factors[1]):
-            problem = f"in {units} the body has some {density:.1g} kg/m3 and a speed of sound of {speed:.1g} m/s"
+        if _is_material(density * factors[0], sound * factors[1]):
+            problem = f"in {units} the body has some {density:.1g} kg/m3 and a speed of sound of {sound:.1g} m/s"
             raise InputError(where, problem, f'the files look as if units = "{other}"')
 
 
