@@ -296,13 +296,16 @@ GRIDS = (
     "GRID*".ljust(8) + "2".rjust(16) + " " * 16 + "1.000000D+01".rjust(16) + "0.".rjust(16),
     "*".ljust(8) + "-2.".rjust(16),
     "GRID,3,,4.,5.,6.",
+    "SET1,7,3,1",
+    "SET1".ljust(8) + "8".rjust(8) + "2".rjust(8) + "THRU".rjust(8) + "9".rjust(8),
 )
 
 
 def test_grids_are_read_in_all_three_forms(tmp_path: Path) -> None:
     (tmp_path / "m.bdf").write_text("\n".join(GRIDS))
-    found = nodes.read(tmp_path / "m.bdf", "deck").position
-    assert found == {1: (0.0, 0.0, 1.5e-3), 2: (10.0, 0.0, -2.0), 3: (4.0, 5.0, 6.0)}
+    found = nodes.read(tmp_path / "m.bdf", "deck")
+    assert {name: numbers.tolist() for name, numbers in found.sets.items()} == {"7": [1, 3], "8": [2, 3]}
+    assert found.position == {1: (0.0, 0.0, 1.5e-3), 2: (10.0, 0.0, -2.0), 3: (4.0, 5.0, 6.0)}
 
 
 @needs_ansys

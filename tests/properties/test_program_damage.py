@@ -31,6 +31,10 @@ DAMAGED: dict[str, tuple[dict[str, str | bytes], str]] = {
         {"block.inp": text("block.inp").replace("1, 4, 1", "1, 1000000000, 1").replace("START", "REST")},
         "unknown set of nodes 'START'",
     ),
+    "sets of themselves": (
+        {"block.inp": text("block.inp") + "*NSET, NSET=A\n1\n" + "A, A, A, A, A, A, A, A\n" * 1000 + "*TRANSFORM\n"},
+        "TRANSFORM",
+    ),
     "axes of nodes": ({"block.inp": text("block.inp") + "*TRANSFORM, NSET=ALL\n1,0,0,0,1,0\n"}, r"line 28 .*TRANSFORM"),
     "an include of itself": ({"block.inp": "*INCLUDE, INPUT=block.inp\n"}, "in a circle"),
     "no rows at all": ({"block.dof": ""}, "'block.dof'|there are 0 unknowns"),
