@@ -71,7 +71,13 @@ def faces(solid: xr.Dataset, table: files.Table) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    "units, length, mass, time", [("m-kg-s", 1.0, 1.0, 1.0), ("mm-t-s", 1e3, 1e-3, 1.0), ("mm-kg-ms", 1e3, 1.0, 1e3)]
+    "units, length, mass, time",
+    [
+        ("m-kg-s", 1.0, 1.0, 1.0),
+        ("mm-t-s", 1e3, 1e-3, 1.0),
+        ("mm-kg-ms", 1e3, 1.0, 1e3),
+        ("in-slinch-s", 1.0 / 0.0254, 0.0254 / 4.4482216152605, 1.0),
+    ],
 )
 def test_a_solid_comes_back_from_matrix_market_in_any_units(
     tmp_path: Path, solid: xr.Dataset, units: str, length: float, mass: float, time: float

@@ -201,6 +201,22 @@ def test_a_packed_matrix_is_not_read_beyond_what_its_header_says(tmp_path: Path)
             files.read(shape, tmp_path, "recipe")
 
 
+def test_a_matrix_that_announces_a_billion_rows_takes_no_memory_for_them(tmp_path: Path) -> None:
+    """Rows without entries would take 19 GB for a file of 80 bytes."""
+    (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix coordinate real symmetric\n{10**9} {10**9} 1\n1 1 1\n")
+    with refused("1 entries for 1000000000 rows"):
+        files._matrix(tmp_path / "k.mtx", "recipe")
+    (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix coordinate real general\n{10**9} {10**9} 1\n1 1 1\n")
+    (tmp_path / "u.csv").write_text("node,x,y,z,component\n1,0,0,0,ux\n")
+    named = {"stiffness": "k.mtx", "mass": "k.mtx", "unknowns": "u.csv"}
+    with refused("does not match the lines"):
+        files.read(Matrices(type="matrices", units="m-kg-s", **named), tmp_path, "recipe")
+    np.savez(tmp_path / "sound.npz", **SOUND)
+    shape = Matrices(type="matrices", units="m-kg-s", file="sound.npz", basis="k.mtx")
+    with refused("no basis of finite numbers for 6 unknowns"):
+        files.read(shape, tmp_path, "recipe")
+
+
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"s": [{"name": 1, "seconds": [NaN], "error": {}}]}', ""])
 def test_runs_of_other_programs_are_numbers(text: str, tmp_path: Path) -> None:
     (tmp_path / "p.json").write_text(text)

@@ -1,6 +1,8 @@
 """What README and the tutorial show can be done as it is there."""
 
 import re
+import shutil
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -48,3 +50,27 @@ def test_the_tutorials_scenes_and_python_run(root: Path, apart: Path) -> None:
     names: dict[str, Any] = {}
     exec(compile(quick, "tutorial.md", "exec"), names)
     assert set(names["tree"].children) >= {"run", "bundle"}
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX: apt-get install calculix-ccx")
+def test_the_bar_from_calculix_is_the_bar_there(root: Path, apart: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = root / "docs" / "exchange.md"
+    (code,), (deck,), (recipe, scene) = (blocks(page, language) for language in ("python", "inp", "toml"))
+    exec(compile(code, "exchange.md", "exec"), {})
+    for name, text in (("bar", deck), ("free", deck.replace(", SOLVER=MATRIXSTORAGE", ""))):
+        (apart / f"{name}.inp").write_text(text)
+        subprocess.run(["ccx", name], check=True, capture_output=True, timeout=300)
+    (apart / "bar.toml").write_text(recipe)
+    (apart / "swing.toml").write_text(scene)
+    assert main(["run", "-q", "swing.toml", "--to", "bundle"]) == 0
+    printed = capsys.readouterr().out
+    for line in re.findall(
+        r"^    (mass .*|centre .*|inertia .*|frequencies .*) \.\.\.$", page.read_text(), re.MULTILINE
+    ):
+        assert line in printed
+    assert main(["run", "-q", "swing.toml"]) == 0
+    capsys.readouterr()
+    wrong = recipe.replace('"mm-t-s"', '"m-kg-s"')
+    (apart / "bar.toml").write_text(wrong)
+    assert main(["run", "-q", "swing.toml", "--to", "bundle"]) == 2
+    assert 'units = "mm-t-s"' in capsys.readouterr().err

@@ -27,7 +27,7 @@ class Matrices(Part):
     """
 
     type: Literal["matrices"]
-    units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms"]
+    units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-slinch-s"]
     """consistent units of all numbers in the files, which do not state them"""
     file: str | None = None
     """one file with both matrices: npz, HDF5, DMIG in .pch, .op4, .full"""

@@ -3,6 +3,7 @@ the program states."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -44,14 +45,28 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
         _require_same("frequency 1 of the free body", free[0], listed[0], "Hz")
     if np.isfinite(stated):
         _require_same("the mass", mass, stated, "kg")
+    six = inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
     lines = (
         f"matrices: symmetric to {mesh.attrs['asymmetry']:.1g}, both positive definite but for six rigid motions, "
         f"which strain to {strain(model.stiffness, model.rigid).max():.1g} of the largest term",
         f"mass {mass:.7g} kg" + (f" ({stated:.7g} kg in the program's file)" if np.isfinite(stated) else ""),
         f"centre of mass {_listed(centre)} m",
-        f"inertia about it, xx yy zz yz xz xy {_listed(inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])} kg m2",
+        f"inertia about it, xx yy zz yz xz xy {_listed(six)} kg m^2",
     )
     return data, {"imported": "\n".join(lines)}
+
+
+def require_definite(mesh: xr.Dataset, flexibility: Callable[[], Flexibility]) -> None:
+    """Raise InputError for a stiffness matrix from another program with less than positive energy in elastic motion."""
+    if mesh.attrs.get("body_kind") != "matrices":
+        return
+    try:
+        flexibility()
+    except InputError:
+        problem = "the stiffness matrix has motions of no or negative energy besides the six rigid ones"
+        raise InputError(
+            WHERE, problem, "write the stiffness of the whole unloaded body; parts must share faces"
+        ) from None
 
 
 def rigid_properties(model: Model) -> tuple[float, np.ndarray, np.ndarray]:
@@ -83,4 +98,5 @@ def _require_same(what: str, found: float, stated: float, unit: str) -> None:
 
 
 def _listed(values: np.ndarray) -> str:
-    return " ".join(f"{value:.6g}" for value in values)
+    rounding = 1e-12 * np.abs(values).max()
+    return " ".join(f"{value if abs(value) > rounding else 0.0:.6g}" for value in values)

@@ -57,6 +57,7 @@ def solve(
     def flexibility() -> Flexibility:
         return support(model, lambda fraction: progress(fraction, f"factorising {model.size} coordinates"))
 
+    imported.require_definite(mesh, flexibility)
     body = basis.Body(model, condition, given.interfaces, flexibility, progress)
     shapes, rigid_frequency = basis.build(body, requested or ModeRequest(count=count))
     values, vectors = eigen.rediagonalise(model.stiffness, model.mass, shapes)

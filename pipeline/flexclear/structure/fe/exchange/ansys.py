@@ -6,6 +6,7 @@ import importlib.util
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,10 @@ np.savez(target, **data)
 
 def arrays(path: Path, where: str) -> dict[str, np.ndarray]:
     """Return the arrays that SCRIPT writes of a `.full` or `.cdb` file; raise InputError without the reader."""
-    if importlib.util.find_spec("ansys") is None or importlib.util.find_spec("ansys.mapdl.reader") is None:
+    reader = None
+    with suppress(ModuleNotFoundError):  # of a package above it
+        reader = importlib.util.find_spec("ansys.mapdl.reader")
+    if reader is None:
         problem = f"'{path.name}' is a file of Ansys, whose reader ansys-mapdl-reader is not installed"
         raise InputError(where, problem, "pip install 'flexclear[fe]'")
     with tempfile.TemporaryDirectory() as folder:

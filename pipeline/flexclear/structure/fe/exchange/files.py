@@ -132,11 +132,11 @@ def read(shape: Matrices, folder: Path, where: str) -> Contents:
     contents = replace(contents, sets=known.sets)
     if shape.basis is None:
         return contents
-    basis = _matrix(folder / shape.basis, where).toarray()
-    if len(basis) != len(contents.table.node) or not np.isfinite(basis).all():
-        problem = f"'{shape.basis}' is no basis: {len(basis)} rows of numbers for {len(contents.table.node)} unknowns"
-        raise InputError(where, problem, "write its rows in the order of the unknowns, each finite")
-    return replace(contents, basis=basis)
+    basis, n = _matrix(folder / shape.basis, where), len(contents.table.node)
+    if basis.shape[0] != n or basis.shape[1] > n or not np.isfinite(basis.data).all():
+        problem = f"'{shape.basis}' with the shape {basis.shape} is no basis of finite numbers for {n} unknowns"
+        raise InputError(where, problem, "write a column per shape, its rows in the order of the unknowns")
+    return replace(contents, basis=basis.toarray())
 
 
 def _entries(path: Path, letter: str, where: str) -> Entries:
@@ -253,6 +253,8 @@ def _sparse(held: np.ndarray, rows: int, columns: int, count: int, symmetric: bo
     """Return the matrix with these lines of row, column and value; symmetric files hold one triangle."""
     if len(held) != count or (count and held.shape[1] != 3):
         raise ValueError(f"it holds {len(held)} entries where its header says {count}")
+    if symmetric and count < rows:
+        raise ValueError(f"its header says {count} entries for {rows} rows, so that some are empty")
     index = held[:, :2].T - 1
     if not ((index >= 0) & (index < np.array([[rows], [columns]])) & (index == np.floor(index))).all():
         raise ValueError(f"an entry lies outside of its {rows} x {columns}")

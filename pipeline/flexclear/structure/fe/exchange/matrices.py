@@ -28,7 +28,12 @@ from flexclear.structure.sparse.multifrontal import cholesky
 from flexclear.system.errors import InputError, SolverError
 
 #: units of length [m], mass [kg] and time [s] of each consistent system
-SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
+SYSTEMS = {
+    "m-kg-s": (1.0, 1.0, 1.0),
+    "mm-t-s": (1e-3, 1e3, 1.0),
+    "mm-kg-ms": (1e-3, 1.0, 1e-3),
+    "in-slinch-s": (0.0254, 4.4482216152605 / 0.0254, 1.0),
+}
 #: mass per volume of the box around a body [kg/m^3], and rough speed of sound [m/s], between which it is of a material
 DENSITY = (1e-3, 1e6)
 SPEED = (20.0, 3e5)
@@ -102,14 +107,14 @@ def _require_plausible(
     density = total / float(np.prod(sides)) if sides.all() else 0.0
     # the stiffness of a node against its neighbours is some E h, its mass some rho h^3
     spacing = (np.prod(sides) / len(np.unique(X, axis=0))) ** (1.0 / 3.0)
-    speed = float(spacing * np.sqrt(np.median(stiff[stiff > 0.0]) / np.median(heavy[heavy > 0.0])))
-    if _is_material(density, speed):
+    sound = float(spacing * np.sqrt(np.median(stiff[stiff > 0.0]) / np.median(heavy[heavy > 0.0])))
+    if _is_material(density, sound):
         return
     length, mass, time = SYSTEMS[units]
     for other, (l, m, t) in SYSTEMS.items():
         factors = (m / mass * (length / l) ** 3, l / length * time / t)
-        if _is_material(density * factors[0], speed * factors[1]):
-            problem = f"in {units} the body has some {density:.1g} kg/m3 and a speed of sound of {speed:.1g} m/s"
+        if _is_material(density * factors[0], sound * factors[1]):
+            problem = f"in {units} the body has some {density:.1g} kg/m3 and a speed of sound of {sound:.1g} m/s"
             raise InputError(where, problem, f'the files look as if units = "{other}"')
 
 

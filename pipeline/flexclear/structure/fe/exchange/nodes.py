@@ -23,7 +23,7 @@ REFUSED = ("NGEN", "NFILL", "NCOPY", "NMAP", "SYSTEM", "TRANSFORM", "EXPAND")
 #: a number of Nastran without the letter of its exponent
 BARE = re.compile(r"([\d.])([+-]\d+)$")
 AGAIN = "the file was cut or damaged: write it again"
-CARDS = ("GRID", "GRDSET", "DMIG", "INCLUDE")
+CARDS = ("GRID", "GRDSET", "SET1", "DMIG", "INCLUDE")
 
 
 @dataclass
@@ -56,7 +56,7 @@ def read(path: Path, where: str) -> Nodes:
 
 def _of_keywords(path: Path, where: str) -> Nodes:
     nodes, keyword = Nodes(), ""
-    chosen: dict[str, list[int]] = {}
+    chosen: dict[str, set[int]] = {}
     options: dict[str, str] = {}
     instances = 0
     for file, number, line in _lines(path):
@@ -79,15 +79,15 @@ def _of_keywords(path: Path, where: str) -> Nodes:
                     refuse(file, number, where, f"node {label} is defined twice", "write each node once")
                 nodes.position[label] = (*position, 0.0, 0.0)[:3]
                 if "NSET" in options:
-                    chosen.setdefault(options["NSET"], []).append(label)
+                    chosen.setdefault(options["NSET"], set()).add(label)
             elif keyword == "NSET":
                 if "GENERATE" in options:
                     first, last, step = (*map(int, parts), 1)[:3]
                     parts = [str(n) for n in nodes.position if first <= n <= last and (n - first) % max(step, 1) == 0]
                 for part in filter(None, parts):
                     known = chosen.get(part.upper())
-                    chosen.setdefault(options["NSET"], []).extend([int(part)] if known is None else known)
-    nodes.sets = {name: np.unique(numbers) for name, numbers in chosen.items()}
+                    chosen.setdefault(options["NSET"], set()).update([int(part)] if known is None else known)
+    nodes.sets = {name: np.array(sorted(numbers), dtype=np.int64) for name, numbers in chosen.items()}
     return nodes
 
 
@@ -98,7 +98,7 @@ def _lines(path: Path) -> Iterator[tuple[Path, int, str]]:
             text = line.strip()
             if not text or text.startswith("**"):
                 continue
-            if text.partition(",")[0].replace(" ", "").upper() == "*INCLUDE":
+            if text.partition(",")[0].strip().replace("*", "").upper() == "INCLUDE":
                 name = Path(text.split("=")[-1].strip())
                 yield from _lines(name if name.exists() else path.parent / name)
             else:
@@ -107,6 +107,7 @@ def _lines(path: Path) -> Iterator[tuple[Path, int, str]]:
 
 def _of_cards(path: Path, where: str) -> Nodes:
     nodes = Nodes()
+    sets: list[tuple[str, list[int], range]] = []
     for number, name, values in cards(path):
         if name == "INCLUDE":
             refuse(path, number, where, "INCLUDE is not followed", "write the deck as one file")
@@ -118,6 +119,17 @@ def _of_cards(path: Path, where: str) -> Nodes:
         if name == "GRID":
             with record(path, number, where):
                 nodes.position[int(values[0])] = tuple(real(value) for value in values[2:5])
+        if name == "SET1":
+            with record(path, number, where):
+                label, *members = [value.upper() for value in values if value]
+                if "THRU" in members:
+                    first, _, last = members
+                    sets.append((label, [], range(int(first), int(last) + 1)))
+                else:
+                    sets.append((label, [int(node) for node in members], range(0)))
+    for label, numbers, interval in sets:  # nodes may come after the sets of them
+        inside = (node for node in nodes.position if node in interval)
+        nodes.sets[label] = np.array(sorted({*numbers, *inside}), dtype=np.int64)
     return nodes
 
 

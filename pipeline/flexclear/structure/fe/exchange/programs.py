@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,9 +61,8 @@ class Entries:
         if self.shape is None:
             self._require_rows(row, column, count, where)
         elif self.shape != (count, count):
-            raise InputError(
-                where, f"'{self.name}' has the shape {self.shape}, which does not match the lines of `unknowns`"
-            )
+            problem = f"'{self.name}' has the shape {self.shape}, which does not match the lines of `unknowns`"
+            raise InputError(where, problem)
         matrix = sp.coo_array((self.value, (row, column)), shape=(count, count))
         lower, upper = sp.tril(matrix, -1), sp.triu(matrix, 1)
         both = self.shape is not None or (lower.nnz and upper.nnz)
@@ -75,24 +75,25 @@ class Entries:
         place = order[np.searchsorted(keys, part, sorter=order).clip(max=len(keys) - 1)]
         lacking = np.flatnonzero(keys[place] != part)
         if len(lacking):
-            node = part[lacking[0]] // KEY
-            raise InputError(
-                where, f"node {node} of '{self.name}' lacks a row in `unknowns`", "give the files of one model"
-            )
+            problem = f"node {part[lacking[0]] // KEY} of '{self.name}' lacks a row in `unknowns`"
+            raise InputError(where, problem, "give the files of one model")
         return place
 
     def _require_rows(self, row: np.ndarray, column: np.ndarray, count: int, where: str) -> None:
-        """Raise InputError for entries beyond the unknowns, and for rows without an entry of a file that was cut."""
-        last = int(max(row.max(), column.max()))
-        if last >= count:
-            problem = f"'{self.name}' has an entry in row or column {last + 1}, but there are {count} unknowns"
+        """Raise InputError for entries beyond the unknowns or given twice, and for rows without a diagonal entry."""
+        first, last = min(row.min(), column.min()), max(row.max(), column.max())
+        if first < 0 or last >= count:
+            wrong = first if first < 0 else last
+            problem = f"'{self.name}' has an entry in row or column {wrong + 1}, but there are {count} unknowns"
             raise InputError(where, problem, "give the files of one model")
+        place, times = np.unique(row * count + column, return_counts=True)
+        if times.max() > 1:
+            i, j = np.divmod(place[times > 1][0], count)
+            raise InputError(where, f"'{self.name}' has the entry of row {i + 1}, column {j + 1} twice", AGAIN)
         empty = np.flatnonzero(np.bincount(row[row == column], minlength=count) == 0)
         if len(empty):
             problem = f"'{self.name}' has no diagonal entry in row {empty[0] + 1} of {count}"
-            raise InputError(
-                where, problem, "the file was cut, or that unknown has no stiffness or mass: write it again"
-            )
+            raise InputError(where, problem, "write it again: it was cut, or that unknown has no stiffness or mass")
 
 
 def read(path: Path, letter: str, where: str) -> Entries:
@@ -144,10 +145,8 @@ def key(node: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return keys of nodes and directions 1 to 6; raise ValueError for others."""
     wrong = np.flatnonzero((direction < 1) | (direction > 6))
     if len(wrong):
-        problem = (
-            f"row {wrong[0] + 1}, direction {direction[wrong[0]]} of node {node[wrong[0]]}, is no motion of a node"
-        )
-        raise ValueError(f"{problem}: give full matrices, which have no generalised coordinates")
+        which = f"row {wrong[0] + 1}, direction {direction[wrong[0]]} of node {node[wrong[0]]}"
+        raise ValueError(f"{which}, is no motion of a node; full matrices have no generalised coordinates")
     return KEY * node + direction - 1
 
 
@@ -187,7 +186,7 @@ def _output4(path: Path, letter: str, where: str) -> Entries:
     found: dict[str, tuple[list[int], list[int], list[float]]] = {}
     with path.open(encoding="ascii") as opened:
         file = enumerate(opened, 1)
-        for _, line in file:
+        for _, line in filter(lambda numbered: numbered[1].strip(), file):
             header = re.match(r"\s*(\d+)\s*(-?\d+)\s*\d\s+(\d)\s*(\w+)\s*\S*?\d+[ED](\d+)\.", line)
             if header is None:
                 raise ValueError("it has no header of OUTPUT4 in text; write it FORMATTED")
@@ -269,14 +268,9 @@ def listed(path: Path, where: str) -> tuple[np.ndarray, float | None]:
                 column = 0
             waiting = waiting or TOTAL.search(line) is not None
             if waiting and mass is None and words:
-                mass = _real(words[0])
-    if not frequency:
-        raise InputError(where, f"'{path.name}' has no table of frequencies", "name the listing of a modal analysis")
+                with suppress(ValueError):
+                    mass = float(words[0])
+    if not frequency or not np.isfinite([*frequency, mass or 0.0]).all():
+        problem = f"'{path.name}' has no table of finite frequencies"
+        raise InputError(where, problem, "name the listing of a modal analysis")
     return np.array(frequency), mass
-
-
-def _real(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
