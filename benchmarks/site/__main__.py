@@ -24,6 +24,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "index.md": readme,
     "reference/python.md": reference.python,
     "datasets.md": reference.datasets,
+    "datasets/structure.csv": reference.structure,
     "reference/quantities.md": reference.quantities,
     **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
 }
