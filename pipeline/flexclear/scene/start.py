@@ -79,8 +79,8 @@ class Start(Part):
     branch: Annotated[
         tuple[Branch, ...], BeforeValidator(_several, json_schema_input_type=Branch | tuple[Branch, ...])
     ] = ()
-    """in a change point, the branch that the motion takes; with several loops a list, each entry chooses among the branches
-    that are left"""
+    """in a change point, the branch that the motion takes; with several loops a list, each entry chooses among the
+    branches that are left"""
 
     #: True where an equilibrium is searched for from here, so that free coordinates need no start of their own
     _sought: bool = PrivateAttr(default=False)
