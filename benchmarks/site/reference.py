@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterable
 
 import flexclear as fc
@@ -46,6 +47,10 @@ STRUCTURE_HEAD = """## Mesh, modes, reduced body
 `mesh/<body>.nc`, `modes/<body>.nc` and `bundle/<body>.nc`. [All of their variables](datasets/structure.csv) have
 dimensions, units and meanings there, and as attributes of their own: `print(bundle["first_moment"])`.
 
+## Coordinates
+
+The same names mean the same in all datasets. Other dimensions have names, or numbers from 0, of their entries.
+
 """
 DATASETS_HEAD = """# Datasets
 
@@ -80,8 +85,7 @@ def datasets() -> str:
             f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_repeated(own, known)}{_table(own, known)}\n\n"
         )
         known = {**own, **known}
-    parts.append(STRUCTURE_HEAD)
-    parts.append(f"## Coordinates\n\nThe same names mean the same in all datasets.\n\n{_coordinates()}\n")
+    parts.append(f"{STRUCTURE_HEAD}{_coordinates()}\n")
     return "".join(parts)
 
 
@@ -121,9 +125,12 @@ def structure() -> str:
 
 
 def _coordinates() -> str:
+    """Return the coordinates, without those that are but names or numbers of the entries of their dimension."""
+    plain = re.compile(r"(name|number) of the [\w-]+(, from 0)?")
     return _lines(
         f"- `{name}`{'' if v.dims == (name,) else f' ({_dims(v)})'}{_units(v)}: {v.long_name}"
         for name, v in COORDINATES.items()
+        if not (v.dims == (name,) and plain.fullmatch(v.long_name))
     )
 
 
