@@ -14,8 +14,8 @@ from flexclear.artifacts.paths import PROJECT
 
 
 def readme() -> str:
-    """Return the README as first page, with links relative to docs/."""
-    page = (PROJECT / "README.md").read_text(encoding="utf-8")
+    """Return the README as first page, with links relative to docs/, without the list that the site's menu has."""
+    page = (PROJECT / "README.md").read_text(encoding="utf-8").partition("## Read on\n")[0].rstrip() + "\n"
     return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)
 
 
