@@ -50,7 +50,10 @@ def show(records: list[Record]) -> str:
         mine = [r for r in records if r["case"] == scene]
         tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r and _shown(r["table"]))
         pictures = {r["picture"]: r["path"] for r in mine if "picture" in r}
-        found.append(Studied(scene, next(r["advice"] for r in mine if "advice" in r), tables, pictures))
+        advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(
+            " To refine"
+        )  # as the table of causes
+        found.append(Studied(scene, advice, tables, pictures))
     return sections(tuple(found))
 
 

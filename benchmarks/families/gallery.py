@@ -348,10 +348,10 @@ def show(records: list[Record]) -> str:
     parts = []
     for record in records:
         name = record["case"]
-        picture = f"![{record['title']}](gallery/{name}.png)\n\n" if (PICTURES / f"{name}.png").is_file() else ""
+        picture = f"![{name}](gallery/{name}.png)\n\n" if (PICTURES / f"{name}.png").is_file() else ""
         parts.append(
             f"## {record['title']}\n\n{picture}*{record['question']}* {record['answer']}\n\n"
-            f"`scenes/{record['scene']}.toml`: {record['parts']}; one run takes {record['seconds']:.2g} s.\n"
+            f"`scenes/{record['scene']}.toml`; one run takes {record['seconds']:.2g} s.\n"
         )
     return "\n".join(parts)
 

@@ -14,8 +14,8 @@ from flexclear.artifacts.paths import PROJECT
 
 
 def readme() -> str:
-    """Return the README as first page, with links relative to docs/."""
-    page = (PROJECT / "README.md").read_text(encoding="utf-8")
+    """Return the README as first page, with links relative to docs/, without the list that the site's menu has."""
+    page = (PROJECT / "README.md").read_text(encoding="utf-8").partition("## Read on\n")[0].rstrip() + "\n"
     return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)
 
 
@@ -24,6 +24,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "index.md": readme,
     "reference/python.md": reference.python,
     "datasets.md": reference.datasets,
+    "datasets/structure.csv": reference.structure,
     "reference/quantities.md": reference.quantities,
     **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterable
 
 import flexclear as fc
@@ -10,6 +11,7 @@ from benchmarks.page import DOCS
 from flexclear.artifacts import schema as artifacts
 from flexclear.artifacts.coordinates import COORDINATES
 from flexclear.artifacts.schema import Schema
+from flexclear.post.plotting.table import Table, as_csv
 from flexclear.post.sections.verdict import VERDICT
 from flexclear.post.single_run.schema import POST
 from flexclear.scene.output import Variable
@@ -30,6 +32,9 @@ DATASETS: dict[str, tuple[str, Schema]] = {
     "Campbell diagram": ("from `flexclear frequencies --speeds`", artifacts.CAMPBELL),
     "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
     "Verdict": ("from `flexclear sections`", VERDICT),
+}
+#: datasets of stages 1 to 3, whose variables are in a file of their own
+STRUCTURE: dict[str, tuple[str, Schema]] = {
     "Reduced body": ("`bundle/<body>.nc`", artifacts.BUNDLE),
     "Modes": ("`modes/<body>.nc`", artifacts.MODES),
     "Mesh of a beam": ("`mesh/<body>.nc`", artifacts.MESH),
@@ -37,6 +42,16 @@ DATASETS: dict[str, tuple[str, Schema]] = {
     "Matrices of another program": ("`mesh/<body>.nc`", artifacts.MATRICES),
     "Rigid body of a mesh": ("kept in the cache alone, for bodies of the type rigid with a mesh", artifacts.RIGID),
 }
+STRUCTURE_HEAD = """## Mesh, modes, reduced body
+
+`mesh/<body>.nc`, `modes/<body>.nc` and `bundle/<body>.nc`. [All of their variables](datasets/structure.csv) have
+dimensions, units and meanings there, and as attributes of their own: `print(bundle["first_moment"])`.
+
+## Coordinates
+
+The same names mean the same in all datasets. Other dimensions have names, or numbers from 0, of their entries.
+
+"""
 DATASETS_HEAD = """# Datasets
 
 Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Values are selected by the
@@ -70,7 +85,7 @@ def datasets() -> str:
             f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_repeated(own, known)}{_table(own, known)}\n\n"
         )
         known = {**own, **known}
-    parts.append(f"## Coordinates\n\nThe same names mean the same in all datasets.\n\n{_coordinates()}\n")
+    parts.append(f"{STRUCTURE_HEAD}{_coordinates()}\n")
     return "".join(parts)
 
 
@@ -98,10 +113,24 @@ def _table(schema: Schema, known: Schema) -> str:
     return _lines(rows)
 
 
+def structure() -> str:
+    """Return docs/datasets/structure.csv: every variable of meshes, modes and reduced bodies."""
+    heads = ("dataset", "file", "variable", "optional", "dimensions", "unit", "unit where it turns", "meaning")
+    rows = tuple(
+        (heading, where.replace("`", ""), name, "yes" if v.optional else "", _dims(v), v.units, v.turning, v.long_name)
+        for heading, (where, schema) in STRUCTURE.items()
+        for name, v in schema.items()
+    )
+    return as_csv(Table("", heads, rows))
+
+
 def _coordinates() -> str:
+    """Return the coordinates, without those that are but names or numbers of the entries of their dimension."""
+    plain = re.compile(r"(name|number) of the [\w-]+(, from 0)?")
     return _lines(
         f"- `{name}`{'' if v.dims == (name,) else f' ({_dims(v)})'}{_units(v)}: {v.long_name}"
         for name, v in COORDINATES.items()
+        if not (v.dims == (name,) and plain.fullmatch(v.long_name))
     )
 
 

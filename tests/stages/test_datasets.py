@@ -39,9 +39,12 @@ def is_udunits(text: str) -> bool:
     return text == "1" or all(token is not None and token[1] in SYMBOLS for token in tokens)
 
 
-@pytest.mark.parametrize("name", [*datasets.DATASETS, "coordinates"])
+SCHEMAS = {**datasets.DATASETS, **datasets.STRUCTURE, "coordinates": ("", COORDINATES)}
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
 def test_every_unit_is_one_that_udunits_reads(name: str) -> None:
-    schema = COORDINATES if name == "coordinates" else datasets.DATASETS[name][1]
+    _, schema = SCHEMAS[name]
     units = {unit for v in schema.values() for unit in (v.units, v.turning) if unit}
     assert {unit for unit in units if not is_udunits(unit)} == set()
 

@@ -231,11 +231,10 @@ class _Contact(Part):
     friction: Friction | None = None
     """law of friction; default: no friction"""
     floor: Annotated[Speed, Positive] | None = None
-    """least approach speed used as the impact rate of a closing [m/s]; keeps the law regular for grazing and resting
-    contact. Default: 1e-5 of the size of the mechanism per second, at most 1e-6 m/s"""
+    """least impact rate of a closing, for grazing and resting contact; default: 1e-5 of the mechanism's size per
+    second, at most 1e-6 m/s"""
     initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
-    """impact rate of a contact that exists at the start, 0 for a resting one; without this key a start in contact is
-    refused"""
+    """impact rate of a contact that exists at the start, which is refused otherwise; 0 for a resting one"""
 
     #: names of the outer and the inner surface in keys
     surfaces: ClassVar[tuple[str, str]]

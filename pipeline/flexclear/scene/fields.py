@@ -214,8 +214,7 @@ class Pose(Part):
     """two of the frame's axes as directions in the parent, e.g. ``{ z = [0, 1, 2], x = [1, 0, 0] }``; the first is
     exact, the second is made perpendicular to it. Or all three, as a list [x, y, z]"""
     axis: Direction | None = None
-    """direction of z alone, where x and y do not matter: the frame is rotated from its parent by the least rotation
-    that brings z there (for the parent's -z, by half a turn about x)"""
+    """direction of z alone, by the least rotation from the parent that brings z there (for -z, half a turn about x)"""
 
     @model_validator(mode="after")
     def _one_orientation(self) -> Self:

@@ -31,8 +31,7 @@ class Limits(Part):
     """Largest resources of the work, which are estimated first; a larger request is refused at once (exit code 4)."""
 
     time: Annotated[Time, Field(gt=0.0)] | None = None
-    """wall time of each run, ensemble or study of sections; partial results are stored at the limit, and ensembles and
-    sections can continue from them"""
+    """wall time of each run, ensemble or study of sections; partial results are stored at the limit"""
     memory: Bytes | None = None
     """default: four fifths of what is free"""
     disk: Bytes | None = None

@@ -127,7 +127,7 @@ class PointForce(Part):
     force: Components
     """components x, y, z [N]"""
     axes: Literal["world", "frame"] = "world"
-    """axes of the components: those of the world, or those of the frame, with which the force then rotates"""
+    """axes of the components; those of the frame rotate with it"""
 
 
 class PointTorque(Part):
@@ -138,7 +138,7 @@ class PointTorque(Part):
     torque: Components
     """components x, y, z [N m]"""
     axes: Literal["world", "frame"] = "world"
-    """axes of the components: those of the world, or those of the frame, with which the torque then rotates"""
+    """axes of the components; those of the frame rotate with it"""
 
 
 class SpringDamper(Part):
@@ -218,7 +218,7 @@ class PointExpression(_ByExpression):
     force: str | tuple[str, str, str]
     """components x, y, z, or one vector"""
     axes: Literal["world", "frame"] = "world"
-    """axes of the components: those of the world, or those of the frame, with which the force then rotates"""
+    """axes of the components; those of the frame rotate with it"""
 
 
 class JointSpring(OnCoordinate):
@@ -275,8 +275,8 @@ class Bushing(Part):
     between: tuple[FrameName, FrameName]
     """the frame of the mount, and the frame that it carries"""
     symmetric: bool = True
-    """false allows any 6x6 matrices, as cross-coupled bearings and seals have them: the skew-symmetric part of the
-    stiffness then supplies or takes energy on closed paths, which is booked as work of the load"""
+    """false allows any 6x6 matrices, as of cross-coupled bearings and seals; the work of the skew-symmetric part of the
+    stiffness is work of the load"""
     stiffness: BushingStiffness = NOTHING
     """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix; any with `symmetric = false`"""
     damping: BushingDamping = NOTHING

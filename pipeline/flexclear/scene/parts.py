@@ -140,8 +140,8 @@ class RigidBody(Moving):
     frames: dict[PartName, Pose] = Field(default_factory=dict)
     """named points with axes on the body, in the body frame"""
     frame_tolerance: Annotated[Length, Field(ge=0.0)] = 0.0
-    """distance by which the body's frames may be moved so that the joints fit, where they nearly do; for bodies from a
-    mesh a thousandth of the distance of their frames, since the nodes of a hole determine its centre no better"""
+    """distance by which the body's frames may be moved so that the joints fit; for bodies from a mesh a thousandth of
+    the distance of their frames"""
 
 
 def _hertz(value: Any) -> float:

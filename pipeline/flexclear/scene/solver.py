@@ -21,11 +21,10 @@ class Solver(Part):
     integrator: Annotated[str, WithJsonSchema({"type": "string", "enum": list(INTEGRATORS)})] = DEFAULT
     """name of the integrator, as docs/integrators.md lists them"""
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
-    """relative tolerance of steps where their length is chosen, and always of loop closures and Newton iterations"""
+    """relative tolerance of adaptive steps, and always of loop closures and Newton iterations"""
     ledger_tolerance: Annotated[Number, Field(gt=0.0)] | None = None
-    """largest energy error of a run, as a fraction of the energy that it turns over; default 1e5 rtol, but from 1e-4 to
-    1e-3, where the error chooses the steps (1e-3 of methods that damp by their order: that of generalized-alpha is
-    2), and 0.1 for fixed steps"""
+    """largest energy error of a run, as a fraction of the energy exchanged; default 1e5 rtol, from 1e-4 to 1e-3 (1e-3
+    of generalized-alpha), and 0.1 for fixed steps"""
     evaluations: Annotated[int, Field(gt=0, le=10**15)] = 50_000_000
     """largest number of right-hand sides of one run"""
     step: Annotated[Time, Field(gt=0.0)] | None = None
@@ -33,9 +32,8 @@ class Solver(Part):
     events: Literal["located", "at step ends"] = "located"
     """where contacts begin and end: at located times, or, for fixed steps only, ``at step ends``"""
     by_need: bool | Literal["integrator"] | None = None
-    """whether an expensive run gets another integrator and tolerance, or the integrator only, where the scene has no
-    `[accuracy]`; default: true if `[solver]` gives none of integrator, step and rtol, "integrator" if it gives rtol
-    only"""
+    """whether an expensive run without `[accuracy]` gets another integrator and tolerance, or the integrator only;
+    default: true if `[solver]` gives none of integrator, step and rtol, "integrator" if it gives rtol only"""
     rho_inf: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
     """spectral radius at infinite frequency, for generalized-alpha only; 1 damps nothing; default 0.8"""
 

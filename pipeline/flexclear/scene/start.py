@@ -20,8 +20,7 @@ class JointStart(Part):
     position: Measure | None = None
     """exact value at the start"""
     near: Measure | None = None
-    """approximate value at the start, which selects the nearest of several ways to assemble the mechanism; without the
-    poses of bodies the assembly is also searched for from this value"""
+    """approximate value at the start, which selects among several assemblies"""
     velocity: Measure | None = None
     """rate at the start"""
 
@@ -58,8 +57,7 @@ class Branch(OnCoordinate):
     """One way out of a change point: that on which this joint coordinate changes most in the direction of `sign`."""
 
     sign: Literal[1, -1]
-    """1 for the branch on which the coordinate grows most, or falls least; -1 for that on which it falls most, or grows
-    least"""
+    """1 for the branch on which the coordinate grows most; -1 for that on which it falls most"""
 
 
 def _several(value: Any) -> Any:
@@ -71,10 +69,9 @@ class Start(Part):
     """The start of the run."""
 
     at: At | None = None
-    """"equilibrium", the static equilibrium with the drives where their laws start, and the joint coordinates whose
-    `position` is given held there; or "ideal", where the mechanism without clearance would start, each loose pin
-    resting in its socket on the side to which the joint's force presses it, flexible bodies deformed as the loads of
-    that moment hold them"""
+    """"equilibrium", the static one with drives where their laws start and given joint positions held; or "ideal",
+    the start of the mechanism without clearance, each loose pin resting where the joint's force presses it, flexible
+    bodies deformed by the loads"""
     joint: dict[PartName, JointStarts] = Field(default_factory=dict)
     """starts of joints, by name; for joints with several coordinates by the coordinate's name below"""
     modal: dict[PartName, ModalStart] = Field(default_factory=dict)
@@ -82,8 +79,8 @@ class Start(Part):
     branch: Annotated[
         tuple[Branch, ...], BeforeValidator(_several, json_schema_input_type=Branch | tuple[Branch, ...])
     ] = ()
-    """in a change point, the branch that the motion takes among those that cross there; with several loops a list, each
-    entry chooses among the branches that remain after those before it"""
+    """in a change point, the branch that the motion takes; with several loops a list, each entry chooses among the
+    branches that are left"""
 
     #: True where an equilibrium is searched for from here, so that free coordinates need no start of their own
     _sought: bool = PrivateAttr(default=False)
