@@ -70,8 +70,8 @@ def _value(path: str, value: object, dimension: str) -> float | None:
 def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coordinate") -> dict[str, np.ndarray]:
     """Return modal coordinates [m], or with key "velocity" modal velocities [m/s], by body; (mode,) each.
 
-    Bodies whose modes are not known have none.  Raises InputError for bodies that are not flexible, and for more numbers
-    than modes.
+    Bodies whose modes are not known have none.  Raises InputError for bodies that are not flexible, and for more
+    numbers than modes.
     """
     given = scene.start.modal if scene.start is not None else {}
     for name in given.keys() - scene.flexible().keys():
