@@ -182,16 +182,34 @@ def test_what_is_possible_but_hardly_meant_is_a_warning(
     assert f"warning: {tmp_path / 'own.toml'} {warning}" in command("check", tmp_path / "own.toml").err
 
 
-def test_a_load_on_a_flexible_body_that_is_clamped_to_the_ground_is_no_error(tmp_path: Path, command: Command) -> None:
+def test_sections_that_the_run_does_not_contain_are_an_error(tmp_path: Path, command: Command) -> None:
+    (tmp_path / "own.toml").write_text(text := LOOSE + '[sections]\nperiod = "20 ms"\n')
+    line = text.count("\n")
+    said = command("check", tmp_path / "own.toml", code=2).err
+    assert f"[sections.period], line {line}: a period of 0.02 s is longer than the run" in said
+
+
+@pytest.mark.parametrize(
+    "start, error",
+    [
+        ('start.at = "equilibrium"\n', ""),
+        ("start.modal.rod.coordinate = [1e-6]\n", ""),
+        ("start.modal.rot.coordinate = [1e-6]\n", "[start.modal.rot], line 3: there is no flexible body 'rot'"),
+    ],
+)
+def test_a_loaded_flexible_body_on_the_ground_may_start_in_balance_or_bent(
+    start: str, error: str, tmp_path: Path, command: Command
+) -> None:
     recipe = Path(__file__).parents[2] / "meshes" / "actuated_rod.toml"
     end = list(tomllib.loads(recipe.read_text())["frames"])
     (tmp_path / "own.toml").write_text(
-        'title = "Cantilever"\ntime.end = 1\nstart.at = "equilibrium"\n[body.ground]\ntype = "ground"\nframes.O = {}\n'
+        f'title = "Cantilever"\ntime.end = 1\n{start}[body.ground]\ntype = "ground"\nframes.O = {{}}\n'
         f'[body.rod]\ntype = "flexible"\nmesh = "{recipe}"\nmodes = {{ reference = "craig-bampton", count = 13 }}\n'
         f'[joint.wall]\ntype = "fixed"\nbetween = ["ground.O", "rod.{end[0]}"]\n'
         f'[load.tip]\ntype = "point-force"\nframe = "rod.{end[-1]}"\nforce = [0, 0, -1]\n'
     )
-    assert "no error" in command("check", tmp_path / "own.toml").out
+    done = command("check", tmp_path / "own.toml", code=2 if error else 0)
+    assert error in done.err if error else "no error" in done.out
 
 
 @pytest.mark.parametrize(

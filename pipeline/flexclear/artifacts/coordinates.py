@@ -87,6 +87,7 @@ gauge? | gauge | | body, for all of it, or body.gauge; in the files of one body 
 gauge_body? | gauge | | body that the gauge is on
 surface_region? | surface_region | | name of a region with nodes on the boundary
 slice? | slice | 1 | number of the slice, from 0
+station? | station | 1 | number of the station along a rod, from 0
 fibre? | fibre | 1 | number of the fibre, from 0
 member? | member | 1 | number of the member, from 0
 quantile? | quantile | 1 | fraction of the members below
@@ -102,7 +103,7 @@ component? | component | 1 | direction of the motion, by variance, from 0
 """)
 #: dimensions whose entries are named by numbers only, and the number of the first entry
 NUMBERED = {
-    **dict.fromkeys(("node", "cell", "corner", "around", "point", "lump", "section", "slice", "fibre"), 0),
+    **dict.fromkeys(("node", "cell", "corner", "around", "point", "lump", "section", "slice", "station", "fibre"), 0),
     **dict.fromkeys(("followed", "lag", "component", "band", "sector"), 0),
     **dict.fromkeys(("mode", "mode2", "rigid_mode"), 1),
 }

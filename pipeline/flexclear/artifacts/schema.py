@@ -188,9 +188,9 @@ frame_second_translation? | frame axis mode mode2 | m-1 | second derivative of t
     coordinates, body axes
 frame_second_rotation? | frame axis mode mode2 | rad m-2 | second derivative of the frame's rotation vector by modal
     coordinates, body axes
-section_rotation? | slice axis mode | rad m-1 | twist and tilt of a rod's slices per modal coordinate, axes of the rod
-section_curvature? | slice axis mode | rad m-2 | rates of twist and bending along the rod per modal coordinate
-section_stiffness? | slice axis axis2 | N m3 | stiffness of the slice to them, times its length
+station_rotation? | station axis mode | rad m-1 | twist and tilt at stations of a rod per modal coordinate, rod's axes
+station_curvature? | station axis mode | rad m-2 | rates of twist and bending along the rod per modal coordinate
+station_stiffness? | station axis axis2 | N m3 | stiffness of the section to them, times the length that it represents
 untilted_inertia | axis axis2 | kg m2 | moment of inertia of sections that twist but do not tilt (Euler-Bernoulli)
 node_position | node axis | m | undeformed node position in the body frame
 cell_node | cell corner | 1 | node indices of each cell

@@ -153,11 +153,20 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
         findings.errors += scenes.unrecorded(scene)
         complete = findings.attempt(partial(Graph(scene).up_to, "post"), path) and not findings.errors
         findings.attempt(partial(simulation.check_parts, simulation.params(scene)), path)
+        if scene.sections is not None:
+            findings.attempt(partial(_sections, scene), path)
         unplaced = any(part in str(error) for error in findings.errors for part in PLACING)
         findings.warnings += scenes.implausibilities(scene, settings)
         findings.notes.append(scene.summary())
         if complete and not unplaced:
             compute(scene, mesh_of, findings)
+
+
+def _sections(scene: Scene) -> None:
+    """Check the period of the sections, which a run ignores."""
+    from flexclear.dynamics.model.checks import section_period
+
+    section_period(scene)
 
 
 def _sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:

@@ -53,6 +53,8 @@ LONGEST_MOVE = 0.2
 BALANCED, SHORT_MOVE = 1e-12, 1e-14
 #: relative unbalanced force that counts as rounding when iterations stop improving
 STALLED = 1e-8
+#: returns of unheld motions to where they began, which converge quadratically
+RETURNS = 4
 #: eigenvalues of the stiffness below this fraction of the largest count as zero
 NO_STIFFNESS = 1e-12
 #: corrections of one pose; each must be at most this fraction of the one before, else the step of the speed is halved
@@ -75,8 +77,25 @@ class Equilibrium:
 
 
 def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
-    """Return the equilibrium close to positions q (loops closed); raise SolverError when the search fails."""
-    at = tangent(bench, q)
+    """Return the equilibrium close to positions q (loops closed); raise SolverError when the search fails.
+
+    Motions that nothing holds there, such as that of a roller about its pin, end where they began.
+    """
+    rest = _descended(bench, tangent(bench, q))
+    for _ in range(RETURNS):
+        at = rest.at
+        K, _ = stiffness(bench, at, at.Z)
+        k, axes = np.linalg.eigh(0.5 * (K + K.T))
+        free = at.Z @ axes[:, np.abs(k) <= NO_STIFFNESS * np.max(np.abs(k), initial=0.0)]
+        back = free @ (free.T @ at.mass @ np.linalg.lstsq(at.moves, q - at.q, rcond=None)[0])
+        if not SHORT_MOVE < np.max(np.abs(back) / bench.model.speed_scales, initial=0.0) < LONGEST_MOVE:
+            break
+        rest = _descended(bench, tangent(bench, close(bench, at.q + at.moves @ back)))
+    return rest
+
+
+def _descended(bench: Bench, at: Tangent) -> Equilibrium:
+    """Return the equilibrium to which forces lead from a pose."""
     best, since = np.inf, 0
     for iteration in range(MOST_MOVES):
         size = float(np.linalg.norm(at.unbalanced))

@@ -14,7 +14,7 @@ from flexclear.dynamics.model.loads import acting_frames, describe
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.start_table import given_coordinates
 from flexclear.scene.drives import PathDrive
-from flexclear.scene.schema import Scene
+from flexclear.scene.schema import Scene, Sections
 from flexclear.system.errors import InputError, errors_from
 
 #: a check raises InputError
@@ -54,3 +54,22 @@ def mechanism_errors(scene: Scene, mechanism: Mechanism) -> list[InputError]:
 
 def _frames(scene: Scene, mechanism: Mechanism, load: str) -> tuple[str, ...]:
     return acting_frames(mechanism, load, describe(scene, load).row)
+
+
+def section_period(scene: Scene) -> float:
+    """Return the period of the sections [s], by default the run's length; raise InputError for one too long."""
+    requested, span = scene.sections or Sections(), scene.time.end - scene.time.start
+    period = requested.period or span
+    if period > span * (1.0 + 1e-12):
+        raise InputError(
+            "[sections.period]",
+            f"a period of {period:.6g} s is longer than the run, which defines the laws for {span:.6g} s",
+            "let the run last at least one period",
+        )
+    if not requested.phase < period:
+        raise InputError(
+            "[sections.phase]",
+            f"{requested.phase:.6g} s is not within the period of {period:.6g} s",
+            "give a time from 0 to less than the period",
+        )
+    return period

@@ -13,11 +13,11 @@ from flexclear.artifacts import quantities
 from flexclear.artifacts.points import Point, Values
 from flexclear.artifacts.quantities import SAME_TIME, of_impacts, reduced, regular_times
 from flexclear.dynamics.effects import EVENTS
+from flexclear.dynamics.model.checks import section_period
 from flexclear.dynamics.model.contacts import arms
 from flexclear.dynamics.record.dataset import events_of, series, variables_for
 from flexclear.dynamics.record.ensemble import ball_offsets, difference_of_starts
 from flexclear.dynamics.record.motion import Motions
-from flexclear.dynamics.record.sections import section_period
 from flexclear.dynamics.run.alike import engines_alike
 from flexclear.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.dynamics.run.evaluation.engine import Engine

@@ -14,6 +14,7 @@ from flexclear.artifacts.quantities import IMPACT
 from flexclear.artifacts.schema import SECTIONS, conform
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.observation import Variables
+from flexclear.dynamics.model.checks import section_period
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.dynamics.record.ensemble import recorded_bodies
@@ -96,25 +97,6 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     return conform(
         made, SECTIONS, title=title, **attributes(scene), **facts, neighbour_distance=NEIGHBOUR * engine.rtol
     )
-
-
-def section_period(scene: Scene) -> float:
-    """Return the period of the sections [s], by default the run's length; raise InputError for one too long."""
-    requested, span = scene.sections or Sections(), scene.time.end - scene.time.start
-    period = requested.period or span
-    if period > span * (1.0 + 1e-12):
-        raise InputError(
-            "[sections.period]",
-            f"a period of {period:.6g} s is longer than the run, which defines the laws for {span:.6g} s",
-            "let the run last at least one period",
-        )
-    if not requested.phase < period:
-        raise InputError(
-            "[sections.phase]",
-            f"{requested.phase:.6g} s is not within the period of {period:.6g} s",
-            "give a time from 0 to less than the period",
-        )
-    return period
 
 
 @dataclass

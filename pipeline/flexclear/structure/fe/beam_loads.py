@@ -138,9 +138,9 @@ def _stiffness_form(mesh: xr.Dataset, beam: Beam, fields: np.ndarray) -> Callabl
 
 
 def _bending(mesh: xr.Dataset, beam: Beam, fields: np.ndarray) -> list[np.ndarray]:
-    """Return rotation and curvature of sections (slices, 3, n), and their stiffness times length (slices, 3, 3).
+    """Return rotation and curvature of sections (stations, 3, n), and their stiffness times length (stations, 3, 3).
 
-    Three slices of each cell integrate products of three of these fields exactly.
+    Three stations of each cell integrate products of three of these fields exactly.
     """
     stiffness = beams.stiffness(mesh)
     matrix = np.zeros((*beam.basis.dx.shape, 3, 3))
@@ -148,10 +148,10 @@ def _bending(mesh: xr.Dataset, beam: Beam, fields: np.ndarray) -> list[np.ndarra
         matrix[..., k, k] = stiffness[name]
     matrix[..., 1, 2] = matrix[..., 2, 1] = -stiffness["bend_both"]
     points, weights = np.polynomial.legendre.leggauss(3)
-    at_slices = np.vander(0.5 + 0.5 * points, len(POINTS)) @ np.linalg.inv(np.vander(POINTS, len(POINTS)))
+    at_stations = np.vander(0.5 + 0.5 * points, len(POINTS)) @ np.linalg.inv(np.vander(POINTS, len(POINTS)))
     lengths = 0.5 * weights[:, None] * beam.basis.dx.sum(axis=1)[:, None, None]
     parts = (fields[0], fields[2], matrix)
     rotation, curvature, resisting = (
-        np.einsum("sp,cp...->cs...", at_slices, part.reshape(*beam.basis.dx.shape, 3, -1)) for part in parts
+        np.einsum("sp,cp...->cs...", at_stations, part.reshape(*beam.basis.dx.shape, 3, -1)) for part in parts
     )
     return [part.reshape(-1, *part.shape[2:]) for part in (rotation, curvature, resisting * lengths[..., None])]

@@ -58,9 +58,9 @@ class SecondOrder:
     second_order_first_moment: np.ndarray | None = None  #: int rho G [kg/m], shape (3, n, n)
     frame_second_translation: np.ndarray | None = None  #: G of the frames' origins [1/m], shape (frames, 3, n, n)
     frame_second_rotation: np.ndarray | None = None  #: of their rotation vectors [1/m^2], shape (frames, 3, n, n)
-    section_rotation: np.ndarray | None = None  #: of a rod's slices, in its axes [rad/m], shape (slices, 3, n)
-    section_curvature: np.ndarray | None = None  #: rates of twist and bending along it [rad/m^2], shape (slices, 3, n)
-    section_stiffness: np.ndarray | None = None  #: to them, times the slice's length [N m^3], shape (slices, 3, 3)
+    station_rotation: np.ndarray | None = None  #: of a rod's sections, in its axes [rad/m], shape (stations, 3, n)
+    station_curvature: np.ndarray | None = None  #: rates of twist and bending [rad/m^2], shape (stations, 3, n)
+    station_stiffness: np.ndarray | None = None  #: to them, times length [N m^3], shape (stations, 3, 3)
 
 
 @dataclass(frozen=True)

@@ -53,14 +53,14 @@ def at_port(d, p, j, vector, first):
 
 
 @kernel
-def _slice(d, s):
-    """Return rotation and curvature of slice s of a rod, the curvature in axes of its section, and sine and cosine."""
-    body, b = d.flexes[d.rod_slices[s].flex], d.rod_slices[s].data
+def _station(d, s):
+    """Return rotation and curvature at a station, the curvature in axes of the section; sine, cosine of the twist."""
+    body, b = d.flexes[d.stations[s].flex], d.stations[s].data
     n, turned, curved = body.n_modes, ZERO, ZERO
     for j in range(n):
         q = d.x[body.q0 + j]
-        turned = add(turned, scale(q, of_mode(d.rod_slice_data, b, n, j)))
-        curved = add(curved, scale(q, of_mode(d.rod_slice_data, b + 3 * n, n, j)))
+        turned = add(turned, scale(q, of_mode(d.station_data, b, n, j)))
+        curved = add(curved, scale(q, of_mode(d.station_data, b + 3 * n, n, j)))
     sine, cosine = np.sin(turned[0]), np.cos(turned[0])
     twist = curved[0] - 0.5 * (turned[1] * curved[2] - turned[2] * curved[1])
     bent = cosine * curved[1] + sine * curved[2], cosine * curved[2] - sine * curved[1]
@@ -70,10 +70,10 @@ def _slice(d, s):
 @kernel
 def couple(d):
     """Add the forces of the elastic energy beyond that of the modal stiffness to those on the modes."""
-    for s in range(d.n_rod_slices):
-        body, b = d.flexes[d.rod_slices[s].flex], d.rod_slices[s].data
-        stiffness = at6(d.rod_slice_stiffness[s].matrix, 0)
-        turned, curved, strain, sine, cosine = _slice(d, s)
+    for s in range(d.n_stations):
+        body, b = d.flexes[d.stations[s].flex], d.stations[s].data
+        stiffness = at6(d.station_stiffness[s].matrix, 0)
+        turned, curved, strain, sine, cosine = _station(d, s)
         torque, m2, m3 = turn_symmetric(stiffness, strain)
         linear = turn_symmetric(stiffness, curved)
         on_rotation = (m2 * strain[2] - m3 * strain[1], -0.5 * torque * curved[2], 0.5 * torque * curved[1])
@@ -84,8 +84,8 @@ def couple(d):
         on_curvature = sub((torque, on_bending[0], on_bending[1]), linear)
         n = body.n_modes
         for j in range(n):
-            force = dot(on_rotation, of_mode(d.rod_slice_data, b, n, j))
-            force += dot(on_curvature, of_mode(d.rod_slice_data, b + 3 * n, n, j))
+            force = dot(on_rotation, of_mode(d.station_data, b, n, j))
+            force += dot(on_curvature, of_mode(d.station_data, b + 3 * n, n, j))
             # shapes are eigenmodes where loads stiffen a body
             d.modal_bias[body.c0 + j] += force
 
@@ -94,10 +94,10 @@ def couple(d):
 def coupling_energy(d, component):
     """Return this part of the elastic energy [J] of the rods of an independent mechanism."""
     energy = 0.0
-    for s in range(d.n_rod_slices):
-        if d.links[d.flexes[d.rod_slices[s].flex].link].component == component:
-            stiffness = at6(d.rod_slice_stiffness[s].matrix, 0)
-            _, curved, strain, _, _ = _slice(d, s)
+    for s in range(d.n_stations):
+        if d.links[d.flexes[d.stations[s].flex].link].component == component:
+            stiffness = at6(d.station_stiffness[s].matrix, 0)
+            _, curved, strain, _, _ = _station(d, s)
             energy += 0.5 * dot(strain, turn_symmetric(stiffness, strain))
             energy -= 0.5 * dot(curved, turn_symmetric(stiffness, curved))
     return energy

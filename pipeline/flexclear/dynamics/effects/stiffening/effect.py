@@ -7,8 +7,8 @@ from flexclear.dynamics.effects.effect import Effect
 STIFFENING = Effect(
     "stiffening",
     lambda scene: () if any(body.stiffening is not None for body in scene.flexible().values()) else None,
-    topology={"rod_slices": "flex data"},  # data: index in ROD_SLICE_DATA of rotation and curvature (3n each)
-    numbers={"rod_slice_stiffness": "matrix:6", "rod_slice_data": "value"},  # of twist and bending (xx yy zz xy xz yz)
+    topology={"stations": "flex data"},  # data: index in STATION_DATA of rotation and curvature (3n each)
+    numbers={"station_stiffness": "matrix:6", "station_data": "value"},  # of twist and bending (xx yy zz xy xz yz)
     compose={"forces": {"flexible": "flexible_bodies(<bodies>)"}},
     fill="model:fill",
 )
