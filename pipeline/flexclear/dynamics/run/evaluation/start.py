@@ -123,9 +123,9 @@ def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.nda
 
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     """Return the contacts whose surfaces overlap at the start, by index, and their depths [m]."""
-    contacts = engine.model.contacts
-    if not contacts:
+    if not engine.model.contacts:
         return {}
     closure_rows.evaluate(engine, y, engine.start)
     gaps = engine.table(m.TOUCH)["gap"]
-    return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -TOUCHING * joint.clearance}
+    touching = -TOUCHING * engine.model.arrays.table(m.CONTACT_NUMBERS)["clearance"]
+    return {int(c): -float(gaps[c]) for c in np.flatnonzero(gaps < touching)}
