@@ -81,6 +81,7 @@ class Hysteretic(_Normal):
         "zhiying-qishao",
         "carvalho-martins",
     ]
+    """name of the law, as docs/contact.md lists them"""
     exponent: Annotated[Number, Field(ge=1.0)] = 1.5
     """exponent of the penetration"""
 
