@@ -61,7 +61,7 @@ def test_a_method_is_what_the_list_says(name: str) -> None:
     _, _, error, _, keep = method.make_kernels(*given, *([(given[0], composite)] if traits.reads_all else []))
     assert (error is not None) is traits.estimates is (method.error_order > 0)
     # an implicit method remembers its polynomial or its slopes to predict by, a multistep one needs them
-    assert (keep is not keep_nothing) is (traits.multistep or traits.implicit)
+    assert (keep is not keep_nothing) is (method.room.vectors > 0)
     # stability limits who tells of stiffness and who hands over; to a method that it does not limit
     if traits.implicit:
         assert method.stability is None

@@ -81,6 +81,7 @@ class Hysteretic(_Normal):
         "zhiying-qishao",
         "carvalho-martins",
     ]
+    """name of the law, as docs/contact.md lists them"""
     exponent: Annotated[Number, Field(ge=1.0)] = 1.5
     """exponent of the penetration"""
 
@@ -99,7 +100,8 @@ class KelvinVoigt(_Normal):
     """damping coefficient [N s/m]; default: from the restitution"""
     effective_mass: Annotated[Mass, Positive] | None = None
     """mass that rebounds; default: the reduced mass of the two bodies"""
-    exponent: ClassVar[float] = 1.0
+    exponent: Annotated[Number, Field(ge=1.0, le=1.0)] = 1.0
+    """exponent of the penetration: the law is linear"""
 
     @property
     def needs_mass(self) -> bool:

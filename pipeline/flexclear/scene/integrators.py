@@ -33,7 +33,6 @@ class Traits:
     module: of `dynamics.integrate`, which holds its METHOD.
     order: the error of a run falls with this power of the step.
     implicit: its steps solve equations, by iteration.
-    multistep: its steps use slopes of earlier ones, so that a one-step method starts it.
     estimates: it estimates its error, which controls its steps; otherwise a scene must give the step.
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
     long_steps: they span many vibrations, whose work on the drives is known less exactly than the motion.
@@ -47,7 +46,6 @@ class Traits:
     module: str
     order: int
     implicit: bool = False
-    multistep: bool = False
     estimates: bool = True
     dissipative: bool = False
     long_steps: bool = False
@@ -64,9 +62,7 @@ INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
         "dop853": Traits("dop853", 8, hands_over_to=STIFF, tolerances=TO_1E_13),
         "dopri5": Traits("dopri5", 5, hands_over_to=STIFF, tolerances=TO_1E_13),
         "rk4": Traits("rk4", 4, estimates=False, hands_over_to=STIFF, steps=STEPS),
-        "adams-bashforth-moulton": Traits(
-            "adams", 4, multistep=True, estimates=False, hands_over_to=STIFF, steps=STEPS
-        ),
+        "adams-bashforth-moulton": Traits("adams", 4, estimates=False, hands_over_to=STIFF, steps=STEPS),
         "generalized-alpha": Traits(
             "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, steps=STEPS
         ),

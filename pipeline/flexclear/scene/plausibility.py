@@ -23,8 +23,6 @@ LARGE = 3.0
 FAR = 30.0
 #: density [kg/m^3] above which no inertia is plausible; point masses of textbooks reach 1e8
 DENSE = 1e9
-#: the same limit for a body whose mass exceeds that of every other body of the scene by the second factor
-DENSE_AND_HEAVY, HEAVY = 1e6, 100.0
 #: a bare angle that is a whole multiple of the first number and not below the second looks like degrees
 DEGREES, FEWEST_DEGREES = 5.0, 30.0
 UNITS = 'bare numbers are SI; with a unit they are text, as "0.2 mm" or "100 kg mm^2"'
@@ -115,8 +113,9 @@ def _masses(scene: Scene) -> Iterator[InputError]:
     for name, body in bodies.items():
         others = max((other.mass for key, other in bodies.items() if key != name), default=inf)
         density = least_density(body)
-        heavy = body.mass > HEAVY * others
-        if DENSE < density < inf or (heavy and DENSE_AND_HEAVY < density < inf):
+        # the same limit for a body whose mass exceeds that of every other body of the scene by the second factor
+        heavy = body.mass > 100.0 * others
+        if DENSE < density < inf or (heavy and 1e6 < density < inf):
             trace = sum(body.inertia[k][k] for k in range(3))
             text = (
                 f"a body of {body.mass:g} kg with a radius of gyration of {1e3 * sqrt(trace / 2.0 / body.mass):.3g} mm "

@@ -29,7 +29,7 @@ def published(stiffness: Mapping[float, Callable[[Any], float]]) -> Callable[[Cl
     return given_or_published
 
 
-def compliance(joint: Clearance) -> float:
+def compliance(joint: Clearance | Pin) -> float:
     """Return the sum of sigma = (1 - nu^2) / (pi E) [1/Pa] over both surfaces; 1 / (pi sum) is Hertz's E*."""
     return sum(
         (1.0 - material.poisson**2) / (math.pi * material.youngs_modulus)

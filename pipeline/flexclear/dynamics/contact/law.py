@@ -59,11 +59,12 @@ class Hysteresis:
 
     def resolve(self, law: Hysteretic, stiffness: float, mass: float | None) -> Resolved:
         """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
+        parameter = delivered = float(law.requested or 0.0)  # its keys demand one
         if law.restitution is None:
-            a = closed_form.factor(delivered := law.delivered_restitution)
+            a = closed_form.factor(delivered)
             parameter = self._parameter(law.law, a)
         else:
-            a = self._factor(law.law, parameter := law.restitution)
+            a = self._factor(law.law, parameter)
             delivered = closed_form.delivered(a)
         numbers = Numbers(stiffness, law.exponent, a)
         return Resolved("hysteretic", numbers, parameter, delivered, self._warning(law, delivered))

@@ -170,7 +170,7 @@ def named(scene: Scene) -> set[str]:
     if scene.start is not None and scene.start.at is not None:
         parts.append((STARTS, scene.start.at, "[start.at]"))
         laws += ["constant", "polynomial"] if scene.start.joint else []  # which hold given positions
-        parts += [(JOINTS, one.ideal, f"[joint.{name}]") for name, one in loose(scene).items()]
+        parts += [(JOINTS, str(one.ideal), f"[joint.{name}]") for name, one in loose(scene).items()]
     parts += [(RECORDS, name, "[output]") for name in scene.output.requests()]
     if scene.event:
         parts.append((EVENTS, "phases", "[event]"))

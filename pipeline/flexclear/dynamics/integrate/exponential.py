@@ -55,8 +55,6 @@ POLYNOMIALS = np.array(
     ]
 )
 FACTORIALS = np.array([1.0 * factorial(k) for k in range(NODES + 2)])
-#: step lengths aim at corrections that fall by this factor per sweep, which goes with their square; the least rate used
-SWIFT, LEAST_CONTRACTION = 0.1, 0.01
 
 # Memory between steps -------------------------------------------------------------------------------------------------
 # floats: whether the oscillators belong to the present pose, whether any are known, step of the phi functions, length
@@ -219,7 +217,9 @@ def error(d, step):
         add_departures(d, step, 1.0, j, out)
         norms = (norms[1], scaled_norm(d, out))
     third, fourth = norms
-    d.most_growth = min(d.most_growth, np.sqrt(SWIFT / max(d.memory[SLOWEST], LEAST_CONTRACTION)))
+    # step lengths aim at corrections that fall by this factor per sweep, which goes with their square; the least rate
+    # used
+    d.most_growth = min(d.most_growth, np.sqrt(0.1 / max(d.memory[SLOWEST], 0.01)))
     if fourth == 0.0:
         return 0.0
     return fourth**2 / np.sqrt(fourth**2 + 0.01 * third**2)

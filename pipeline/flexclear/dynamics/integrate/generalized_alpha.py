@@ -11,8 +11,8 @@ which follow the speeds in the state (energy ledger, internal states of friction
 
 The unknowns are the *rates* at the end of the step: a, then z'. Newton's matrix has rows (1 - alpha_m) -
 (1 - alpha_f) D for a and 1 - D / 2 for z', with D = gamma h d/du + beta h^2 d/dq dq'/du for columns of u, and h d/dz
-for those of z. A simplified iteration uses the last Jacobian, then a new one; with fixed steps a damped iteration
-follows with a new Jacobian at every iterate, for friction that saturates within the step.
+for those of z. A simplified iteration uses the last Jacobian, then a new one; with fixed steps every Jacobian is new
+once it converges slowly, as for friction that saturates within the step.
 
 The error estimate compares the step with the integral of the parabola through the last three slopes; its rates are
 passed through Newton's matrix, as otherwise damped modes would dictate the step.
@@ -38,14 +38,13 @@ from flexclear.scene.integrators import INTEGRATORS
 
 # rows of SLOPES: start of the step, Newton's iterate, end of the step, error estimates, search for events
 ITERATE, LAST, ESTIMATE, ROWS = 1, 2, 3, 5
-#: simplified iterations at most, damped ones, and halvings of one correction
-MOST_ITERATIONS, MOST_CORRECTIONS, MOST_HALVINGS = 10, 30, 12
+MOST_ITERATIONS = 30
 
 # Memory between steps ------------------------------------------------------------------------------------------------
 #: vectors of rates: accelerations at the start as stored, rates at the end, accelerations at the start for this step's
-#: length, displacement, residual, Newton's correction, row exchanges of the factors; then storage for positions, and
-#: the slope at the start of the previous step
-OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, CORRECTION, PIVOTS, POSITIONS, SLOPE_BEFORE, VECTORS = range(10)
+#: length, displacement, residual, row exchanges of the factors; then storage for positions, and the slope at the start
+#: of the previous step
+OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, PIVOTS, POSITIONS, SLOPE_BEFORE, VECTORS = range(9)
 #: matrices: after the Jacobian Newton's matrix
 NEWTON, MATRICES = 1, 2
 
@@ -233,10 +232,17 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def iterate(d, step):
-        """Iterate; return the rate at which the corrections fell, or -1 when they did not."""
-        left, last_norm, rate = vector(d, RESIDUAL), 0.0, 0.0
+        """Iterate; return the rate at which the corrections fell, or -1 when they did not.
+
+        With fixed steps, whose only remedy are further iterations, every Jacobian is new once convergence is slow.
+        """
+        left, last_norm, rate, anew = vector(d, RESIDUAL), 0.0, 0.0, False
         for k in range(MOST_ITERATIONS):
             if not residual(d, step):
+                return -1.0
+            if anew and not (
+                jacobian(d, d.time + step, d.at_y_new, slope(d, ITERATE), slope(d, ESTIMATE)) and factorise(d, step)
+            ):
                 return -1.0
             solve(d, left)
             for i in range(n_rates(d)):
@@ -244,65 +250,15 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
             norm = rates_norm(d, step, left)
             rate = norm / last_norm if k > 0 else 0.0
             verdict = newton.converged(k, norm, last_norm, d.rtol)
-            if verdict != 0:
-                return rate if verdict > 0 else -1.0
+            if verdict > 0:
+                return rate
+            if verdict < 0 and (d.fixed == 0.0 or not norm <= 1e300):
+                return -1.0
+            anew = d.fixed > 0.0 and (anew or rate > 0.3)
             last_norm = norm
         return -1.0
 
-    @kernel
-    def line_search(d, step, norm):
-        """Apply the fraction of the correction that reduces the residual; return the residual's norm, or -1."""
-        correction, new = vector(d, CORRECTION), vector(d, NEW)
-        share, there = 1.0, 0.0
-        for _ in range(MOST_HALVINGS):
-            for i in range(n_rates(d)):
-                d.w[new + i] += (share - there) * d.w[correction + i]
-            if residual(d, step):
-                left = rates_norm(d, step, vector(d, RESIDUAL))
-                if left < (1.0 - 0.1 * share) * norm:
-                    return left
-            there = share
-            share *= 0.5
-        return -1.0
-
-    @kernel
-    def iterate_damped(d, step):
-        """Iterate damped with a new Newton matrix each time: for friction that saturates within a step."""
-        t, enough = d.time + step, newton.limit(d.rtol)
-        correction = vector(d, CORRECTION)
-        if not residual(d, step):
-            return False
-        left = rates_norm(d, step, vector(d, RESIDUAL))
-        for _ in range(MOST_CORRECTIONS):
-            if not jacobian(d, t, d.at_y_new, slope(d, ITERATE), slope(d, ESTIMATE)) or not factorise(d, step):
-                return False
-            for i in range(n_rates(d)):
-                d.w[correction + i] = d.w[vector(d, RESIDUAL) + i]
-            solve(d, correction)
-            norm = rates_norm(d, step, correction)
-            left = line_search(d, step, left)
-            if norm <= enough or left == 0.0:
-                return True
-            if left < 0.0:
-                return False
-        return False
-
-    simplified = newton.make_solve(jacobian, factorise, predict, iterate)
-
-    @kernel
-    def solve_step(d, step):
-        """Solve for the rates NEW at the end of the step; return False when no iteration converges.
-
-        With adaptive steps a shorter step is the better remedy, with fixed steps further iterations are.
-        """
-        if simplified(d, step):
-            return True
-        if d.fixed == 0.0:
-            return False
-        predict(d, step)
-        return iterate_damped(d, step)
-
-    return place_end, solve_step
+    return place_end, newton.make_solve(jacobian, factorise, predict, iterate)
 
 
 METHOD = Method(

@@ -25,8 +25,6 @@ from flexclear.dynamics.equations.closures import add_spread, solve, take_spread
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import dot
 
-#: off-diagonal entries below this fraction of the diagonal ones' geometric mean count as zero; most Jacobi sweeps
-OFF_DIAGONAL, SWEEPS = 1e-13, 20
 #: oscillators below this fraction of the largest frequency are not stiff, and are integrated with the rest
 NOT_STIFF = 1e-6
 #: largest change of a coordinate in the finite differences of the positions' rates
@@ -155,12 +153,13 @@ def rotate(entries, a, b, stride, n, c, s):
 def diagonalise(d, n):
     """Diagonalise the symmetric matrix by Jacobi's rotations, and rotate its axes along."""
     nv, S = d.nv, d.coupling
-    for _ in range(SWEEPS):
+    # off-diagonal entries below this fraction of the diagonal ones' geometric mean count as zero; most Jacobi sweeps
+    for _ in range(20):
         turned = False
         for p in range(n - 1):
             for q in range(p + 1, n):
                 mixed, a, b = S[nv * p + q], S[nv * p + p], S[nv * q + q]
-                if not abs(mixed) > OFF_DIAGONAL * np.sqrt(max(a * b, 0.0)):
+                if not abs(mixed) > 1e-13 * np.sqrt(max(a * b, 0.0)):
                     continue
                 turned = True
                 half = 0.5 * (b - a) / mixed

@@ -16,9 +16,6 @@ from flexclear.dynamics.integrate.within_step import ROOT_CORRECTION
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import dot, sub
 
-#: a gap is zero below this fraction of the clearance plus this one, four roundings, of the mechanism's size: a
-#: difference of the sites' positions has no digits below, which matters where clearances are of micrometres
-ZERO_GAP, FOUR_ROUNDINGS = 1e-12, 8.9e-16
 ROOT_ITERATIONS, TURN_ITERATIONS = 60, 40
 #: returned in place of a fraction of the step when the mode does not change
 NO_CHANGE = 2.0
@@ -40,7 +37,9 @@ def side(d, c):
 @kernel
 def zero_gap(d, c):
     """Return the size [m] below which the gap of contact c counts as zero."""
-    return ZERO_GAP * d.contact_numbers[c].clearance + FOUR_ROUNDINGS * d.length
+    # a gap is zero below this fraction of the clearance plus this one, four roundings, of the mechanism's size: a
+    # difference of the sites' positions has no digits below, which matters where clearances are of micrometres
+    return 1e-12 * d.contact_numbers[c].clearance + 8.9e-16 * d.length
 
 
 @kernel

@@ -12,8 +12,6 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.integrate.method import matrix, slope
 from flexclear.dynamics.kernels import kernel
 
-#: the remaining error may be this fraction of the tolerance, or ten roundings if that is more
-TOLERANCE_FRACTION, TEN_ROUNDINGS = 1e-2, 2.2e-15
 # first floats that implicit methods store: step of the factors, whether the Jacobian still holds, length of the step
 # before; and the first of their matrices
 FACTORED_STEP, JACOBIAN_HOLDS, LAST_STEP, FLOATS = range(4)
@@ -23,7 +21,8 @@ JACOBIAN = 0
 @kernel
 def limit(rtol):
     """Return the norm of the admissible remaining error, in units of the tolerance."""
-    return max(TOLERANCE_FRACTION, TEN_ROUNDINGS / rtol)
+    # the remaining error may be this fraction of the tolerance, or ten roundings if that is more
+    return max(1e-2, 2.2e-15 / rtol)
 
 
 @kernel

@@ -18,9 +18,6 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.kernels import kernel
 
-#: recorded states are projected to this fraction of rtol times the mechanism's size; it grows by so many times rtol, up
-#: to the second fraction: a residual that the run itself left needs no evaluation in every row
-RECORD_SHARE, MOST_SHARE, LOOSER_FACTOR = 1e-3, 0.1, 1e3
 #: largest number of rows between outputs, for which the array has room at its end: the last ones are those that count
 BETWEEN = 128
 #: steps over many vibrations are examined inside, too: the first ones, then one of so many, at fractions that the
@@ -54,7 +51,9 @@ def empty_record(rows: int, contacts: int, ny: int) -> np.ndarray:
 
 def record_share(rtol: float) -> float:
     """Return the fraction of rtol times the mechanism's size to which the loops of recorded states are closed."""
-    return min(MOST_SHARE, max(RECORD_SHARE, LOOSER_FACTOR * rtol))
+    # recorded states are projected to this fraction of rtol times the mechanism's size; it grows by so many times rtol,
+    # up to the second fraction: a residual that the run itself left needs no evaluation in every row
+    return min(0.1, max(1e-3, 1e3 * rtol))
 
 
 share_of_records = kernel(record_share)

@@ -30,8 +30,6 @@ STEPS_AHEAD, LOW = 4.0, 0.05
 FROM, HALF = 0.3, 0.5
 #: no step starts where a row's independence is less than this fraction of its largest so far
 TOO_LITTLE = 2e-4
-#: steps towards that point end short of it by this fraction of the way: nearer, the time of the pose is known better
-POSE_MARGIN, NEARER = 0.1, 0.7
 
 
 @kernel
@@ -141,7 +139,8 @@ def steer(d, t):
         return 0.0
     if ahead >= NEVER - t or d.most_reach == 0.0:
         return step
-    return min(step, min(ahead - (1.0 - POSE_MARGIN) * reach, NEARER * ahead))
+    # steps towards that point end short of it by this fraction of the way: nearer, the time of the pose is known better
+    return min(step, min(ahead - 0.9 * reach, 0.7 * ahead))
 
 
 @kernel

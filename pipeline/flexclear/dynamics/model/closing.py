@@ -23,7 +23,6 @@ WORST_GUESS = 0.05
 #: residuals, in units of the mechanism's size, below which nothing is moved, and at which closing may end; with large
 #: coordinates, so many roundings of these instead if that is more
 CLOSED_EXACTLY, CLOSED_ENOUGH = 1e-13, 1e-11
-EXACT_ROUNDINGS, CLOSED_ROUNDINGS = 4.0, 100.0
 #: least radius of gyration that a link counts with, as a fraction of the mechanism's size
 LEAST_GYRATION = 0.01
 
@@ -72,7 +71,7 @@ def close(
     (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
     """
     here, grain = list(poses), _rounding(mechanism)
-    exact, closed = max(CLOSED_EXACTLY, EXACT_ROUNDINGS * grain), max(CLOSED_ENOUGH, CLOSED_ROUNDINGS * grain)
+    exact, closed = max(CLOSED_EXACTLY, 4.0 * grain), max(CLOSED_ENOUGH, 100.0 * grain)
     now = misfit(mechanism, joints, here)
     if now.worst <= exact:
         return here

@@ -21,8 +21,6 @@ from flexclear.numerics.rotations import matrix_to_quaternion, rotation_between,
 from flexclear.scene.drives import PathDrive
 from flexclear.system.errors import InputError
 
-#: a start that is further from its drive's law than this is refused, as a fraction of the mechanism's size and in rad
-FAR_FROM_LAW, FAR_ANGLE = 0.05, 0.1
 #: corrections below this, as a fraction of the mechanism's size or in rad, come from the digits that were written
 INPUT_DIGITS = 1e-6
 #: largest number of bodies whose correction is reported one by one
@@ -136,7 +134,9 @@ def refuse_far(mechanism: Mechanism, far: Sequence[Contradiction]) -> None:
     for contradiction in far:
         if contradiction.of_path:
             continue
-        limit = FAR_ANGLE if contradiction.turning else FAR_FROM_LAW * mechanism.length
+        # a start that is further from its drive's law than this is refused, as a fraction of the mechanism's size and
+        # in rad
+        limit = 0.1 if contradiction.turning else 0.05 * mechanism.length
         if contradiction.size > limit:
             unit = "rad" if contradiction.turning else "m"
             raise InputError(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexclear.dynamics.effects.stops.model import STOP, End, ends
+from flexclear.dynamics.effects.stops.model import End, ends
 from flexclear.dynamics.model.chain import InboardJoint, chain, path_pose
 from flexclear.dynamics.model.components import Components, components, joined
 from flexclear.dynamics.model.driving import joint_type, prescribed
@@ -84,12 +84,12 @@ class Contact(NamedTuple):
     @property
     def words(self) -> str:
         """Name of the contact in messages."""
-        return f"joint {self.name}" if self.joint.type != STOP else f"stop {self.name}"
+        return f"{'stop' if isinstance(self.joint, End) else 'joint'} {self.name}"
 
     @property
     def place(self) -> str:
         """Key path of the contact in the scene."""
-        return f"joint.{self.name}" if self.joint.type != STOP else f"stop.{self.name.rpartition('.')[0]}"
+        return f"stop.{self.joint.stop}" if isinstance(self.joint, End) else f"joint.{self.name}"
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces
 from flexclear.dynamics.effects import Parts, most_parts
 from flexclear.dynamics.effects.gears.model import Coupling, couplings
-from flexclear.dynamics.effects.stops.model import STOP
+from flexclear.dynamics.effects.stops.model import End
 from flexclear.dynamics.model import contacts as contacting
 from flexclear.dynamics.model import filling, flexible_bodies, guards, index_tables, laws
 from flexclear.dynamics.model import loads as loading
@@ -141,7 +141,7 @@ def filled(
         m.N_DRIVES: numbering.known,
         m.N_INTERNAL: gauges.internal,
         m.N_LOAD_BENDS: len(loaded.bends),
-        m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
+        m.N_SURFACES: sum(not isinstance(contact.joint, End) for contact in mechanism.contacts),
         **{m.SIZES[f"{effect.name}_slot"]: slots[effect.name] for effect in parts.present if effect.ledger},
         m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
     }

@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
     from flexclear.artifacts.labelled import Labelled
 
-#: residuals below these are rounding of a closed mechanism: as a fraction of its size, and an angle [rad]
-CLOSED_POSE, STRAIGHT = 1e-8, 1e-7
-
 
 @dataclass(frozen=True)
 class Gap:
@@ -98,7 +95,8 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
                     away = away + value * wrench[3:]
                 else:
                     turned = max(turned, float(abs(value)))
-        if np.linalg.norm(away) > CLOSED_POSE * mechanism.length or turned > STRAIGHT:
+        # residuals below these are rounding of a closed mechanism: as a fraction of its size, and an angle [rad]
+        if np.linalg.norm(away) > 1e-8 * mechanism.length or turned > 1e-7:
             end = joint.frames(poses)[1].p + mechanism.origin
             result.append(Gap(joint.name, end - away, end, turned))
     return result

@@ -26,7 +26,6 @@ from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.dynamics.run.run import maker
 from flexclear.dynamics.starts.snapshot import held, moving, resting
-from flexclear.scene.clearance import Clearance
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
@@ -37,8 +36,6 @@ from flexclear.system.progress import Progress
 
 #: a pin has reached its position within this fraction of the clearance; largest number of passes for that
 REACHED, PIN_PASSES = 1e-9, 20
-#: modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
-SETTLED, LOADINGS = 1e-9, 10
 #: singular values below this fraction of the largest are rounding
 SINGULAR_ROUNDING = 1e-9
 
@@ -115,7 +112,8 @@ def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
     try:
         # step of a modal coordinate for differences, as a fraction of the mechanism's size times the root of its mass
         state, step = y, 1e-7 * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
-        for _ in range(LOADINGS):
+        # modal coordinates have converged when a pass changes them by less than this fraction; largest number of passes
+        for _ in range(10):
             rates = _accelerations(engine, state, speeds)
             slopes = np.array(
                 [_accelerations(engine, _changed(engine, state, step * unit), speeds) for unit in np.eye(len(speeds))]
@@ -124,7 +122,7 @@ def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
             stiffness = np.maximum(np.abs(np.diag(slopes)), np.finfo(float).tiny)
             change = np.linalg.lstsq(slopes / stiffness[:, None], -rates / stiffness, rcond=SINGULAR_ROUNDING)[0]
             state = _changed(engine, state, change)
-            if np.max(np.abs(change)) <= SETTLED * np.max(np.abs(state[_modes(engine)])):
+            if np.max(np.abs(change)) <= 1e-9 * np.max(np.abs(state[_modes(engine)])):
                 return state
     except SolverError:
         pass
@@ -164,7 +162,7 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
     pins = [pin for pin in zip(table, model.contacts, model.laws, strict=True) if pin[1].name in loose(model.scene)]
     modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
 
-    def along(row: np.void, joint: Clearance) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def along(row: np.void, joint: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the axes that hold a pin, its offset [m], and the rate of that [m/s] along the axes."""
         outer, inner = (engine.table(m.SITE_FRAMES)[row[side]] for side in ("outer", "inner"))
         across, away = outer["axes"][:, joint.across].T, inner["origin"] - outer["origin"]

@@ -26,7 +26,7 @@ def resolve(law: KelvinVoigt, stiffness: float, mass: float | None) -> Resolved:
     critical = None if mass is None else 2.0 * math.sqrt(stiffness * mass)
     if law.damping is not None:
         damping = law.damping
-    elif critical is None:
+    elif critical is None or law.requested is None:
         raise ValueError("no mass is known on either side of this joint; give an effective_mass, or a damping [N s/m]")
     else:
         damping = critical * restitution.damping_ratio(law.requested)

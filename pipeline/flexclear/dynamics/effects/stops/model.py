@@ -14,9 +14,6 @@ from flexclear.scene.schema import Scene
 from flexclear.scene.units import quantity_at
 from flexclear.system.errors import InputError, together
 
-#: type of a contact at an end of a stop
-STOP = "stop"
-
 
 @dataclass(frozen=True)
 class End:
@@ -37,7 +34,7 @@ class End:
     initial_approach_speed: float | None
     radius: float = 0.0
     friction: None = None
-    type: str = STOP
+    type: str = "stop"
     hollow: bool = False
 
 

@@ -121,10 +121,10 @@ def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.nda
 
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     """Return the contacts whose surfaces overlap at the start, by index, and their depths [m]."""
-    contacts = engine.model.contacts
-    if not contacts:
+    if not engine.model.contacts:
         return {}
     closure_rows.evaluate(engine, y, engine.start)
     gaps = engine.table(m.TOUCH)["gap"]
     # 1e-9: surfaces that overlap by less than this fraction of the clearance touch
-    return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -1e-9 * joint.clearance}
+    touching = -1e-9 * engine.model.arrays.table(m.CONTACT_NUMBERS)["clearance"]
+    return {int(c): -float(gaps[c]) for c in np.flatnonzero(gaps < touching)}
