@@ -47,12 +47,13 @@ def ranking(
     tasks: Mapping[tuple[str, int], Task],
     pairs: Mapping[str, int],
     undone: Sequence[str],
+    integrated: Sequence[Task] = (),
 ) -> Task:
     """Return the task that ranks the effects, each removed alone.
 
     words: description of each effect. variants: the scene without each effect, by its name (the full scene by the empty
     name). tasks: their tasks by name and number of members (`stages.watched_quantities`). pairs: number of members with
-    which each effect is compared.
+    which each effect is compared. integrated: the scene's run and one at a tighter tolerance (`stages.cost_point`).
     """
     params = {
         "words": dict(words),
@@ -62,9 +63,9 @@ def ranking(
         "staying": _staying(scene, pairs),
     }
     used = sorted({("", members) for members in pairs.values()} | set(pairs.items()))
-    return _task(
-        "effect_ranking", scene, chosen, params, {f"{name}:{members}": tasks[name, members] for name, members in used}
-    )
+    inputs = {f"{name}:{members}": tasks[name, members] for name, members in used}
+    inputs |= dict(zip(("own", "tight"), integrated, strict=False))
+    return _task("effect_ranking", scene, chosen, params, inputs)
 
 
 def _task(
@@ -72,11 +73,12 @@ def _task(
 ) -> Task:
     """Return a task of this module. stage: name of the function to call and of its files."""
     watched = {"quantities": [q.written() for q in chosen], "units": [q.unit for q in chosen]}
+    outputs = {"outputs": [scene.time.start, scene.output.interval]}
     return Task(
         stage=stage,
         scene=scene.name,
         run=f"flexclear.stages.effect_study:{stage}",
-        params={"title": scene.title, **watched, **params},
+        params={"title": scene.title, **watched, **outputs, **params},
         inputs=inputs,
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": f"{stage}.nc"},
@@ -105,14 +107,25 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
         for k, gone in enumerate(params["variants"])
     }
     progress(None, "comparing")
-    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"])
+    times = _times(params["outputs"], inputs)
+    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"], times)
     dataset.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
     return result | effect_sizes.chart("effects", dataset, f"Effect sizes: {params['title']}")
 
 
+def _times(outputs: Sequence[float], inputs: Mapping[str, xr.Dataset]) -> list[float]:
+    """Return the times of the outputs [s]. outputs: the first one and their interval."""
+    start, interval = outputs
+    return [
+        start + interval * k for k in range(max((int(one.sizes.get("time", 0)) for one in inputs.values()), default=0))
+    ]
+
+
 def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>:<members>``."""
+    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>:<members>``, and where
+    they exist ``own`` and ``tight``, whose difference is the error of the time integration."""
+    from flexclear.artifacts import quantities
     from flexclear.artifacts.effect_size import watched
     from flexclear.post.answers import effect_ranking as ranked
     from flexclear.post.answers import effect_sizes
@@ -123,7 +136,15 @@ def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], 
         return watched(inputs[f"{name}:{members}"], params["owners"][name], chosen)
 
     pairs = {name: ranked.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
-    results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
+
+    def error(quantity: Quantity, until: float) -> float:
+        own, tight = inputs.get("own"), inputs.get("tight")
+        if own is None or tight is None or not quantities.has(own, quantity) or not quantities.has(tight, quantity):
+            return 0.0
+        return quantities.error(own, tight, quantity, until)
+
+    times = _times(params["outputs"], inputs)
+    results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"], times, error)
     results.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": results} | files("effect_ranking", ranked.table(results))
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])

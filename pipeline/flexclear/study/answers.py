@@ -38,7 +38,8 @@ AT_ONCE, COMPILING = 2.0, 4.0
 AHEAD = 2
 #: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance
 MEANS = 1e-7
-#: numbers of members with which effects are compared; they rise until the difference is decided or the budget is used
+#: numbers of members with which effects are compared; within a given budget they rise until the difference is decided,
+#: else the first one does, since effects are decided up to the horizon and the answer names the members for more
 MEMBERS = (4, 8, 16, 32)
 #: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.effect_ranking`
 IDEAL = "clearance and flexibility"
@@ -187,7 +188,10 @@ class Answers:
             return None
         self.workplace.bring(list(self.kernels.values()))
         self._started.compiled |= self.kernels
-        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._started).task())[0]
+        self._started.tighter()
+        levels = MEMBERS[:1] if self.seconds is None else MEMBERS
+        comparison = _Comparison(self.scene, self.workplace, effects, chosen, self._started, levels)
+        return self.workplace.made(comparison.task())[0]
 
 
 @dataclass
@@ -199,6 +203,8 @@ class _Comparison:
     effects: Sequence[Effect]
     chosen: Sequence[Quantity]
     study: cost.Study
+    #: numbers of members that are tried until a change beyond the horizon is decided
+    levels: Sequence[int]
     #: tasks by missing effect and number of members
     tasks: dict[tuple[str, int], Task] = field(default_factory=dict)
     points: dict[tuple[str, int], Point] = field(default_factory=dict)
@@ -212,7 +218,7 @@ class _Comparison:
         """Run the points that the budget allows and return the task of the answer."""
         from flexclear.post.answers.effect_ranking import Pair, undecided
 
-        levels = MEMBERS if self._has_contacts("") else (0,)
+        levels = self.levels if self._has_contacts("") else (0,)
         waiting = names = self._affordable(list(self._removed), levels[0])
         pairs = dict.fromkeys(names, 0)
         for members in levels:
@@ -231,7 +237,8 @@ class _Comparison:
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if repeated else IDEAL}
         without = {name: self._variant(name) for name in ("", *names)}
         left = [words[name] for name in self._removed if name not in names and words[name]]
-        return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left)
+        points = [self.study.runs[design.key] for design in self.study.points[:2]]
+        return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left, points)
 
     @cached_property
     def _compiled(self) -> set[tuple[str, ...]]:

@@ -95,10 +95,16 @@ class Study:
         self.own = float(record.attrs["evaluations"])
         self.seconds_each = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
 
+    def tighter(self) -> None:
+        """Compute the point at a tenth of the scene's own tolerance or half of its step, if there is none yet."""
+        self.begin()
+        if len(self.points) < 2:
+            self._made(self._neighbours[1])
+
     def first(self) -> None:
         """Compute the first few points in the neighbourhood of the scene's own setting."""
-        self.begin()
-        self._queue(self._neighbours[1 : cost_design.FIRST])
+        self.tighter()
+        self._queue(self._neighbours[2 : cost_design.FIRST])
 
     def neighbourhood(self) -> None:
         """Compute the other points in the neighbourhood of the scene's own setting, as far as the budget goes."""

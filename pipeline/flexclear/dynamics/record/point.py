@@ -196,6 +196,8 @@ def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regul
     for one in recorded:
         if one.quantity.over_time:
             values[one.name] = _recorded(one, time, quantities.series(run, one.quantity), regular)
+        elif one.reduction == "series":
+            values[one.name] = quantities.so_far(run, one.quantity, regular, time)
         elif one.quantity.kind == "impact_times":
             values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
         else:
