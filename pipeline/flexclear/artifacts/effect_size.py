@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 from scipy.special import stdtrit
 
-from flexclear.artifacts.points import Point, unpacked
+from flexclear.artifacts.points import Point, joined, unpacked
 from flexclear.artifacts.quantities import separated_from
 from flexclear.numerics.rotations import rotation_between
 from flexclear.scene.quantity import CONTACT_REDUCTIONS, Quantity, Recorded
@@ -126,9 +126,10 @@ def _whole(quantity: Quantity) -> Recorded:
     return Recorded(replace(quantity, component="", text=""), "largest")
 
 
-def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
-    """Return the point in an artifact of `stages.watched_quantities`."""
-    return unpacked(stored, recorded(owners, chosen))["point"]
+def watched(stored: Sequence[xr.Dataset], owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
+    """Return the point of all members in artifacts of `stages.watched_quantities`."""
+    kept = recorded(owners, chosen)
+    return joined([(unpacked(one, kept)["point"], int(one.attrs["members"])) for one in stored])
 
 
 def _compared(quantity: Quantity) -> list[Recorded]:
@@ -202,7 +203,7 @@ def predictable_outputs(points: Sequence[Point], chosen: Sequence[Quantity], ful
 def predictable_difference(
     a: Point, b: Point, quantity: Quantity, members: int, outputs: int | None, error: float
 ) -> Influence:
-    """Return the largest difference of two variants over the first outputs, all where None, and its uncertainty there.
+    """Return the largest certain difference of two variants over the first outputs (None: all), and its uncertainty.
 
     error: of both runs' time integration together, in the quantity's unit.  A difference that is nowhere REAL times its
     uncertainty is zero, with the largest one that is not excluded as uncertainty.
@@ -218,7 +219,7 @@ def predictable_difference(
     if not (sure & (distance > max(rounding(a, quantity), rounding(b, quantity)))).any():
         most = float((distance + uncertainty).max())
         return Influence(0.0, 0.0 if most <= max(rounding(a, quantity), rounding(b, quantity)) else most)
-    at = int(np.argmax(np.where(sure, distance, -1.0)))
+    at = int(np.argmax(np.where(sure, distance - uncertainty, -1.0)))
     return Influence(float(distance[at]), float(uncertainty[at]))
 
 

@@ -74,9 +74,7 @@ def assemble(
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
     shape = (n, n, len(chosen))
-    whole = [point for point in points.values() if not point.refused]
-    outputs = predictable_outputs(whole, chosen, points[frozenset()]) if not points[frozenset()].refused else None
-    early = np.full((2, n, len(chosen)), np.nan)
+    early, horizon = np.full((2, n, len(chosen)), np.nan), np.full(n, np.nan)
     data = {f"{name}{part}": np.full(shape, np.nan) for name in MEANINGS for part in ("", "_uncertainty")}
     full = points[frozenset()]
     for i, one in enumerate(effects):
@@ -88,12 +86,16 @@ def assemble(
             gained = points[every - closed_up(effects, pair)]
             single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
             independent = i != j and one.within != other.name and other.within != one.name
+            outputs: int | None = 0
+            if i == j and not lost.refused and not full.refused:
+                outputs = predictable_outputs((lost, full), chosen, full)
+                horizon[i] = times[outputs - 1] if outputs and len(times) else np.nan
             for k, quantity in enumerate(chosen):
                 variables = {"dropped": _between(lost, full, quantity, members)}
                 variables["added"] = _between(gained, bare, quantity, members)
                 if independent:
                     variables["interaction"] = _interaction(gained, single, bare, quantity, members)
-                if i == j and not lost.refused and not full.refused:
+                if i == j and outputs != 0:
                     change = predictable_difference(lost, full, quantity, members, outputs, 0.0)
                     early[:, i, k] = change.difference, change.uncertainty
                 for name, value in variables.items():
@@ -112,10 +114,9 @@ def assemble(
     )
     result["early"] = (("effect", "quantity"), early[0], {"long_name": f"{MEANINGS['dropped']}, up to the horizon"})
     result["early_uncertainty"] = (("effect", "quantity"), early[1])
-    reached = np.nan if not outputs or not len(times) else float(times[outputs - 1])
     result["horizon"] = (
-        (),
-        reached,
+        ("effect",),
+        horizon,
         {"units": "s", "long_name": "time up to which members of a variant are one motion"},
     )
     for name, text in MEANINGS.items():
@@ -152,12 +153,14 @@ def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Qu
 
 def table(dataset: xr.Dataset) -> Table:
     """Tabulate the change of each quantity by removal and addition of each effect; and the strongest interactions."""
-    rows, horizon = [], float(dataset["horizon"])
-    until = f"dropped, up to {in_unit(horizon, 's')}" if np.isfinite(horizon) else ""
+    rows, horizon = [], dataset["horizon"].values
+    until = ["dropped, up to the horizon"] if np.isfinite(horizon).any() else []
     for k, quantity in enumerate(dataset["quantity"].values):
         unit = str(dataset["unit"].values[k])
         for i, effect in enumerate(dataset["effect"].values):
-            cells = [cell(dataset, "early", (i, k), unit)] if until else []
+            reached = f" to {in_unit(horizon[i], 's')}" if np.isfinite(horizon[i]) else ""
+            finite = np.isfinite(dataset["early"].values[i, k])
+            cells = [f"{cell(dataset, 'early', (i, k), unit)}{reached if finite else ''}" for _ in until]
             cells += [cell(dataset, name, (i, i, k), unit) for name in ("dropped", "added")]
             rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
     notes = [
@@ -170,7 +173,7 @@ def table(dataset: xr.Dataset) -> Table:
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     notes += filter(None, [dataset.attrs.get("staying")])
     notes += ["Up to the horizon all runs of a variant are one motion."] if until else []
-    columns = ("quantity", "effect", *([until] if until else []), "dropped", "added", "interaction", "with")
+    columns = ("quantity", "effect", *until, "dropped", "added", "interaction", "with")
     return Table("Effect sizes", columns, tuple(rows), tuple(notes))
 
 
@@ -236,7 +239,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         dataset = dataset.isel(effect=diagonal, other=diagonal)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
-    early = "early" in dataset and bool(np.isfinite(dataset["horizon"].values).any())
+    early = "added" not in dataset and "early" in dataset and bool(np.isfinite(dataset["horizon"].values).any())
     kinds = [kind for kind in ("dropped", "added", "early") if kind in dataset and (early or kind != "early")]
     with style.style():
         figure, axes = style.panels(len(chosen), min(2, len(chosen)), 10.0, 1.1, 0.9 + 0.3 * len(names), sharey=True)
