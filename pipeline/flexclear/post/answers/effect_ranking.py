@@ -228,8 +228,8 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
         levels = [("the requested accuracy", asked)]
     sentences, named, unchanged = list[str](), list[str](), list[str]()
-    first = float(np.nanmin(single["horizon"].values, initial=np.inf))
-    beyond = f" beyond the horizon, t = {in_unit(first, 's')}" if np.isfinite(first) else ""
+    reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
+    beyond = " beyond the horizon" if reached.size else ""
     for name, limits in levels:
         certain, possible = _called_for(single, limits)
         added = [effect for effect in certain if effect not in named]
@@ -244,13 +244,13 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         named += added
     if unchanged:
         sentences.append(f"For {listed(unchanged)}, no {'further ' if named else ''}effect is needed.")
-    sentences += [_parts(single, first)] if np.isfinite(first) else []
+    sentences += [_parts(single, reached)] if reached.size else []
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + last)
 
 
-def _parts(single: xr.Dataset, first: float) -> str:
-    """Return a sentence on the answer's two parts: up to the horizon [s] and beyond it."""
+def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
+    """Return a sentence on the answer's two parts: up to the horizons [s] and over the whole run."""
     words = [str(w) for w in single["words"].values]
     changes = [
         [Influence(*pair) for pair in zip(*row, strict=True)]
@@ -259,16 +259,16 @@ def _parts(single: xr.Dataset, first: float) -> str:
     scales = single["size"].values
     left = [w for w, row in zip(words, changes, strict=True) if not all(map(decided, row, scales))]
     beyond = [w for w, sure in zip(words, single["decided"].values, strict=True) if not sure.all()]
-    members, more = int(single["members"].max()), [_deciding(single, i)[0] for i in range(len(words))]
+    members = int(single["members"].max())
+    until = " to ".join(dict.fromkeys(in_unit(time, "s") for time in (reached.min(), reached.max())))
+    more = [enough for enough, _ in (_deciding(single, i) for i in range(len(words))) if enough]
     said = f"undecided for {listed(left)}" if left else "decided for each effect"
-    text = (
-        f"Up to the horizon, t = {in_unit(first, 's')}, all runs of a variant are one motion, and its change is {said}"
-    )
+    text = f"Up to the horizon, t = {until}, all runs of a variant are one motion, and its change is {said}"
     if not beyond:
         return f"{text}; means of {members} runs decide it over the whole run as well."
     return (
         f"{text}; over the whole run means of {members} runs leave it open for {listed(beyond)}, "
-        f"which some {max(more)} runs would decide."
+        f"which some {' to '.join(dict.fromkeys(map(str, (min(more), max(more)))))} runs would decide."
     )
 
 
@@ -321,7 +321,7 @@ def table(result: xr.Dataset) -> Table:
             rows.append((words, *cells, str(members) if members else "one run"))
     notes = ["Largest change of each quantity without the effect. The number after ± or < may be due to chance."]
     if np.isfinite(result["horizon"].values).any():
-        notes.append("Up to the horizon, all runs of a variant are one motion: ± or < is the error of the integration.")
+        notes.append("Up to the horizon, all runs of a variant are one motion: ± or < is due to starts and time steps.")
     notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     return Table(
