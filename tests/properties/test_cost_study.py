@@ -256,7 +256,6 @@ def test_a_cause_that_changes_the_number_of_impacts_dominates():
     assert causes.dominant(fractions["pin.impact_times"]) == "beam theory"
     found = {row[0]: row[1] for row in causes.table(fractions, "t").rows}
     assert (found["mesh"], found["beam theory"]) == ("1.0e-03", "another number of impacts")
-    assert set(causes.make("c", fractions, "t")) == {"c.png", "c.svg"}
 
 
 def test_contacts_beyond_the_horizon_do_not_count():
@@ -330,18 +329,10 @@ def test_runs_left_undone_are_named_with_their_reason():
 
 def test_larger_ensembles_know_their_mean_better():
     values = np.random.default_rng(3).normal(10.0, 1.0, size=64)
-    errors = [statistics.relative_error(values[:size]) for size in statistics.growing(64)]
-    assert statistics.growing(64) == [8, 16, 32, 64]
+    errors = [statistics.relative_error(values[:size]) for size in (8, 16, 32, 64)]
     # 1.96 standard deviations of 0.1 over the root of 64, from one draw of them
     assert errors[-1] == pytest.approx(1.96 * 0.1 / 8.0, rel=0.2)
     assert errors[-1] < errors[1]
-
-
-def test_the_figure_of_ensembles_is_drawn():
-    random = np.random.default_rng(1)
-    data = {name: (("member", "contact"), random.uniform(1, 2, (16, 1))) for name in statistics.STATISTICS}
-    one = xr.Dataset(data, {"contact": ["pin"]}, {"cpu_seconds": 0.5})
-    assert set(statistics.make("s", {"rtol 1e-06": one, "rtol 1e-08": one}, "t")) == {"s.png", "s.svg"}
 
 
 def test_the_standard_error_of_a_series_is_that_of_its_members_mean():

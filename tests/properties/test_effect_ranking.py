@@ -35,10 +35,17 @@ def point(offset: float, scatter: float = 0.0) -> Point:
     return Point(values, {}, deviation if scatter else {}, 100)
 
 
+def separating(offset: float, later: float) -> Point:
+    """The slider of `point`, whose members agree up to half of the run and then scatter by `later` [m/s]."""
+    made = point(offset, later)
+    early = {name: np.where(TIME[:, None] < 0.5, 1e-6, v) if v.ndim else v for name, v in made.deviation.items()}
+    return Point(made.values, {}, early, 100)
+
+
 def study(**pairs: Pair):
     words = {name: f"effect {name}" for name in pairs} | {IDEAL: IDEAL}
     named = {IDEAL if name == "ideal" else name: pair for name, pair in pairs.items()}
-    return assemble(named, words | {name: name for name in named}, [VELOCITY], ["m/s"], "")
+    return assemble(named, words | {name: name for name in named}, [VELOCITY], ["m/s"], "", TIME)
 
 
 def test_without_scatter_a_change_is_the_distance_of_the_two_runs():
@@ -152,3 +159,27 @@ def test_a_refused_variant_is_named_and_calls_for_nothing():
     assert "it jams" in found.attrs["refused"]
     assert any("it jams" in note for note in table(found).notes)
     assert "undecided: broken" in sentence(found, {})
+
+
+def test_up_to_the_horizon_a_change_is_decided_however_the_members_scatter_later():
+    """A change of 5 mm/s of a motion that scatters by 0.5 m/s from t = 0.5 s on."""
+    found = study(weak=Pair(separating(0.0, 0.5), separating(5e-3, 0.5), 4))
+    # members separate within a 200th of the run after the last output at which they agree
+    assert float(found["horizon"][0]) == pytest.approx(0.5, abs=0.006)
+    assert float(found["early"][0, 0]) == pytest.approx(5e-3)
+    # Student's t of 6 degrees of freedom at 1e-3, 5.96, times 1 um/s in three directions of two variants of 4 runs
+    assert float(found["early_uncertainty"][0, 0]) == pytest.approx(5.96 * 6**0.5 * 1e-6 / 2.0, rel=1e-2)
+    assert float(found["dropped_uncertainty"][0, 0]) > 1.0
+    first, second = table(found).rows
+    assert first[0].endswith("up to 495 ms")
+    assert "would decide" in second[-1]
+    text = sentence(found, {})
+    assert "its change is decided for each effect; over the whole run means of 4 runs leave it open for weak" in text
+    assert "For errors below 0.1 %, model weak" in text
+
+
+def test_the_error_of_the_integration_bounds_what_is_decided_up_to_the_horizon():
+    pair = Pair(separating(0.0, 0.5), separating(5e-3, 0.5), 4)
+    found = assemble({"weak": pair}, {"weak": "weak"}, [VELOCITY], ["m/s"], "", TIME, lambda quantity, until: 2e-3)
+    assert float(found["early"][0, 0]) == 0.0
+    assert float(found["early_uncertainty"][0, 0]) == pytest.approx(9e-3, rel=1e-2)  # 5 mm/s and 2 mm/s of each run

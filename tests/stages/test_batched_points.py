@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.artifacts.points import Point
+from flexclear.artifacts.points import Point, joined
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.record import point as points_of
 from flexclear.dynamics.record.point import Runner
@@ -176,3 +176,16 @@ def test_the_run_for_a_points_error_reuses_its_model(root: Path, monkeypatch: py
     for clearance in (3e-4, 4e-4):
         assert not worker.run(with_numbers(paper, {"joint.A1.clearance": clearance})).refused
     assert made == [paper.solver.rtol]
+
+
+def test_members_in_batches_are_those_of_one_point(root: Path):
+    """Of equal seeds the first starts are the same, so that more members need only those that are missing."""
+    scene = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.3})
+    whole = runner(scene, members=6).run(scene)
+    parts = [runner(scene, members=4).run(scene), runner(scene, members=2, first=4).run(scene)]
+    found = joined([(parts[0], 4), (parts[1], 2)])
+    assert found.evaluations == whole.evaluations
+    for mine, its in ((found.values, whole.values), (found.deviation, whole.deviation)):
+        assert mine.keys() == its.keys()
+        for name in mine:  # sums in another order
+            np.testing.assert_allclose(mine[name], its[name], rtol=1e-9, atol=1e-12)

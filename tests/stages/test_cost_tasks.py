@@ -80,7 +80,7 @@ def test_fixed_steps_are_compared_with_other_steps_and_with_chosen_ones(csj: Sce
 
 def test_points_are_measured_alone_with_kernels_compiled_before(study: cost.Study):
     points = [task for task in in_order([study.task()]) if task.stage == "cost-point"]
-    assert len(points) == len(study.points)
+    assert len(points) == len(study.points) - 1  # the scene as it is, which is also the point at its own tolerance
     assert all(point.exclusive for point in points)
     for point in points:
         mine, compiled = (t.params["simulate"]["scene"]["solver"] for t in (point, point.inputs["kernels"]))
@@ -110,8 +110,8 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
 def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, place: Workplace, study: cost.Study):
     small = cost.Study(swing, place, seconds=1e-3)
     small.first()
-    assert [d.key for d in small.points] == ["as it is"]
-    assert len(small.undone) == cost_design.FIRST - 1
+    assert [d.key for d in small.points] == ["as it is", "dop853, rtol 1e-06"]  # one run
+    assert len(small.undone) == cost_design.FIRST - 2
     mine, others = small.task().inputs["point0"], study.task().inputs["point0"]
     assert mine.params == others.params
 

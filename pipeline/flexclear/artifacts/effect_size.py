@@ -8,7 +8,10 @@ two means is known only to its standard error:
 
 The number k of standard errors attributed to chance is Student's t for n members. s(t) is at least its root mean square
 over a twentieth of the series around t: a few separated members agree at some output by accident, and among hundreds of
-outputs a few would look like differences. Without spread d is the distance of the two motions.
+outputs would look like differences. Without spread d is the distance of the two motions.
+
+Up to the horizon, where the members of both variants are one motion each, the difference is not one of statistics:
+`predictable_outputs`, `predictable_difference`.
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ import numpy as np
 import xarray as xr
 from scipy.special import stdtrit
 
-from flexclear.artifacts.points import Point, unpacked
+from flexclear.artifacts.points import Point, joined, unpacked
+from flexclear.artifacts.quantities import separated_from
 from flexclear.numerics.rotations import rotation_between
 from flexclear.scene.quantity import CONTACT_REDUCTIONS, Quantity, Recorded
 
@@ -33,6 +37,8 @@ POOLED = 0.05
 #: recorded reductions of quantities that are not of contacts: the series, and the largest value, which an impact may
 #: cause between outputs
 OTHERS = ("series", "largest")
+#: units of positions and velocities
+MOTIONS = ("m", "rad", "m/s", "rad/s")
 #: changes of a vector's component below this fraction of the vector's largest magnitude are rounding
 ROUNDING = 1e-12
 #: a difference is real when it is at least so many times its uncertainty by chance or by errors of the runs
@@ -111,6 +117,7 @@ def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) 
     """
     there = [q for q in chosen if q.is_there(owners)]
     every = [*(one for q in there for one in _compared(q)), *(_whole(q) for q in there if q.component)]
+    every += [Recorded(q, "series") for q in there if q.kind in ("peak_force", "impulse")]
     return list({one.name: one for one in every}.values())
 
 
@@ -119,9 +126,10 @@ def _whole(quantity: Quantity) -> Recorded:
     return Recorded(replace(quantity, component="", text=""), "largest")
 
 
-def watched(stored: xr.Dataset, owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
-    """Return the point in an artifact of `stages.watched_quantities`."""
-    return unpacked(stored, recorded(owners, chosen))["point"]
+def watched(stored: Sequence[xr.Dataset], owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
+    """Return the point of all members in artifacts of `stages.watched_quantities`."""
+    kept = recorded(owners, chosen)
+    return joined([(unpacked(one, kept)["point"], int(one.attrs["members"])) for one in stored])
 
 
 def _compared(quantity: Quantity) -> list[Recorded]:
@@ -172,6 +180,55 @@ def _beyond(distance: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
     """Return the part of distances that exceeds chance."""
     squares: np.ndarray = np.maximum(0.0, distance**2 - uncertainty**2)
     return np.sqrt(squares)
+
+
+def predictable_outputs(points: Sequence[Point], chosen: Sequence[Quantity], full: Point) -> int | None:
+    """Return the number of outputs up to which the members of each point are one motion: 0 where they never are, None
+    where they always are.
+
+    They separate where they visibly differ (`quantities.separated_from`), relative to the quantity's size in `full`, in
+    positions and velocities where such quantities are chosen: forces of impacts differ for moments before.
+    """
+    outputs, series = list[int](), [q for q in chosen if q.over_time]
+    for quantity in [q for q in series if q.unit in MOTIONS] or series:
+        what, scale = Recorded(quantity, "series"), size(full, quantity)
+        for point in points:
+            if what.name in point.deviation and scale > rounding(full, quantity):
+                separation = _deviations(point, what) / scale
+                first = separated_from(np.linspace(0.0, 1.0, len(separation)), separation, 1.0)
+                outputs += [] if first is None else [first if first > 1 else 0]
+    return min(outputs, default=None)
+
+
+def predictable_difference(
+    a: Point, b: Point, quantity: Quantity, members: int, outputs: int | None, error: float
+) -> Influence:
+    """Return the largest certain difference of two variants over the first outputs (None: all), and its uncertainty.
+
+    error: of both runs' time integration together, in the quantity's unit.  A difference that is nowhere REAL times its
+    uncertainty is zero, with the largest one that is not excluded as uncertainty.
+    """
+    what = Recorded(quantity, "series")
+    if outputs == 0:
+        return Influence(np.nan, np.nan)
+    if quantity.kind == "impact_times" or what.name not in a.values or what.name not in b.values:
+        return _impact_times(a, b, quantity.name) if quantity.kind == "impact_times" else Influence(np.inf)
+    distance, spread = _along(_begin(a, what.name, outputs), _begin(b, what.name, outputs), what, members)
+    uncertainty = chance(members) * spread + error
+    sure = distance >= REAL * uncertainty
+    if not (sure & (distance > max(rounding(a, quantity), rounding(b, quantity)))).any():
+        most = float((distance + uncertainty).max())
+        return Influence(0.0, 0.0 if most <= max(rounding(a, quantity), rounding(b, quantity)) else most)
+    at = int(np.argmax(np.where(sure, distance - uncertainty, -1.0)))
+    return Influence(float(distance[at]), float(uncertainty[at]))
+
+
+def _begin(point: Point, name: str, outputs: int | None) -> Point:
+    """Return the first outputs of one series of a point."""
+    values, deviation = (
+        {name: rows[name][:outputs]} if name in rows else {} for rows in (point.values, point.deviation)
+    )
+    return Point(values, {}, deviation, 0)
 
 
 def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Influence:

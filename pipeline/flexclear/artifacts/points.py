@@ -61,6 +61,26 @@ def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Datas
     return xr.Dataset(variables, coords={"key": ("point", np.array(list(points), dtype=object))})
 
 
+def joined(parts: Sequence[tuple[Point, int]]) -> Point:
+    """Return the point of all members of several points of one scene, each with its number of members (at least 1)."""
+    if len(parts) == 1:
+        return parts[0][0]
+    refused = next((point.refused for point, _ in parts if point.refused), "")
+    evaluations, total = sum(point.evaluations for point, _ in parts), sum(n for _, n in parts)
+    if refused:
+        return Point({}, {}, {}, evaluations, refused)
+    values = {
+        name: np.asarray(np.sum([n * p.values[name] for p, n in parts], axis=0) / total) for name in parts[0][0].values
+    }
+    deviation = {}
+    for name, mean in values.items():
+        squares = [
+            (n - 1) * np.square(p.deviation.get(name, 0.0)) + n * np.square(p.values[name] - mean) for p, n in parts
+        ]
+        deviation[name] = np.asarray(np.sqrt(np.sum(squares, axis=0) / (total - 1)))
+    return Point(values, {}, deviation, evaluations)
+
+
 def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Point]:
     """Return the points of a batch by their keys."""
     arrays = {str(name): stored[name].values for name in stored.variables}

@@ -190,6 +190,20 @@ def events(run: xr.Dataset | LabelledArrays, quantity: Quantity, until: float = 
     return times
 
 
+def so_far(run: xr.Dataset | LabelledArrays, quantity: Quantity, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return the largest force of the contacts that began up to each row's time [N], or the impulse [N s], (row,).
+
+    time: of all rows [s].
+    """
+    if quantity.kind == "impulse":
+        return series(run, quantity)[rows].ravel()
+    mine = (run["event_contact"].values == quantity.owner) & (run["event_kind"].values == "closing")
+    begun, peak = run["event_time"].values[mine], run["event_peak_force"].values[mine]
+    order = np.argsort(begun, kind="stable")
+    largest = np.maximum.accumulate(np.append(0.0, peak[order]))
+    return np.asarray(largest[np.searchsorted(begun[order], time[rows], side="right")])
+
+
 def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return indices into a and into b of the times that both contain, ascending, each time once."""
     unit = SAME_TIME * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)) or 1.0

@@ -350,7 +350,7 @@ class Recorded:
     @property
     def throughout(self) -> bool:
         """True when the reduction needs the regular output times."""
-        return self.quantity.over_time and self.reduction in THROUGHOUT
+        return self.reduction == "series" or (self.quantity.over_time and self.reduction in THROUGHOUT)
 
 
 def reductions(quantity: Quantity) -> dict[str, str]:

@@ -19,7 +19,7 @@ from flexclear.stages.kernels import warm
 from flexclear.stages.simulation import bundles, rebuild
 from flexclear.system.errors import SolverError
 from flexclear.system.platforms import peak_memory
-from flexclear.system.progress import Progress, silent
+from flexclear.system.progress import Progress
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -49,8 +49,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Run an ensemble; return the contacts' statistics, ``standard_error(quantity)`` of the means of the series, and
-    the attribute ``cpu_seconds``, the processor time of the integration of one run; or the attribute `refused`.
+    """Run an ensemble; return the contacts' statistics and ``standard_error(quantity)`` of the means of the series; or
+    the attribute `refused`.
 
     params: `simulate`, with the ensemble, and `quantities`. inputs: as in `run`.
     """
@@ -58,7 +58,6 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     warm(scene, reduced, progress)
     try:
         done = analyses.ensemble(scene, reduced, progress)
-        seconds = float(np.median(analyses.cost(scene, reduced, silent, brief=True).integration))
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     recorded = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
@@ -66,7 +65,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}
     recorded = recorded.assign_coords(quantity=list(errors))
     recorded["standard_error"] = (("quantity",), list(errors.values()))
-    return {"nc": recorded.assign_attrs(cpu_seconds=seconds)}
+    return {"nc": recorded}
 
 
 def _growth(run: xr.Dataset) -> dict[str, float]:

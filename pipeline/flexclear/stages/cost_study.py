@@ -53,14 +53,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     result |= files("quantities", answer.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")
-    result |= causes.make("causes", split, f"Where the error comes from: {title}")
     marks = _marks(points, runs, chosen)
     result |= work_precision.make(
         "work_precision", study, f"Error against cost: {title}", marks, work_precision.peers(study, params["peers"])
     )
     if ensembles:
         result |= files("statistics", statistics.table(ensembles, f"Beyond the horizon: {title}"))
-        result |= statistics.make("statistics", ensembles, f"Beyond the horizon: {title}")
     return result
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flexclear.post.plotting.table import files
@@ -25,18 +26,19 @@ def task(
     effects: Sequence[Effect],
     chosen: Sequence[Quantity],
     variants: Mapping[Names, Scene],
-    watched: Mapping[Names, Task],
+    watched: Mapping[Hashable, Sequence[Task]],
     members: int,
 ) -> Task:
     """Return the task of all effect sizes. variants, watched: scenes and their tasks, by the effects that they lack."""
     params = {
         "effects": [[effect.name, effect.kind, effect.within, effect.joint] for effect in effects],
-        "variants": [sorted(gone) for gone in watched],
+        "variants": [sorted(gone) for gone in variants],
         "owners": [_owners(variant) for variant in variants.values()],
         "members": members,
         "staying": _staying(scene, [effect.name for effect in effects]),
     }
-    return _task("effects", scene, chosen, params, {f"variant{k}": made for k, made in enumerate(watched.values())})
+    inputs = {f"variant{k}/{n}": one for k, gone in enumerate(variants) for n, one in enumerate(watched[gone])}
+    return _task("effects", scene, chosen, params, inputs)
 
 
 def ranking(
@@ -44,15 +46,16 @@ def ranking(
     chosen: Sequence[Quantity],
     words: Mapping[str, str],
     variants: Mapping[str, Scene],
-    tasks: Mapping[tuple[str, int], Task],
+    tasks: Mapping[Hashable, Sequence[Task]],
     pairs: Mapping[str, int],
     undone: Sequence[str],
+    integrated: Sequence[Task] = (),
 ) -> Task:
     """Return the task that ranks the effects, each removed alone.
 
     words: description of each effect. variants: the scene without each effect, by its name (the full scene by the empty
-    name). tasks: their tasks by name and number of members (`stages.watched_quantities`). pairs: number of members with
-    which each effect is compared.
+    name). tasks: their tasks by name (`stages.watched_quantities`). pairs: number of members with which each effect is
+    compared. integrated: the scene's run and one at a tighter tolerance (`stages.cost_point`).
     """
     params = {
         "words": dict(words),
@@ -61,10 +64,9 @@ def ranking(
         "undone": ", ".join(undone),
         "staying": _staying(scene, pairs),
     }
-    used = sorted({("", members) for members in pairs.values()} | set(pairs.items()))
-    return _task(
-        "effect_ranking", scene, chosen, params, {f"{name}:{members}": tasks[name, members] for name, members in used}
-    )
+    inputs = {f"{name}/{n}": one for name in ("", *pairs) for n, one in enumerate(tasks[name])}
+    inputs |= dict(zip(("own", "tight"), integrated, strict=False))
+    return _task("effect_ranking", scene, chosen, params, inputs)
 
 
 def _task(
@@ -72,11 +74,12 @@ def _task(
 ) -> Task:
     """Return a task of this module. stage: name of the function to call and of its files."""
     watched = {"quantities": [q.written() for q in chosen], "units": [q.unit for q in chosen]}
+    outputs = {"outputs": [scene.time.start, scene.output.interval]}
     return Task(
         stage=stage,
         scene=scene.name,
         run=f"flexclear.stages.effect_study:{stage}",
-        params={"title": scene.title, **watched, **params},
+        params={"title": scene.title, **watched, **outputs, **params},
         inputs=inputs,
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": f"{stage}.nc"},
@@ -93,37 +96,72 @@ def _owners(scene: Scene) -> dict[str, list[str]]:
 
 
 def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effects.nc``, its table and its chart. params: see `task`. inputs: ``variant<k>``, as in
+    """Assemble ``effects.nc``, its table and its chart. params: see `task`. inputs: ``variant<k>/<n>``, as in
     `watched_quantities`."""
-    from flexclear.artifacts.effect_size import watched
     from flexclear.post.answers import effect_sizes
 
     all_effects = [Effect(*text) for text in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
     points = {
-        frozenset(gone): watched(inputs[f"variant{k}"], params["owners"][k], chosen)
+        frozenset(gone): _point(inputs, f"variant{k}", params["owners"][k], chosen)
         for k, gone in enumerate(params["variants"])
     }
     progress(None, "comparing")
-    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"])
+    times = _times(params["outputs"], inputs)
+    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"], times)
     dataset.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
     return result | effect_sizes.chart("effects", dataset, f"Effect sizes: {params['title']}")
 
 
-def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>:<members>``."""
+def _point(
+    inputs: Mapping[str, xr.Dataset],
+    name: str,
+    owners: Mapping[str, list[str]],
+    chosen: Sequence[Quantity],
+    members: float = math.inf,
+) -> Point:
+    """Return the point of a variant's first members, all by default, from the inputs ``<name>/<n>``."""
     from flexclear.artifacts.effect_size import watched
+
+    used: list[xr.Dataset] = []
+    known = 0
+    while f"{name}/{len(used)}" in inputs and (known < members or not used):
+        used.append(inputs[f"{name}/{len(used)}"])
+        known += int(used[-1].attrs["members"])
+    return watched(used, owners, chosen)
+
+
+def _times(outputs: Sequence[float], inputs: Mapping[str, xr.Dataset]) -> list[float]:
+    """Return the times of the outputs [s]. outputs: the first one and their interval."""
+    start, interval = outputs
+    return [
+        start + interval * k for k in range(max((int(one.sizes.get("time", 0)) for one in inputs.values()), default=0))
+    ]
+
+
+def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>/<n>``, and where
+    they exist ``own`` and ``tight``, whose difference is the error of the time integration."""
+    from flexclear.artifacts import quantities
     from flexclear.post.answers import effect_ranking as ranked
     from flexclear.post.answers import effect_sizes
 
     chosen = [Quantity.read(data) for data in params["quantities"]]
 
     def point(name: str, members: int) -> Point:
-        return watched(inputs[f"{name}:{members}"], params["owners"][name], chosen)
+        return _point(inputs, name, params["owners"][name], chosen, members)
 
     pairs = {name: ranked.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
-    results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
+
+    def error(quantity: Quantity, until: float) -> float:
+        own, tight = inputs.get("own"), inputs.get("tight")
+        if own is None or tight is None or not quantities.has(own, quantity) or not quantities.has(tight, quantity):
+            return 0.0
+        return quantities.error(own, tight, quantity, until)
+
+    times = _times(params["outputs"], inputs)
+    results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"], times, error)
     results.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": results} | files("effect_ranking", ranked.table(results))
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])

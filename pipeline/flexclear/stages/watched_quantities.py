@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 UNSEEN = ("accuracy", "ensemble", "sections", "view")
 #: number of members of a variant with contacts
 MEMBERS = 4
+#: members that one task runs end at these numbers: a study that needs more makes only those that are missing
+BATCHES = (4, 8, 16, 32, 64)
 
 
 def plain(scene: Scene) -> Scene:
@@ -31,22 +33,27 @@ def plain(scene: Scene) -> Scene:
     return edited(scene, dict.fromkeys(UNSEEN)) if any(getattr(scene, key) for key in UNSEEN) else scene
 
 
-def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
-    """Return the task of a variant; its artifact holds one point, see `points.unpacked`."""
+def tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
+    """Return the tasks of a variant, one for each batch of members; `effect_size.watched` reads their artifacts."""
     variant = plain(scene)
-    graph = Graph(variant, shown=False)
-    return Task(
-        stage="quantities",
-        scene=scene.name,
-        run="flexclear.stages.watched_quantities:run",
-        params={
-            "simulate": simulation.params(variant),
-            "quantities": [q.written() for q in chosen],
-            "members": _members(variant, members),
-        },
-        inputs=graph.bodies(),
-        modules=simulation.modules(variant),
-    )
+    graph, count = Graph(variant, shown=False), _members(variant, members)
+    ends = [*(end for end in BATCHES if end < count), count]
+    return [
+        Task(
+            stage="quantities",
+            scene=scene.name,
+            part=f"members {first + 1} to {end}" if first else "",
+            run="flexclear.stages.watched_quantities:run",
+            params={
+                "simulate": simulation.params(variant),
+                "quantities": [q.written() for q in chosen],
+                "members": [first, end],
+            },
+            inputs=graph.bodies(),
+            modules=simulation.modules(variant),
+        )
+        for first, end in zip([0, *ends], ends, strict=False)
+    ]
 
 
 def _members(scene: Scene, members: int) -> int:
@@ -57,7 +64,8 @@ def _members(scene: Scene, members: int) -> int:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Return one point as a dataset, refusals of the solver included, since they, too, show an effect.
 
-    Its attributes `compile_seconds` and `cpu_seconds` are the processor time of the kernels and of the runs [s].
+    Its attributes `compile_seconds` and `cpu_seconds` are the processor time of the kernels and of the runs [s], and
+    `members` is the number of runs.
     """
     from flexclear.artifacts.effect_size import recorded
     from flexclear.artifacts.points import batch
@@ -69,14 +77,22 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     with suppress(SolverError, InputError):  # which the point reports
         kernels.warm(scene, reduced, progress)
     compiled = kernels.processor_time()
-    point = watch(scene, reduced, chosen, params["members"])
-    spent = {"compile_seconds": compiled - begun, "cpu_seconds": kernels.processor_time() - compiled}
+    first, end = params["members"]
+    point = watch(scene, reduced, chosen, end - first, first)
+    spent = {
+        "members": max(end - first, 1),
+        "compile_seconds": compiled - begun,
+        "cpu_seconds": kernels.processor_time() - compiled,
+    }
     return {"nc": batch({"point": point}, recorded(scene.owners(), chosen)).assign_attrs(spent)}
 
 
-def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
-    """Run a scene in this process and return its point; without contacts `members` is ignored."""
+def watch(
+    scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int, first: int = 0
+) -> Point:
+    """Run a scene in this process and return the point of its members from number `first` on; without contacts they are
+    ignored."""
     from flexclear.artifacts.effect_size import recorded
     from flexclear.dynamics.record.point import Runner
 
-    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members)).run(scene)
+    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members), first=first).run(scene)

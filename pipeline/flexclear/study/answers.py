@@ -1,7 +1,8 @@
 """Three answers about a scene: what accuracy costs, whether its run is stable, which effects matter.
 
-Runs within a budget of processor time give the answers, half for the costs of accuracy, half for the effects. Stability
-is judged from the scene's run and from the runs that measured the costs of accuracy.
+Runs within one budget of processor time give the answers: a quarter at most for the costs of accuracy, what is left of
+it for the effects, which take as many runs as there are effects and members. Stability is judged from the scene's run
+and from the runs that measured the costs of accuracy.
 """
 
 from __future__ import annotations
@@ -9,17 +10,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from flexclear.post.pages import prose
 from flexclear.scene import variants
-from flexclear.scene.integrators import DEFAULT, VIBRATING
-from flexclear.scene.load import edited
-from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
-from flexclear.stages import effect_study, kernels, scenes, watched_quantities
+from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect
+from flexclear.stages import effect_study, scenes
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 from flexclear.study import cost
+from flexclear.study.members import Members, with_setting
 from flexclear.system.errors import InputError, SolverError
 from flexclear.workflow.task import Task
 
@@ -30,15 +31,14 @@ if TYPE_CHECKING:
     from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
 
+#: fraction of the budget of both that the costs of accuracy may take
+ACCURACY = 0.25
 #: default budget: so many times the processor time of the scene's own run, and at least so long [s]
 TIMES, LEAST = 3.0, 30.0
-#: number of variants that are run and compiled concurrently; time to compile one with the scene's steps compiled [s]
-AT_ONCE, COMPILING = 2.0, 4.0
-#: number of ideal variants (without a clearance or a flexible body) whose kernels are compiled during the scene's run
-AHEAD = 2
-#: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance
-MEANS = 1e-7
-#: numbers of members with which effects are compared; they rise until the difference is decided or the budget is used
+#: number of variants that are run and compiled concurrently
+AT_ONCE = 2.0
+#: numbers of members with which effects are compared; within a given budget they rise until the difference is decided,
+#: else the first one does, since effects are decided up to the horizon and the answer names the members for more
 MEMBERS = (4, 8, 16, 32)
 #: name of the effect that comprises all clearances and flexible bodies, as in `post.answers.effect_ranking`
 IDEAL = "clearance and flexibility"
@@ -114,7 +114,7 @@ class Answers:
     """The three answers about a scene, each computed at its first use.
 
     seconds: processor time of the runs; by default TIMES that of the scene's own run, and at least LEAST. questions:
-    number of answers that divide it, the costs of accuracy and the effects; 0: only stability is judged. of: names of
+    number of answers that take runs, the costs of accuracy and the effects; 0: only stability is judged. of: names of
     effects or parts, as of `variants.effects_of`.
     """
 
@@ -125,31 +125,18 @@ class Answers:
     of: Sequence[str] = ()
 
     @cached_property
-    def kernels(self) -> dict[tuple[str, ...], Task]:
-        """Return tasks that compile kernels of the effects' variants while the scene's own run leaves a processor idle;
-        by what runs on them (`kernels.shared`)."""
-        effects, tasks = variants.effects_of(self.scene, self.of, "of"), dict[tuple[str, ...], Task]()
-        ideal = [effect for effect in effects if effect.kind in (CLEARANCE, FLEXIBILITY)]
-        for effect in ideal if len(ideal) > 1 else ():  # without the only one: the ideal scene, which is run
-            gone = [other for other in effects if effect.name in (other.name, other.within)]
-            variant = watched_quantities.plain(variants.without(self.scene, gone))
-            variant = edited(variant, {"solver.integrator": DEFAULT}) if self.scene.by_need() else variant
-            tasks[kernels.shared(variant)] = kernels.task(variant, Graph(variant, shown=False).bodies())
-        return dict(list(tasks.items())[:AHEAD])
-
-    @cached_property
     def _started(self) -> cost.Study:
         """Return the study with the scene's own run measured, and with the budget that follows from that run."""
-        study = cost.Study(self.scene, self.workplace, (self.seconds or LEAST) / self.questions)
+        study = cost.Study(self.scene, self.workplace, self.seconds or LEAST)
         study.begin()
-        if self.seconds is None:
-            study.seconds = max(LEAST, TIMES * study.own * study.seconds_each) / self.questions
+        study.seconds = self.seconds or max(LEAST, TIMES * study.own * study.seconds_each)
         return study
 
     @cached_property
     def _study(self) -> cost.Study:
         """Return the study with the points in the neighbourhood of the scene's own setting."""
         study = self._started
+        study.reserve = study.seconds * (1.0 - ACCURACY) if self.questions > 1 else 0.0
         study.first()
         study.neighbourhood()
         return study
@@ -185,9 +172,10 @@ class Answers:
         effects, chosen = variants.effects_of(self.scene, self.of, "of"), self.scene.watched()
         if not effects or not chosen:
             return None
-        self.workplace.bring(list(self.kernels.values()))
-        self._started.compiled |= self.kernels
-        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._started).task())[0]
+        self._started.tighter()
+        levels = MEMBERS[:1] if self.seconds is None else MEMBERS
+        comparison = _Comparison(self.scene, self.workplace, effects, chosen, self._started, levels)
+        return self.workplace.made(comparison.task())[0]
 
 
 @dataclass
@@ -199,20 +187,25 @@ class _Comparison:
     effects: Sequence[Effect]
     chosen: Sequence[Quantity]
     study: cost.Study
-    #: tasks by missing effect and number of members
-    tasks: dict[tuple[str, int], Task] = field(default_factory=dict)
+    #: numbers of members that are tried until a change beyond the horizon is decided
+    levels: Sequence[int]
+    #: number of members that have run, by missing effect
+    done: dict[str, int] = field(default_factory=dict)
     points: dict[tuple[str, int], Point] = field(default_factory=dict)
     spent: float = 0.0
     #: True when members run at the scene's own tolerance, since the looser one for means was refused
     tight: bool = False
-    #: processor time of a run of each variant [s]
-    cpu_seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def members(self) -> Members:
+        """Members of the variants so far."""
+        return Members(self.workplace, self.chosen)
 
     def task(self) -> Task:
         """Run the points that the budget allows and return the task of the answer."""
         from flexclear.post.answers.effect_ranking import Pair, undecided
 
-        levels = MEMBERS if self._has_contacts("") else (0,)
+        levels = self.levels if self._has_contacts("") else (0,)
         waiting = names = self._affordable(list(self._removed), levels[0])
         pairs = dict.fromkeys(names, 0)
         for members in levels:
@@ -222,22 +215,17 @@ class _Comparison:
                 break
             self._bring(["", *waiting], members)
             if not self.tight and any(self.points[name, members].refused for name in ("", *waiting)):
-                self.tight = True
+                self.tight, self.done = True, {}
                 self._bring(["", *waiting], members)
             pairs |= dict.fromkeys(waiting, members)
             full = self.points["", members]
             waiting = [n for n in waiting if undecided(Pair(full, self.points[n, members], members), self.chosen)]
-        repeated = IDEAL in self._removed and self._repeats(IDEAL, [name for name in self._removed if name != IDEAL])
+        repeated = self._removed.get(IDEAL) in [gone for name, gone in self._removed.items() if name != IDEAL]
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if repeated else IDEAL}
         without = {name: self._variant(name) for name in ("", *names)}
         left = [words[name] for name in self._removed if name not in names and words[name]]
-        return effect_study.ranking(self.scene, self.chosen, words, without, self.tasks, pairs, left)
-
-    @cached_property
-    def _compiled(self) -> set[tuple[str, ...]]:
-        """Return the kinds of compiled kernels: those of the study, and those of the run of the ideal scene."""
-        run = [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
-        return {*self.study.compiled, *(kernels.shared(scene) for scene in run)}
+        points = self.study.pair
+        return effect_study.ranking(self.scene, self.chosen, words, without, self.members.tasks, pairs, left, points)
 
     @cached_property
     def _removed(self) -> Mapping[str, frozenset[str]]:
@@ -254,13 +242,8 @@ class _Comparison:
 
     def _variant(self, name: str) -> Scene:
         gone = self._removed[name] if name else frozenset()
-        variant, setting = variants.without(self.scene, [e for e in self.effects if e.name in gone]), self.study.setting
-        if setting.step is not None:
-            return variant
-        rigid = setting.integrator == VIBRATING and not variant.flexible()
-        means = (variant.contacts() or variant.stop) and not self.tight
-        rtol = max(setting.rtol, MEANS) if means else setting.rtol
-        return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})
+        variant = variants.without(self.scene, [e for e in self.effects if e.name in gone])
+        return with_setting(variant, self.study.setting, tight=self.tight)
 
     def _has_contacts(self, name: str) -> bool:
         scene = self._variant(name)
@@ -268,35 +251,22 @@ class _Comparison:
 
     def _seconds(self, name: str, members: int) -> float:
         """Predict the wall time of members of a variant [s]: from its last round, else from the scene's own run."""
-        runs = members if self._has_contacts(name) else 1
-        return (runs * self.cpu_seconds.get(name, self.study.own * self.study.seconds_each) + cost.POINT) / AT_ONCE
+        runs = members - self.done.get(name, 0) if self._has_contacts(name) else 1
+        each, _ = self.members.seconds.get(name, (self.study.own * self.study.seconds_each, 0.0))
+        return (runs * each + cost.POINT) / AT_ONCE
 
     def _affordable(self, names: Sequence[str], members: int) -> list[str]:
         """Return the first names that the rest of the budget allows, in the order in which the summary needs them; at
         least one while no point exists."""
-        fitting, total = list[str](), self.spent + self._seconds("", members)
-        for name in names:
-            kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
-            seconds = self._seconds(name, members) + (0.0 if kinds in self._compiled else COMPILING / AT_ONCE)
-            again = self._repeats(name, fitting)
-            if again or total + seconds <= self.study.seconds or not (fitting or self.points):
-                fitting.append(name)
-                total += 0.0 if again else seconds
-                self._compiled.add(kinds)
-        return fitting
-
-    def _repeats(self, name: str, others: Sequence[str]) -> bool:
-        """Return True when another effect's variant has the same runs: a single effect may be all of them."""
-        return any(self._removed.get(name) == self._removed.get(other) for other in others)
+        rest = self.study.seconds - self.study.spent - self.spent - self._seconds("", members)
+        times = list(accumulate(self._seconds(name, members) for name in names))
+        least = 0 if self.points else 1
+        gone = {self._removed[name] for name in names[: max(least, sum(time <= rest for time in times))]}
+        return [name for name in names if self._removed[name] in gone]  # equal ones cost nothing more
 
     def _bring(self, names: Sequence[str], members: int) -> None:
-        from flexclear.artifacts.effect_size import watched
-
-        tasks = [watched_quantities.task(self._variant(name), self.chosen, members) for name in names]
-        for k, (name, made) in enumerate(zip(names, self.workplace.made(*tasks), strict=True)):
-            stored = made.dataset()
-            self.tasks[name, members] = made.task
-            self.points[name, members] = watched(stored, self._variant(name).owners(), self.chosen)
-            self.cpu_seconds[name] = float(stored.attrs["cpu_seconds"]) / (members if self._has_contacts(name) else 1)
-            if not self._repeats(name, names[:k]):
-                self.spent += self._seconds(name, members) + float(stored.attrs["compile_seconds"]) / AT_ONCE
+        points = self.members.points({name: self._variant(name) for name in names}, members)
+        for name, point in points.items():
+            self.points[name, members] = point
+            self.spent += self._seconds(name, members) + self.members.seconds[name][1] / AT_ONCE
+            self.done[name] = members

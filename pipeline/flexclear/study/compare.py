@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 from flexclear.artifacts.store import publish
 from flexclear.post.pages import Part, page
@@ -25,13 +24,10 @@ PICTURES = {
 TABLES = ("differences.md", "costs.md")
 
 
-def bring(
-    scenes: list[Scene], workplace: Workplace, without: str | None = None, alongside: Sequence[Task] = ()
-) -> Made:
+def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None) -> Made:
     """Run scenes, their ideal mechanisms, and all of these at tighter tolerances; return the comparison and its page.
 
-    without: one of IDEAL, or None for the scenes alone.  alongside: tasks for a processor that the runs leave idle;
-    they may fail.  Raises InputError.
+    without: one of IDEAL, or None for the scenes alone.  Raises InputError.
     """
     sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
     if len(sides) < 2:
@@ -43,8 +39,8 @@ def bring(
     names = [side.name for side in sides]
     labels = [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(labels, sides, strict=True)}
-    runs = workplace.bring([*(graph.simulate for graph in graphs.values()), *alongside])
-    check(replace(runs, failures=tuple(failure for failure in runs.failures if failure.task not in alongside)))
+    runs = workplace.bring([graph.simulate for graph in graphs.values()])
+    check(runs)
     # the runs have compiled the kernels, so that the tighter runs need not compile them concurrently
     tight = {
         label: graph.tighter(workplace.store.load(runs.records[graph.simulate]).attrs)

@@ -15,12 +15,12 @@ from pydantic import Strict, ValidationError, model_validator
 
 from flexclear.scene.fields import Part
 from flexclear.scene.load import edited
-from flexclear.scene.solver import of_run
 from flexclear.scene.validation_errors import input_errors
 from flexclear.stages import kernels, scenes, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace
 from flexclear.study import cost_design
+from flexclear.study.members import setting_of
 from flexclear.system.errors import FlexclearError, InputError, SolverError
 from flexclear.system.external_files import require_file
 from flexclear.workflow.task import Task
@@ -46,12 +46,8 @@ MOST_EVALUATIONS = 10.0
 LISTED_RUNS = 6
 #: tables of a study, in the order in which they are printed
 PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
-#: figures of a study and their titles
-FIGURES = {
-    "work_precision": "Error against cost",
-    "causes": "Causes of the error",
-    "statistics": "Error of ensemble means against cost",
-}
+#: figure of a study, and its title
+FIGURE, TITLE = "work_precision", "Error against cost"
 
 
 @dataclass
@@ -74,6 +70,8 @@ class Study:
     points: list[cost_design.Design] = field(default_factory=list)
     undone: list[cost_design.Design] = field(default_factory=list)
     spent: float = 0.0
+    #: part of the budget that is left for others
+    reserve: float = 0.0
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
     #: loosest tolerance at which a point used up its evaluations, by integrator
     used_up: dict[str, float] = field(default_factory=dict)
@@ -92,8 +90,24 @@ class Study:
         record = self._made(self._neighbours[0])
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
+        same = self._neighbours[0]
+        for design in self._neighbours[1:]:
+            if design.scene.solver == same.scene.solver and design.scene.output == same.scene.output:
+                self.runs[design.key] = self.runs[same.key]  # one run, which is two points
+                self.points.append(design)
         self.own = float(record.attrs["evaluations"])
         self.seconds_each = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
+
+    def tighter(self) -> None:
+        """Compute the point at a tenth of the scene's own tolerance or half of its step, if there is none yet."""
+        self.begin()
+        if self._neighbours[1].key not in self.runs:
+            self._made(self._neighbours[1])
+
+    @property
+    def pair(self) -> list[Task]:
+        """Tasks of the scene as it is and of the run by `tighter`."""
+        return [self.runs[design.key] for design in self._neighbours[:2]]
 
     def first(self) -> None:
         """Compute the first few points in the neighbourhood of the scene's own setting."""
@@ -126,10 +140,8 @@ class Study:
 
     @cached_property
     def setting(self) -> cost_design.Setting:
-        """Return integrator, tolerance and step of the scene's own run, which says those that the scene leaves open."""
-        graph = Graph(self.scene, shown=False)
-        (run,) = self.workplace.datasets(graph.simulate)
-        return cost_design.Setting(*of_run(self.scene.solver, self.scene.by_need(), run.attrs), self.scene.solver.step)
+        """Integrator, tolerance and step of the scene's own run."""
+        return setting_of(self.scene, self.workplace)
 
     def task(self) -> Task:
         """Return the task of the study of all points so far."""
@@ -178,10 +190,10 @@ class Study:
 
     def _queue(self, designs: Sequence[cost_design.Design]) -> None:
         """Compute points in this order; skip those that the budget no longer allows."""
-        for design in designs:
+        for design in (one for one in designs if one.key not in self.runs):
             seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
             compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
-            if self.spent + seconds + compiling > self.seconds or self._exhausted(design):
+            if self.spent + seconds + compiling > self.seconds - self.reserve or self._exhausted(design):
                 self.undone.append(design)
             else:
                 self._made(design)
@@ -273,11 +285,9 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
     """
     from flexclear.post.cost.answer import Studied, advice
 
-    shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem in FIGURES}
-    shown = {stem: path for stem, path in shown.items() if f"{stem}.png" in made.record.files}
+    path = f"{pictures}/{name.replace('/', '_')}_{FIGURE}.png"
     paragraph = advice(made.dataset(), tables(made))
-    page = Studied(name, paragraph, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
-    return page, {path: f"{stem}.png" for stem, path in shown.items()}
+    return Studied(name, paragraph, tables(made), {TITLE: path}), {path: f"{FIGURE}.png"}
 
 
 def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> None:

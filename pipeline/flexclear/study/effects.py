@@ -11,6 +11,7 @@ from flexclear.scene import variants
 from flexclear.stages import effect_study, watched_quantities
 from flexclear.stages.scenes import pictures, tables
 from flexclear.stages.workplace import Made, Workplace
+from flexclear.study.members import Members, setting_of, with_setting
 from flexclear.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,8 +43,9 @@ def bring(
         raise InputError(str(scene.path or scene.name), "no quantity is watched", "name quantities in [view] watch")
     by_name = {effect.name: effect for effect in present}
     scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(present)}
-    tasks = {gone: watched_quantities.task(variant, chosen, members) for gone, variant in scenes.items()}
-    (made,) = workplace.made(effect_study.task(scene, present, chosen, scenes, tasks, members))
+    setting, runs = setting_of(scene, workplace), Members(workplace, chosen)
+    runs.points({gone: with_setting(variant, setting) for gone, variant in scenes.items()}, members)
+    (made,) = workplace.made(effect_study.task(scene, present, chosen, scenes, runs.tasks, members))
     parts = [
         Part("chart", "Chart", pictures(made, {"effects.png": ("Each effect alone",)})),
         Part("table", "Table", tables(made, "effects.md")),

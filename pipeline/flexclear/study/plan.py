@@ -15,8 +15,9 @@ from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import parse
 from flexclear.scene.units import quantity as number
 from flexclear.scene.variants import pruned
-from flexclear.stages import effect_plan, scenes, watched_quantities
+from flexclear.stages import effect_plan, scenes
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
+from flexclear.study.members import Members
 from flexclear.system.errors import InputError, SolverError
 
 if TYPE_CHECKING:
@@ -230,8 +231,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
 
     def compared(members: int) -> list[effect_size.Agreement]:
         both = full, planned.planned
-        stored = workplace.datasets(*(watched_quantities.task(scene, chosen, members) for scene in both))
-        one, two = (effect_size.watched(d, scene.owners(), chosen) for d, scene in zip(stored, both, strict=True))
+        one, two = Members(workplace, chosen).points(dict(enumerate(both)), members).values()
         for point, what in ((one, "full"), (two, "planned")):
             if point.refused:
                 raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")

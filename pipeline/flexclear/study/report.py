@@ -85,7 +85,7 @@ def of_scene(
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
-            compared = compare.bring([scene], workplace, "both", list(answering.kernels.values()) if answers else ())
+            compared = compare.bring([scene], workplace, "both")
     drawn = [task for what, task in graph.render.items() if what in SHOWN_MOTION]
     members = [graph.ensemble, graph.post] if graph.ensemble else []
     outcome = workplace.bring([*drawn, graph.overview, *members])  # the film takes longest, so it begins first

@@ -51,7 +51,8 @@ TOGETHER, FEWEST = 8, 3
 class Runner:
     """Runs points of one family, all edits of one scene with the same bundles, and reuses its first engine.
 
-    recorded: the quantities.  members: number of perturbed starts per point; 0: the scene's start alone.
+    recorded: the quantities.  members: number of perturbed starts per point, from number `first` of all starts on;
+    0: the scene's start alone.
     error: run each point at a tighter tolerance as well.  scaled: starts differ by what clearances, penetrations and
     the size allow, where the scene has no ensemble; else by the default of ensembles.
     """
@@ -60,6 +61,7 @@ class Runner:
     recorded: Sequence[Recorded]
     members: int = 0
     error: bool = False
+    first: int = 0
     scaled: bool = True
     engine: Engine | None = None
     _making: Lock = field(default_factory=Lock)
@@ -150,9 +152,12 @@ class Runner:
             return [start]
         jacobian = offset_jacobian(engine, start)
         given = model.scene.ensemble or (None if self.scaled else Ensemble())
-        offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.members)
+        offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.first + self.members)
         per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model.mechanism)
-        return [perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3)) for moved in offsets]
+        return [
+            perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3))
+            for moved in list(offsets)[self.first :]
+        ]
 
 
 def _statistics(rows: Sequence[Values]) -> tuple[Values, Values]:
@@ -196,6 +201,8 @@ def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regul
     for one in recorded:
         if one.quantity.over_time:
             values[one.name] = _recorded(one, time, quantities.series(run, one.quantity), regular)
+        elif one.reduction == "series":
+            values[one.name] = quantities.so_far(run, one.quantity, regular, time)
         elif one.quantity.kind == "impact_times":
             values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
         else:

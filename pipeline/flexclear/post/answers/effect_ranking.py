@@ -2,19 +2,29 @@
 
 Scenes with contacts are compared by the means of members with slightly different starts, the same in each variant. A
 change is decided where it is twice its uncertainty by chance, or where both together are below a hundredth of the
-quantity's size (`artifacts.effect_size`).
+quantity's size (`artifacts.effect_size`). Up to the horizon the members are one motion, and a change is uncertain by
+the error of the time integration only.
 """
 
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import REAL, Influence, chance, influence, scatter, size
+from flexclear.artifacts.effect_size import (
+    REAL,
+    Influence,
+    chance,
+    influence,
+    predictable_difference,
+    predictable_outputs,
+    scatter,
+    size,
+)
 from flexclear.artifacts.points import Point
 from flexclear.post.answers.effect_sizes import MEANING_NOT_COMPARABLE, NOT_COMPARABLE, cell, listed, written
 from flexclear.post.overview.curves import in_unit, rounded, size_of
@@ -59,23 +69,50 @@ def decided(change: Influence, scale: float) -> bool:
     return change.real or change.most <= SLIGHT * scale
 
 
+def outputs_of(pair: Pair, chosen: Sequence[Quantity]) -> int | None:
+    """Return the number of outputs up to the horizon of a pair (`predictable_outputs`)."""
+    if pair.full.refused or pair.without.refused:
+        return None
+    return predictable_outputs((pair.full, pair.without), chosen, pair.full)
+
+
+def early_change(pair: Pair, quantity: Quantity, outputs: int | None, error: float = 0.0) -> Influence:
+    """Return the change by the effect up to the horizon; nan where a run was refused."""
+    if pair.full.refused or pair.without.refused:
+        return Influence(np.nan, np.nan)
+    return predictable_difference(pair.without, pair.full, quantity, pair.members, outputs, error)
+
+
 def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
-    """Return the quantities whose verdict further members may change."""
+    """Return the quantities whose verdict beyond the horizon further members may change."""
     if pair.full.refused or pair.without.refused:
         return []
     return [q for q in chosen if not decided(compared(pair, q), size(pair.full, q))]
 
 
 def assemble(
-    pairs: Mapping[str, Pair], words: Mapping[str, str], chosen: Sequence[Quantity], units: Sequence[str], undone: str
+    pairs: Mapping[str, Pair],
+    words: Mapping[str, str],
+    chosen: Sequence[Quantity],
+    units: Sequence[str],
+    undone: str,
+    times: Sequence[float] = (),
+    error: Callable[[Quantity, float], float] = lambda quantity, until: 0.0,
 ) -> xr.Dataset:
     """Return changes over (effect, quantity) in the quantities' SI units.
 
     pairs: by effect, with `IDEAL` where the scene has an ideal counterpart.  words: of the effects; empty for one that
-    is not listed.  undone: effects that the budget did not reach, in words.
+    is not listed.  undone: effects that the budget did not reach, in words.  times: of the outputs [s].  error: of the
+    time integration of a run in a quantity up to a time [s].
     """
     names = list(pairs)
     changes = [[compared(pairs[name], q) for q in chosen] for name in names]
+    begun = [outputs_of(pair, chosen) for pair in pairs.values()]
+    horizons = [np.nan if not n or not len(times) else float(times[n - 1]) for n in begun]
+    early = [
+        [early_change(pair, q, n, 2.0 * error(q, until if n is not None else np.inf)) for q in chosen]
+        for pair, n, until in zip(pairs.values(), begun, horizons, strict=True)
+    ]
     full = next(iter(pairs.values())).full
     scales = [size(full, q) if not full.refused else np.nan for q in chosen]
     differences = np.array([[c.difference for c in row] for row in changes])
@@ -84,6 +121,9 @@ def assemble(
     data = {
         "dropped": (dims, differences, {"long_name": "change without the effect"}),
         "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be due to chance"}),
+        "early": (dims, np.array([[c.difference for c in row] for row in early])),
+        "early_uncertainty": (dims, np.array([[c.uncertainty for c in row] for row in early])),
+        "horizon": (("effect",), np.array(horizons)),
         "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
         "scatter": (
@@ -99,9 +139,17 @@ def assemble(
         "quantity": [q.name for q in chosen],
         "unit": ("quantity", list(units)),
     }
+    described = {
+        "early": "change without the effect up to the horizon",
+        "early_uncertainty": "part of that change that may be due to errors of the time integration",
+        "horizon": "time up to which the members of both variants are one motion each; nan: they always are",
+    }
     refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
     text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why and words[name])
-    return xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
+    result = xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
+    for name, meaning in described.items():
+        result[name].attrs = {"long_name": meaning} | ({"units": "s"} if name == "horizon" else {})
+    return result
 
 
 def ideal_sentences(result: xr.Dataset) -> list[str]:
@@ -113,7 +161,11 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
             unit, members = str(result["unit"].values[k]), int(one["members"])
-            text = in_words(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
+            scale, until = float(result["size"][k]), float(one["horizon"])
+            text = in_words(change, scale, unit, members, float(result["scatter"][k]))
+            if np.isfinite(until):
+                early = Influence(float(one["early"][k]), float(one["early_uncertainty"][k]))
+                text = f"up to t = {in_unit(until, 's')} {in_words(early, scale, unit)}. Over the whole run it {text}"
             sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
@@ -146,10 +198,11 @@ def in_words(
         apart = f"<b class='n'>{in_unit(spread, unit, 2)}</b>{part and percent(spread)}"
         return (
             f"is not predictable: {members} runs from slightly different starts differ by {apart} (standard deviation);"
-            f" their mean differs from the ideal mechanism {amount}"
+            f" their mean differs from the ideal mechanism {amount}; "
+            f"about {round_up(needed(change, scale, members))} runs would decide"
         )
     if not decided(change, scale) and members:
-        means += f"; about {needed(change, scale, members)} runs would decide"
+        means += f"; about {round_up(needed(change, scale, members))} runs would decide"
     slightly = "slightly, " if 0.0 < change.difference < SLIGHT * scale else ""
     return f"changes {slightly}{amount}{means}"
 
@@ -175,11 +228,13 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
         levels = [("the requested accuracy", asked)]
     sentences, named, unchanged = list[str](), list[str](), list[str]()
+    reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
+    beyond = " beyond the horizon" if reached.size else ""
     for name, limits in levels:
         certain, possible = _called_for(single, limits)
         added = [effect for effect in certain if effect not in named]
         uncertain = [effect for effect in possible if effect not in certain]
-        open_ = f" (undecided: {listed(uncertain)})" if uncertain else ""
+        open_ = f" (undecided{beyond}: {listed(uncertain)})" if uncertain else ""
         if added:
             sentences.append(f"For {name}, {'also ' if named else ''}model {listed(added)}{open_}.")
         elif uncertain:
@@ -189,19 +244,64 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         named += added
     if unchanged:
         sentences.append(f"For {listed(unchanged)}, no {'further ' if named else ''}effect is needed.")
+    sentences += [_parts(single, reached)] if reached.size else []
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + last)
 
 
+def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
+    """Return a sentence on the answer's two parts: up to the horizons [s] and over the whole run."""
+    words = [str(w) for w in single["words"].values]
+    changes = [
+        [Influence(*pair) for pair in zip(*row, strict=True)]
+        for row in zip(single["early"].values, single["early_uncertainty"].values, strict=True)
+    ]
+    scales = single["size"].values
+    left = [w for w, row in zip(words, changes, strict=True) if not all(map(decided, row, scales))]
+    beyond = [w for w, sure in zip(words, single["decided"].values, strict=True) if not sure.all()]
+    members = int(single["members"].max())
+    until = " to ".join(dict.fromkeys(in_unit(time, "s") for time in (reached.min(), reached.max())))
+    more = [enough for enough, _ in (_deciding(single, i) for i in range(len(words))) if enough]
+    said = f"undecided for {listed(left)}" if left else "decided for each effect"
+    text = f"Up to the horizon, t = {until}, all runs of a variant are one motion, and its change is {said}"
+    if not beyond:
+        return f"{text}; means of {members} runs decide it over the whole run as well."
+    return (
+        f"{text}; over the whole run means of {members} runs leave it open for {listed(beyond)}, "
+        f"which some {' to '.join(dict.fromkeys(map(str, (min(more), max(more)))))} runs would decide."
+    )
+
+
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
-    """Return effects whose change certainly exceeds its limit, and effects whose change may exceed it by chance."""
+    """Return effects whose change certainly exceeds its limit, up to the horizon or beyond it, and effects whose change
+    may exceed it by chance."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
+    early, doubt = single["early"].values, single["early_uncertainty"].values
     certain = np.any((change > limits) & (change >= REAL * chance), axis=1)
+    certain |= np.any((early > limits) & (early >= REAL * doubt), axis=1)
     possible = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
     words = [str(w) for w in single["words"].values]
     return [w for w, hit in zip(words, certain, strict=True) if hit], [
         w for w, hit in zip(words, possible & ~certain, strict=True) if hit
     ]
+
+
+def _deciding(result: xr.Dataset, i: int) -> tuple[int, str]:
+    """Return how many members would decide what is undecided of an effect, 0 for none, and a cell of a table on it."""
+    members = int(result["members"][i])
+    changes = [
+        (Influence(float(result["dropped"][i, k]), float(result["dropped_uncertainty"][i, k])), float(scale))
+        for k, scale in enumerate(result["size"].values)
+    ]
+    more = [needed(change, scale, members) for change, scale in changes if not decided(change, scale)]
+    enough = round_up(max(more)) if more else 0
+    return enough, f"{members}; some {enough} would decide" if more else str(members)
+
+
+def round_up(runs: int) -> int:
+    """Return a number of runs with one digit that is not zero."""
+    digit: int = 10 ** (len(str(runs)) - 1)
+    return -(-runs // digit) * digit
 
 
 def table(result: xr.Dataset) -> Table:
@@ -210,10 +310,18 @@ def table(result: xr.Dataset) -> Table:
     for i, words in enumerate(str(w) for w in result["words"].values):
         if not words:
             continue
-        cells = [cell(result, "dropped", (i, k), str(unit)) for k, unit in enumerate(result["unit"].values)]
-        members = int(result["members"][i])
-        rows.append((words, *cells, str(members) if members else "one run"))
+        units = [str(unit) for unit in result["unit"].values]
+        cells = [cell(result, "dropped", (i, k), unit) for k, unit in enumerate(units)]
+        members, until = int(result["members"][i]), float(result["horizon"][i])
+        if np.isfinite(until):
+            early = [cell(result, "early", (i, k), unit) for k, unit in enumerate(units)]
+            rows.append((f"{words}, up to {in_unit(until, 's')}", *early, "one motion"))
+            rows.append((f"{words}, whole run", *cells, _deciding(result, i)[1]))
+        else:
+            rows.append((words, *cells, str(members) if members else "one run"))
     notes = ["Largest change of each quantity without the effect. The number after ± or < may be due to chance."]
+    if np.isfinite(result["horizon"].values).any():
+        notes.append("Up to the horizon, all runs of a variant are one motion: ± or < is due to starts and time steps.")
     notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     return Table(

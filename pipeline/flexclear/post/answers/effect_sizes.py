@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import Influence, influence
+from flexclear.artifacts.effect_size import Influence, influence, predictable_difference, predictable_outputs
 from flexclear.artifacts.points import Point
 from flexclear.post.overview.curves import in_unit, measured
 from flexclear.post.plotting.table import Table
@@ -24,7 +24,7 @@ UNKNOWN = Point({}, {}, {}, 0, "not run")
 #: ratio of an axis's limits below which it has ticks between the powers of ten
 FEW = 30.0
 #: labels of the chart's bars
-LEGEND = {"dropped": "removed", "added": "added alone"}
+LEGEND = {"dropped": "removed", "added": "added alone", "early": "removed, up to the horizon"}
 #: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
 WHISKER = 0.9
 #: words for an infinite effect size, and their meaning
@@ -64,14 +64,17 @@ def assemble(
     points: Mapping[Names, Point],
     members: int,
     units: Sequence[str],
+    times: Sequence[float] = (),
 ) -> xr.Dataset:
     """Return effect sizes over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
 
     The diagonal of (effect, other) holds single effects.  points: by the effects that a variant lacks. units: of the
-    chosen quantities.  nan where a variant was refused; infinite where the quantity goes with the effect.
+    chosen quantities.  times: of the outputs [s].  nan where a variant was refused; infinite where the quantity goes
+    with the effect.
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
     shape = (n, n, len(chosen))
+    early, horizon = np.full((2, n, len(chosen)), np.nan), np.full(n, np.nan)
     data = {f"{name}{part}": np.full(shape, np.nan) for name in MEANINGS for part in ("", "_uncertainty")}
     full = points[frozenset()]
     for i, one in enumerate(effects):
@@ -83,11 +86,18 @@ def assemble(
             gained = points[every - closed_up(effects, pair)]
             single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
             independent = i != j and one.within != other.name and other.within != one.name
+            outputs: int | None = 0
+            if i == j and not lost.refused and not full.refused:
+                outputs = predictable_outputs((lost, full), chosen, full)
+                horizon[i] = times[outputs - 1] if outputs and len(times) else np.nan
             for k, quantity in enumerate(chosen):
                 variables = {"dropped": _between(lost, full, quantity, members)}
                 variables["added"] = _between(gained, bare, quantity, members)
                 if independent:
                     variables["interaction"] = _interaction(gained, single, bare, quantity, members)
+                if i == j and outputs != 0:
+                    change = predictable_difference(lost, full, quantity, members, outputs, 0.0)
+                    early[:, i, k] = change.difference, change.uncertainty
                 for name, value in variables.items():
                     data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty
     dims = ("effect", "other", "quantity")
@@ -101,6 +111,13 @@ def assemble(
             "unit": ("quantity", list(units)),
         },
         attrs={"Conventions": "CF-1.11", "members": members},
+    )
+    result["early"] = (("effect", "quantity"), early[0], {"long_name": f"{MEANINGS['dropped']}, up to the horizon"})
+    result["early_uncertainty"] = (("effect", "quantity"), early[1])
+    result["horizon"] = (
+        ("effect",),
+        horizon,
+        {"units": "s", "long_name": "time up to which members of a variant are one motion"},
     )
     for name, text in MEANINGS.items():
         result[name].attrs = {"long_name": text}
@@ -136,11 +153,15 @@ def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Qu
 
 def table(dataset: xr.Dataset) -> Table:
     """Tabulate the change of each quantity by removal and addition of each effect; and the strongest interactions."""
-    rows = []
+    rows, horizon = [], dataset["horizon"].values
+    until = ["dropped, up to the horizon"] if np.isfinite(horizon).any() else []
     for k, quantity in enumerate(dataset["quantity"].values):
         unit = str(dataset["unit"].values[k])
         for i, effect in enumerate(dataset["effect"].values):
-            cells = [cell(dataset, name, (i, i, k), unit) for name in ("dropped", "added")]
+            reached = f" to {in_unit(horizon[i], 's')}" if np.isfinite(horizon[i]) else ""
+            finite = np.isfinite(dataset["early"].values[i, k])
+            cells = [f"{cell(dataset, 'early', (i, k), unit)}{reached if finite else ''}" for _ in until]
+            cells += [cell(dataset, name, (i, i, k), unit) for name in ("dropped", "added")]
             rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
     notes = [
         "Dropped: largest change of the quantity over the run when the effect is removed from the full scene. Added: "
@@ -151,7 +172,8 @@ def table(dataset: xr.Dataset) -> Table:
     notes += [f"Refused: {line}" for line in filter(None, dataset.attrs["refused"].split("\n"))]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     notes += filter(None, [dataset.attrs.get("staying")])
-    columns = ("quantity", "effect", "dropped", "added", "interaction", "with")
+    notes += ["Up to the horizon all runs of a variant are one motion."] if until else []
+    columns = ("quantity", "effect", *until, "dropped", "added", "interaction", "with")
     return Table("Effect sizes", columns, tuple(rows), tuple(notes))
 
 
@@ -206,7 +228,7 @@ def stay(names: Sequence[str]) -> str:
 def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
     """Draw bars of the sizes of single effects, a panel for each quantity; a line where an accuracy is requested.
 
-    Uses `dropped` and, where it exists, `added`, of single effects.
+    Uses `dropped` and, where they exist, `added` or `early`, of single effects.
     """
     from matplotlib.ticker import NullFormatter
 
@@ -217,7 +239,8 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         dataset = dataset.isel(effect=diagonal, other=diagonal)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
-    kinds = [kind for kind in ("dropped", "added") if kind in dataset]
+    early = "added" not in dataset and "early" in dataset and bool(np.isfinite(dataset["horizon"].values).any())
+    kinds = [kind for kind in ("dropped", "added", "early") if kind in dataset and (early or kind != "early")]
     with style.style():
         figure, axes = style.panels(len(chosen), min(2, len(chosen)), 10.0, 1.1, 0.9 + 0.3 * len(names), sharey=True)
         for k, panel in enumerate(axes):

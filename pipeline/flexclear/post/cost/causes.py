@@ -1,18 +1,15 @@
-"""Error of a scene as it is, by cause, each from two runs that differ in that cause alone; table and figure."""
+"""Error of a scene as it is, by cause, each from two runs that differ in that cause alone; and their table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from textwrap import fill
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 
 from flexclear.artifacts import quantities
 from flexclear.post.cost.statistics import relative_error
 from flexclear.post.cost.study import Point, comparable_until, relative
-from flexclear.post.plotting.style import INK, files, grid, heading, style
 from flexclear.post.plotting.table import Table
 from flexclear.scene.quantity import Quantity
 
@@ -28,9 +25,6 @@ CAUSES = {
 }
 #: words for an infinite error
 OTHER = "another number of impacts"
-#: letters that fit next to a bar
-LETTERS = 52
-COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")
 
 
 def with_causes(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
@@ -63,45 +57,6 @@ def dominant(causes: Mapping[str, float]) -> str:
     """Return the cause with the largest error; one that changes the number of impacts is larger than any other."""
     known = {cause: error for cause, error in causes.items() if not np.isnan(error)}
     return max(known, key=lambda cause: known[cause]) if known else "–"
-
-
-def make(name: str, split: Mapping[str, Mapping[str, float]], title: str) -> dict[str, bytes]:
-    """Draw ``<name>.png`` and ``.svg``: per quantity the causes stacked, as fractions of their sum.
-
-    Fractions show what to refine; the magnitudes are next to the bars, since causes span many decades.
-    """
-    with style():
-        figure, axes = grid(1, 1, (9.5, 1.6 + 0.55 * len(split)))
-        ax = axes[0, 0]
-        for row, causes in enumerate(split.values()):
-            _bar(ax, row, causes)
-        ax.set_yticks(range(len(split)), list(split))
-        ax.invert_yaxis()
-        ax.set_xlim(0.0, 1.9)
-        ax.grid(visible=False, axis="y")
-        ax.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
-        ax.set_xlabel("fraction of the sum of all errors", x=0.5 / 1.9)
-        ax.spines["bottom"].set_bounds(0.0, 1.0)
-        handles, labels = ax.get_legend_handles_labels()
-        unique = dict(zip(labels, handles, strict=True))
-        figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=4, fontsize=8.2)
-        heading(figure, title, "errors of the scene as it is, relative to each quantity's size, by their cause")
-        return files(name, figure)
-
-
-def _bar(ax: Axes, row: int, causes: Mapping[str, float]) -> None:
-    infinite = [cause for cause, e in causes.items() if np.isinf(e)]
-    known = dict.fromkeys(infinite, 1.0) or {cause: e for cause, e in causes.items() if e > 0.0}
-    total, left = sum(known.values()), 0.0
-    for color, cause in zip(COLORS, CAUSES, strict=True):
-        if cause in known:
-            ax.barh(row, known[cause] / total, left=left, color=color, label=cause, height=0.7)
-            left += known[cause] / total
-    first = sorted(known, key=lambda cause: -known[cause])[:2]
-    text = ", ".join(f"{cause} {known[cause]:.1e}" for cause in first)
-    if infinite:
-        text = fill(f"{OTHER} by {', '.join(infinite)}", LETTERS)
-    ax.text(1.02, row, text or "no visible error", va="center", fontsize=7.5, color=INK)
 
 
 #: half the width of a normal distribution's 95 % interval, in standard deviations

@@ -239,7 +239,7 @@ def by_default(
     request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
     wanting = edited(scene, {"accuracy": request})
     search = Search(wanting, make, costs(wanting), predictable=True)
-    return _delivered(search, _climb(search, progress), progress)
+    return _delivered(search, search.cheapest(_climb(search, progress)), progress)
 
 
 def _climb(search: Search, progress: Progress) -> Attempt:
