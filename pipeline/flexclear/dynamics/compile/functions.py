@@ -113,6 +113,22 @@ def specialised(name: str, source: str, report: Callable[[str], None]) -> int:
     return loaded[path.stem].address
 
 
+def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], None]) -> dict[str, int]:
+    """Return the addresses of functions given by LLVM code, by names that tell all that the code depends on."""
+    folder = writable(kernel_root(), report)
+    paths = {name: folder / f"flexclear_routine_{name}.py" for name in texts}
+    with disk_limits(folder):
+        missing = [name for name, path in paths.items() if path.stem not in loaded and not compiled(path)]
+        if missing:
+            report("compiling routines (first run of a mechanism of this kind only)")
+        for name in missing:
+            publish(paths[name], sources.of_llvm(texts[name]()).encode())
+        load_files([path for path in paths.values() if path.stem not in loaded], lambda _: None)
+        if missing:
+            prune(folder)
+    return {name: loaded[path.stem].address for name, path in paths.items()}
+
+
 def _load(folder: Path, files: Mapping[str, Path], report: Callable[[str], None], began: float) -> None:
     """Load the functions of files, from disk or after compiling them; files: by function name."""
     names = {path: name for name, path in files.items() if path.stem not in loaded}

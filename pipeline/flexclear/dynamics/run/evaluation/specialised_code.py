@@ -26,6 +26,7 @@ from flexclear.dynamics.specialise.topology import Topology, topology_of
 from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
@@ -41,6 +42,7 @@ class SpecialisedCode:
     place: for stepping together with others; by default each engine takes its own steps.
     group: the group at that place, for the closure rows of its code.
     addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
+    lists: of calls of routines, by closure rows, where no code is specialised.  running: these with their own results.
     rows: those for which the present integration has specialised steps.  They belong to one integration, since other
     integrations of this engine must not change a bit of this one.
     """
@@ -49,6 +51,8 @@ class SpecialisedCode:
     place: Place | None = None
     group: LaneGroup | None = None
     addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
+    lists: dict[bytes, LoadedList] = field(default_factory=dict)
+    running: dict[bytes, ListInstance] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
 
@@ -77,6 +81,28 @@ def address(
     if (rows, name) not in known:
         known[rows, name] = made(model, h, rows, progress, name, exact=code.exact)
     return known[rows, name]
+
+
+def has_routines(parts: Parts) -> bool:
+    """Return True when routines know all parts of a mechanism: rigid bodies and ideal joints."""
+    return not (parts.surfaces or parts.loads or parts.effects or parts.flexible)
+
+
+def call_list(
+    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
+) -> ListInstance:
+    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
+    from flexclear.dynamics.mechanics.mechanism import evaluation  # here: they import the compiler
+    from flexclear.dynamics.mechanics.of_model import mechanism_of
+    from flexclear.dynamics.routines.store import load
+
+    if rows not in code.running:
+        if rows not in code.lists:
+            h = h.copy()
+            selection.write(model, h, np.frombuffer(rows, dtype=bool))
+            code.lists[rows] = load(evaluation(mechanism_of(model, h)), partial(progress, None))
+        code.running[rows] = code.lists[rows].instance()
+    return code.running[rows]
 
 
 def made(
