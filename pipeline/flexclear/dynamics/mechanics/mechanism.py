@@ -90,10 +90,10 @@ class Mechanism(NamedTuple):
 
 
 @routine
-def status(sound: Any, least: Any) -> Any:
+def status(sound: Any, least: Any) -> tuple[Any]:
     """Return the report of an evaluation (`memory`), from those of `trees.eliminate` and `closures.independence`."""
     regular = select(least > c.SINGULAR, float(m.OK), float(m.SINGULAR))
-    return select(sound > 0.5, regular, float(m.NOT_POSITIVE))
+    return (select(sound > 0.5, regular, float(m.NOT_POSITIVE)),)
 
 
 def evaluation(mechanism: Mechanism) -> CallList:

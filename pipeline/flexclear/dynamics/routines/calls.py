@@ -107,12 +107,12 @@ class CallList:
         """Codes that the finished list calls, in the order of their first calls."""
         return list({id(call.code): call.code for call in self.calls}.values())
 
-    def call(self, function: Callable, arguments: Any, into: Sequence[Cell] = ()) -> Any:
-        """Append a call and return its results, without the first one if cells are given into which that is stored."""
+    def call(self, function: Callable, arguments: Any, into: Sequence[Cell] | None = None) -> Any:
+        """Append a call and return its results; without the first of several, if cells are given to store that."""
         runs = _Runs()
         inside = [runs.at(one) if isinstance(one, Cell) else one for one in leaves(arguments)]
-        targets = [runs.at(cell) for cell in into]
-        kind = (function, _shape(arguments), tuple(inside), tuple(targets), tuple(runs.arrays))
+        targets = None if into is None else tuple(runs.at(cell) for cell in into)
+        kind = (function, _shape(arguments), tuple(inside), targets, tuple(runs.arrays))
         if kind not in self._kinds:
             self._kinds[kind] = _traced(function, arguments, inside, targets, tuple(runs.arrays))
         made, where = self._kinds[kind], tuple(runs.begins)
@@ -128,7 +128,7 @@ class CallList:
         return result
 
     def store(self, cells: Sequence[Cell], function: Callable, *arguments: Any) -> Any:
-        """Append a call of a routine whose first result is stored in cells, and return the others."""
+        """Append a call of a routine, the first of whose results is stored in cells, and return the others."""
         return self.call(function.__wrapped__, arguments, cells)  # type: ignore[attr-defined]
 
     def write(self, cells: Sequence[Cell], values: Sequence[Any]) -> None:
@@ -138,7 +138,7 @@ class CallList:
 
 
 def _same(values: Any) -> Any:
-    return values
+    return (values,)
 
 
 def cells(array: str, begin: int, count: int) -> list[Cell]:
@@ -174,7 +174,7 @@ class Argument:
 
 
 def _traced(
-    function: Callable, arguments: Any, inside: list[Any], into: list[Argument], runs: tuple[str, ...]
+    function: Callable, arguments: Any, inside: list[Any], into: Sequence[Argument] | None, runs: tuple[str, ...]
 ) -> _Kind:
     """Trace a routine; inside: its numbers, symbolic ones by their run."""
     tape, token = new_tape(), _building.set(None)
@@ -183,8 +183,8 @@ def _traced(
         result = function(*rebuilt(arguments, iter(symbols)))
     finally:
         _building.reset(token)
-    first, rest = _split(result, len(into))
-    stores = [(one.run, one.offset, value) for one, value in zip(into, leaves(first), strict=True)]
+    first, rest = ((), result) if into is None else (result[0], result[1] if len(result) == 2 else result[1:])
+    stores = [(one.run, one.offset, value) for one, value in zip(into or (), leaves(first), strict=True)]
     given = {id(one): k for k, one in enumerate(symbols) if isinstance(one, Symbol)}
     places, slots = list[tuple[str, Any]](), dict[Symbol, int]()
     for value in leaves(rest):
@@ -197,15 +197,6 @@ def _traced(
     stores += [(str(len(runs)), slot, value) for value, slot in slots.items()]
     code = Code(function.__name__.lstrip("_"), Program(tape.block, stores), (*runs, RESULTS))
     return _Kind(code, rest, places, len(slots))
-
-
-def _split(result: Any, count: int) -> tuple[Any, Any]:
-    """Return the first result, of so many numbers, and the others: of one number none is first, of all none is left."""
-    if not count:
-        return (), result
-    if len(leaves(result)) == count:
-        return result, ()
-    return result[0], result[1] if len(result) == 2 else result[1:]
 
 
 def _shape(tree: Any) -> Any:
