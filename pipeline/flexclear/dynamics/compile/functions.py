@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -19,16 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.artifacts.disk import disk_limits, publish
+from flexclear.artifacts.disk import disk_limits, publish, temporary
 from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import reach, sources
+from flexclear.dynamics.compile import machine_code, reach, sources
 from flexclear.dynamics.compile.compiler_process import second_process
-from flexclear.dynamics.compile.files import SIGNATURES, compiled, interpreted, load_files, loaded
+from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, interpreted, load_files, loaded
 from flexclear.dynamics.compile.folder import prune, writable
 from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
 from flexclear.dynamics.effects import DEEP, METHOD, Parts, Scheme
 from flexclear.dynamics.kernels import INTERPRETED
+from flexclear.system.platforms import replace
 from flexclear.workflow.encounters import meet
 from flexclear.workflow.fingerprint import library_version
 
@@ -114,19 +116,36 @@ def specialised(name: str, source: str, report: Callable[[str], None]) -> int:
 
 
 def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], None]) -> dict[str, int]:
-    """Return the addresses of functions given by LLVM code, by names that tell all that the code depends on."""
-    folder = writable(kernel_root(), report)
-    paths = {name: folder / f"flexclear_routine_{name}.py" for name in texts}
+    """Return the addresses of functions given by LLVM code, by names that tell all that the code depends on.
+
+    Each is called `routine` in its text, and stored in a file of its own, without a source.
+    """
+    folder, compiling = writable(kernel_root(), report), False
+    paths = {name: folder / f"flexclear_routine_{name}{CODE}" for name in texts}
     with disk_limits(folder):
-        missing = [name for name, path in paths.items() if path.stem not in loaded and not compiled(path)]
-        if missing:
-            report("compiling routines (first run of a mechanism of this kind only)")
-        for name in missing:
-            publish(paths[name], sources.of_llvm(texts[name]()).encode())
-        load_files([path for path in paths.values() if path.stem not in loaded], lambda _: None)
-        if missing:
+        for name, path in paths.items():
+            if path.stem not in loaded and not _loads(path):
+                if not compiling:
+                    compiling = True
+                    report("compiling routines (first run of a mechanism of this kind only)")
+                image = machine_code.stored("routine", *machine_code.assembled(texts[name](), 2, optimised=False))
+                with temporary(path) as scratch:  # not forced to the disk: damaged code is noticed and made again
+                    scratch.write_bytes(image)
+                    replace(scratch, path)
+                loaded.setdefault(path.stem, machine_code.load(image))
+        if compiling:
             prune(folder)
     return {name: loaded[path.stem].address for name, path in paths.items()}
+
+
+def _loads(path: Path) -> bool:
+    """Load the code of a routine; return False when it is missing or damaged."""
+    try:
+        loaded.setdefault(path.stem, machine_code.load(path.read_bytes()))
+        os.utime(path)  # marks it as used, against pruning
+    except (OSError, ValueError, KeyError):
+        return False
+    return True
 
 
 def _load(folder: Path, files: Mapping[str, Path], report: Callable[[str], None], began: float) -> None:

@@ -186,11 +186,6 @@ def batched(parts: Parts, topology: Topology, lanes: int) -> str:
     return _of_topology(file, topology, LANES, lanes=lanes)
 
 
-def of_llvm(text: str) -> str:
-    """Return the source of a function given by its LLVM code, in which it is called `routine`."""
-    return LLVM.format(text=text)
-
-
 def tangent(parts: Parts, topology: Topology) -> str:
     """Return the source of the right-hand side for one topology with its tangents."""
     file = _equations(parts)
@@ -345,10 +340,6 @@ def _formulas(parts: Parts) -> str:
 ONE_TOPOLOGY = """TOPOLOGY = (
 {topology})
 files.assembles(__name__, NAME, lambda: llvm_text({kernel}, TOPOLOGY, {options}), {level})
-"""
-LLVM = """from flexclear.dynamics.compile import files
-
-files.assembles(__name__, "routine", lambda: r'''{text}''', 2)
 """
 CHANGES = """TOPOLOGY = (
 {topology})

@@ -15,21 +15,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from flexclear.dynamics.mechanics.trees import Gain, Motion, Site, Step, carried
+from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, carried
 from flexclear.dynamics.mechanics.vectors import ZERO, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.routines.symbols import larger, select, smaller, sqrt
 
 #: pivots of J M^-1 J^T below this fraction of their diagonal entry indicate a singular pose
 SINGULAR = 1e-13
-Rows = Sequence[Sequence[Any]]
+Rows = Sequence[Numbers]
+Wrenches = Sequence[Wrench]
 Blocks = dict[tuple[int, int], Rows]
 
 
 @routine
-def closure(
-    rows: Sequence[tuple[int, int, int]], kept: int, a: tuple[Motion, Site], b: tuple[Motion, Site]
-) -> tuple[list[Any], list[Any], list[Wrench], list[Wrench]]:
+def closure(rows: Sequence[tuple[int, int, int]], kept: int, a: tuple[Motion, Site], b: tuple[Motion, Site]) -> Any:
     """Return residuals [m or -] of all rows, followed by their rates; then gamma of the first `kept` rows, and their
     wrenches on the bodies of a and b about the origins of these.
 
@@ -64,14 +63,8 @@ def row(a: Motion, b: Motion, kind: int, i: int, j: int) -> tuple[Any, Any, Any,
 
 @routine
 def spread(
-    carried_on: int,
-    step: Step,
-    gains: Sequence[Gain],
-    forces: Sequence[Any],
-    wrenches: Sequence[Wrench],
-    gamma: Sequence[Any],
-    S: Rows,
-) -> tuple[Rows, list[Any], Rows, list[Wrench]]:
+    carried_on: int, step: Step, gains: Gains, forces: Numbers, wrenches: Wrenches, gamma: Numbers, S: Rows
+) -> Any:
     """Eliminate a joint's coordinates from the rows of a closure, which are wrenches on the joint's body.
 
     Returns V = L^-1 J^T of the coordinates, gamma - V^T forces, S + V^T V, and, if `carried_on` is 1, the wrenches that
@@ -88,13 +81,13 @@ def spread(
 
 
 @routine
-def inwards(step: Step, wrenches: Sequence[Wrench]) -> list[Wrench]:
+def inwards(step: Step, wrenches: Wrenches) -> Wrenches:
     """Return wrenches on a body about the origin of the one that carries it."""
     return [wrench.about(step.p_PB) for wrench in wrenches]
 
 
 @routine
-def together(one: Sequence[Wrench], other: Sequence[Wrench]) -> list[Wrench]:
+def together(one: Wrenches, other: Wrenches) -> Wrenches:
     """Return sums of wrenches."""
     return [a + b for a, b in zip(one, other, strict=True)]
 
@@ -108,13 +101,13 @@ def coupled(S: Rows, V: Rows, W: Rows) -> Rows:
 
 
 @routine
-def with_multipliers(forces: Sequence[Any], V: Rows, multipliers: Sequence[Any]) -> list[Any]:
+def with_multipliers(forces: Numbers, V: Rows, multipliers: Numbers) -> list[Any]:
     """Return forces + V multipliers."""
     return [f + _dot(v, multipliers) for f, v in zip(forces, V, strict=True)]
 
 
 @routine
-def cholesky(S: Rows, diagonal: Sequence[Any], scales: Sequence[Any], least: Any) -> tuple[list[Any], Rows, Any]:
+def cholesky(S: Rows, diagonal: Numbers, scales: Numbers, least: Any) -> tuple[list[Any], Rows, Any]:
     """Return diagonal and reciprocal diagonal of the factor of a diagonal block; the factor; and its least pivot.
 
     S: lower part of the block after elimination of those before it, `diagonal` before that.  The factor L, too, is the
@@ -145,7 +138,7 @@ def below(S: Rows, L: Rows) -> Rows:
 
 
 @routine
-def forward(L: Rows, right: Sequence[Any]) -> list[Any]:
+def forward(L: Rows, right: Numbers) -> list[Any]:
     """Return L^-1 right."""
     x: list[Any] = []
     for row, one in zip(L, right, strict=True):
@@ -154,7 +147,7 @@ def forward(L: Rows, right: Sequence[Any]) -> list[Any]:
 
 
 @routine
-def backward(L: Rows, right: Sequence[Any]) -> list[Any]:
+def backward(L: Rows, right: Numbers) -> list[Any]:
     """Return L^-T right."""
     x = list(right)
     for i in reversed(range(len(L))):
@@ -163,13 +156,13 @@ def backward(L: Rows, right: Sequence[Any]) -> list[Any]:
 
 
 @routine
-def minus(right: Sequence[Any], A: Rows, x: Sequence[Any]) -> list[Any]:
+def minus(right: Numbers, A: Rows, x: Numbers) -> list[Any]:
     """Return right - A x."""
     return [one - _dot(row, x) for one, row in zip(right, A, strict=True)]
 
 
 @routine
-def minus_transposed(right: Sequence[Any], A: Rows, x: Sequence[Any]) -> list[Any]:
+def minus_transposed(right: Numbers, A: Rows, x: Numbers) -> list[Any]:
     """Return right - A^T x."""
     return [one - _dot(column, x) for one, column in zip(right, zip(*A, strict=True), strict=True)]
 
@@ -178,12 +171,7 @@ def _dot(a: Iterable[Any], b: Iterable[Any]) -> Any:
     return sum((x * y for x, y in zip(a, b, strict=True)), 0.0)
 
 
-def zeros(rows: int, columns: int) -> Rows:
-    """Return a matrix of zeros."""
-    return [[0.0] * columns] * rows
-
-
-def solved(L: Blocks, right: Sequence[Sequence[Any]]) -> list[Sequence[Any]]:
+def solved(L: Blocks, right: Sequence[Numbers]) -> list[Numbers]:
     """Return x of L L^T x = right."""
     x, before = list(right), {i: [k for k in range(i) if (i, k) in L] for i in range(len(right))}
     for i in range(len(x)):

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import trees as t
-from flexclear.dynamics.mechanics.trees import Body, Free, Motion, Prescribed, Resistance, Site, Step
-from flexclear.dynamics.mechanics.vectors import AT_REST, Twist, Wrench
+from flexclear.dynamics.mechanics.trees import Body, Coordinates, Motion, Resistance, Site, Step
+from flexclear.dynamics.mechanics.vectors import AT_REST, Twist
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
 from flexclear.dynamics.routines.symbols import select
 
@@ -19,11 +19,15 @@ Cells = Sequence[Cell]
 
 @dataclass(eq=False)
 class Carrier:
-    """The ground, or a link. acceleration: the part from unknown rates of speeds.  beyond: of what it carries."""
+    """The ground, or a link.
+
+    acceleration: its part from unknown rates of speeds.  beyond: of what it carries.  depth: links to the ground.
+    """
 
     motion: Motion = field(init=False)
     acceleration: Twist = field(init=False, default=AT_REST)
     beyond: list[Resistance] = field(init=False, default_factory=list)
+    depth: int = field(init=False, default=0)
 
 
 @dataclass(eq=False)
@@ -39,14 +43,22 @@ class Link(Carrier):
     kind: str
     site: Site
     body: Body
-    coordinates: Free | Prescribed
+    coordinates: Coordinates
     rates: Cells = ()
     book: int = -1
     step: Step = field(init=False)
     rest: Resistance = field(init=False)
-    gains: Sequence[t.Gain] = field(init=False, default=())
-    forces: Sequence[Any] = field(init=False, default=())
-    closing: list[tuple[list[Wrench], Sequence[Any]]] = field(init=False, default_factory=list)
+    gains: t.Gains = field(init=False, default=())
+    forces: t.Numbers = field(init=False, default=())
+    closing: list[tuple[c.Wrenches, t.Numbers]] = field(init=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.depth = self.parent.depth + 1
+
+    @property
+    def driven(self) -> bool:
+        """True when its coordinates are prescribed."""
+        return self.book >= 0
 
     @property
     def on_link(self) -> bool:
@@ -103,9 +115,11 @@ def evaluation(mechanism: Mechanism) -> CallList:
         sound = eliminated(mechanism)
         least = closed(mechanism, calls) if mechanism.closures else 1.0
         for link in mechanism.links:
-            above = link.parent.acceleration
-            given = link.kind, link.coordinates, above, link.step, link.gains, link.forces
-            link.acceleration = calls.store(link.rates, t.accelerate, *given)
+            if link.driven:
+                link.acceleration = t.follow(link.parent.acceleration, link.step)
+            else:
+                given = link.parent.acceleration, link.step, link.gains, link.forces
+                link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
         calls.write(mechanism.ledger, powers(mechanism))
         calls.store([Cell(RESULTS, 0)], status, sound, least)
     return calls
@@ -122,12 +136,12 @@ def eliminated(mechanism: Mechanism) -> Any:
     """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass."""
     sound: Any = 1.0
     for link in reversed(mechanism.links):
-        if isinstance(link.coordinates, Free):
-            given = int(link.on_link), link.motion, link.body, link.step, link.beyond, sound
-            rest, link.gains, link.forces, sound = t.eliminate(*given)
-        else:
+        if link.driven:
             link.rest = t.resist(link.motion, link.body, link.beyond)
             rest = t.carry(link.step, link.rest) if link.on_link else None
+        else:
+            given = int(link.on_link), link.motion, link.body, link.step, link.beyond, sound
+            rest, link.gains, link.forces, sound = t.eliminate(*given)
         if rest:
             link.parent.beyond.append(rest)
     return sound
@@ -135,18 +149,19 @@ def eliminated(mechanism: Mechanism) -> Any:
 
 def closed(mechanism: Mechanism, calls: CallList) -> Any:
     """Add the closures' forces to those of all links; return the smallest pivot of their matrix."""
-    found, right, S = list[Spread](), list[Any](), dict[tuple[int, int], c.Rows]()
+    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link, list[int]]()
     for one in mechanism.closures:
         kept, frames = len(one.scales), [(link.motion, site) for link, site in (one.a, one.b)]
         gamma, *wrenches = calls.store(one.residuals, c.closure, one.rows, kept, *frames)
         if not kept:
             continue
         i, ends = len(found), zip((one.a[0], one.b[0]), wrenches, strict=True)
-        mine, gamma, S[i, i] = passed_inwards(mechanism, ends, gamma)
-        for k, other in enumerate(found):
-            for link in [link for link in mine.V if link in other.V]:
-                before = S.get((i, k)) or c.zeros(kept, len(right[k]))
-                S[i, k] = c.coupled(before, mine.V[link], other.V[link])
+        mine, gamma, S[i, i] = passed_inwards(ends, gamma)
+        for link, V in mine.V.items():
+            for k in moved_by.setdefault(link, []):
+                before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
+                S[i, k] = c.coupled(before, V, found[k].V[link])
+            moved_by[link].append(i)
         found.append(mine)
         right.append(gamma)
     L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
@@ -169,7 +184,7 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
         for at, i in enumerate(column):
             L[i, j] = c.below(rest[i, j], L[j, j])
             for k in column[: at + 1]:
-                before = rest.get((i, k)) or c.zeros(len(L[i, j]), len(L[k, j]))
+                before = rest.get((i, k)) or [[0.0] * len(L[k, j])] * len(L[i, j])
                 rest[i, k] = c.eliminated(before, L[i, j], L[k, j])
     return L, least
 
@@ -178,27 +193,24 @@ class Spread(NamedTuple):
     """Rows of a closure passed from its ends to the ground: V by link, and wrenches on links with drives."""
 
     V: dict[Link, c.Rows]
-    driven: dict[Link, list[Wrench]]
+    driven: dict[Link, c.Wrenches]
 
 
-def passed_inwards(
-    mechanism: Mechanism, ends: Iterable[tuple[Carrier, list[Wrench]]], gamma: Sequence[Any]
-) -> tuple[Spread, Sequence[Any], c.Rows]:
+def passed_inwards(ends: Iterable[tuple[Carrier, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
     """Return V = L^-1 J^T of the rows of a closure, gamma - V^T L^-1 f, and V^T V; ends: links and wrenches on them."""
-    found, waiting = Spread({}, {}), dict[Link, list[Wrench]]()
-    order = {link: k for k, link in enumerate(mechanism.links)}
+    found, waiting = Spread({}, {}), dict[Link, c.Wrenches]()
     S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
 
-    def receive(link: Carrier, wrenches: list[Wrench]) -> None:
+    def receive(link: Carrier, wrenches: c.Wrenches) -> None:
         if isinstance(link, Link):
             waiting[link] = c.together(waiting[link], wrenches) if link in waiting else wrenches
 
     for link, wrenches in ends:
         receive(link, wrenches)
     while waiting:
-        link = max(waiting, key=order.__getitem__)
+        link = max(waiting, key=lambda link: link.depth)
         wrenches, carried_on = waiting.pop(link), int(link.on_link)
-        if link.book >= 0:
+        if link.driven:
             found.driven[link] = wrenches
         if link.gains:
             given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
@@ -213,8 +225,7 @@ def powers(mechanism: Mechanism) -> list[Any]:
     """Return the rates of the ledger: powers of the drives in their books, else zeros."""
     sums: list[Any] = [0.0] * len(mechanism.ledger)
     for link in mechanism.links:
-        if link.book >= 0:
-            closing = [t.weighted(wrenches, sizes) for wrenches, sizes in link.closing]
-            power = t.driving_power(link.step, link.rest, link.acceleration, closing, link.coordinates)
-            sums[link.book] = t.sum_of(sums[link.book], power)
+        if link.driven:
+            power = t.driving_power(link.step, link.rest, link.acceleration, link.closing, link.coordinates.u)
+            sums[link.book] = t.together(sums[link.book], power)
     return sums

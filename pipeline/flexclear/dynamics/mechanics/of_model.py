@@ -8,7 +8,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism
-from flexclear.dynamics.mechanics.trees import Body, Free, Law, Prescribed, Site
+from flexclear.dynamics.mechanics.trees import Body, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.routines.calls import RATES, SCENE, STATE, WORK, Cell, cells
@@ -44,19 +44,16 @@ def _body(h: np.ndarray, i: int) -> Body:
     return Body(numbers[0], Vector(numbers[1:4]), Symmetric(numbers[4:10]), *numbers[10:])
 
 
-def _joint_state(model: Model, h: np.ndarray, i: int) -> tuple[Free | Prescribed, list[Cell], int]:
+def _joint_state(model: Model, h: np.ndarray, i: int) -> tuple[Coordinates, list[Cell], int]:
     """Return the coordinates of a link's joint, where their rates are stored, and the book of its drives or -1."""
     q, u = model.numbering.positions[i], model.numbering.coordinates[i]
     if model.links[i].drives:
-        first = u.start - model.nv
-        laws = [Law(*cells(WORK, int(h[m.LAW.at]) + m.LAW.size * (first + k), m.LAW.size)) for k in range(len(u))]
-        return Prescribed(laws), [], int(model.arrays.table(m.DRIVES)["book"][first])
-    x, v, dx, dv = (
-        cells(array, begin, count)
-        for array in (STATE, RATES)
-        for begin, count in ((q.start, len(q)), (model.nq + u.start, len(u)))
-    )
-    return Free(x, v), [*dx, *dv], -1
+        laws = [cells(WORK, int(h[m.LAW.at]) + m.LAW.size * (k - model.nv), m.LAW.size) for k in u]
+        book = int(model.arrays.table(m.DRIVES)["book"][u.start - model.nv])
+        return Coordinates(*map(list, zip(*laws, strict=True))), [], book
+    places = (q.start, len(q)), (model.nq + u.start, len(u))
+    x, v = (cells(STATE, *place) for place in places)
+    return Coordinates(x, v, [0.0] * len(u)), [cell for place in places for cell in cells(RATES, *place)], -1
 
 
 def _closures(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Closure]:

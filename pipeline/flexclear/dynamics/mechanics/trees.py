@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 
 from flexclear.dynamics.mechanics.joints import JOINTS
 from flexclear.dynamics.mechanics.vectors import (
-    NO_WRENCH,
     UNIT,
     ZERO,
     Inertia,
@@ -40,6 +39,9 @@ from flexclear.dynamics.routines.symbols import select, sqrt
 #: pivots D at most this fraction of the largest that all inertia beyond could give in any pose mean a coordinate that
 #: moves no mass; rounding leaves a few times 1e-16 of it
 MASSLESS = 1e-14
+
+
+Numbers = Sequence[Any]
 
 
 class Motion(NamedTuple):
@@ -73,45 +75,12 @@ class Body(NamedTuple):
     reaching: Any
 
 
-class Free(NamedTuple):
-    """Positions and speeds of a joint that are unknown."""
+class Coordinates(NamedTuple):
+    """Positions and speeds of a joint, and the known part of the rates of the speeds."""
 
-    x: Sequence[Any]
-    u: Sequence[Any]
-
-    @property
-    def du(self) -> list[float]:
-        """Known part of the rates of the speeds."""
-        return [0.0] * len(self.u)
-
-
-class Law(NamedTuple):
-    """Value of a law of time, with its two rates."""
-
-    value: Any
-    rate: Any
-    second_rate: Any
-
-
-class Prescribed(NamedTuple):
-    """Coordinates of a joint that laws of time give."""
-
-    laws: Sequence[Law]
-
-    @property
-    def x(self) -> list[Any]:
-        """Positions."""
-        return [law.value for law in self.laws]
-
-    @property
-    def u(self) -> list[Any]:
-        """Speeds."""
-        return [law.rate for law in self.laws]
-
-    @property
-    def du(self) -> list[Any]:
-        """Rates of the speeds."""
-        return [law.second_rate for law in self.laws]
+    x: Numbers
+    u: Numbers
+    du: Numbers
 
 
 class Step(NamedTuple):
@@ -126,6 +95,9 @@ class Gain(NamedTuple):
 
     root: Any
     K: Wrench
+
+
+Gains = Sequence[Gain]
 
 
 class Resistance(NamedTuple):
@@ -153,10 +125,10 @@ def ground(gravity: Any) -> Motion:
 
 
 @routine
-def place(kind: str, parent: Motion, site: Site, coordinates: Free | Prescribed) -> tuple[Motion, Step]:
+def place(kind: str, parent: Motion, site: Site, coordinates: Coordinates) -> tuple[Motion, Step]:
     """Return a body's motion, from that of the body on which its joint sits at a site, and the step between them."""
     F = carried(parent, site)
-    x, u, du = coordinates.x, coordinates.u, coordinates.du
+    x, u, du = coordinates
     R_FG, p_FG, S, bias = JOINTS[kind].motion(x, u)
     p_FG = F.R_WB @ p_FG
     S = [s.seen(F.R_WB) for s in S]
@@ -190,9 +162,7 @@ resist = routine(resistance)
 
 
 @routine
-def eliminate(
-    carried_on: int, motion: Motion, body: Body, step: Step, beyond: Sequence[Resistance], sound: Any
-) -> tuple[Resistance | None, list[Gain], list[Any], Any]:
+def eliminate(carried_on: int, motion: Motion, body: Body, step: Step, beyond: Sequence[Resistance], sound: Any) -> Any:
     """Eliminate the coordinates of a body's joint from the resistance of the body and all beyond.
 
     Returns what remains for the body that carries it, about that one's origin, if `carried_on` is 1; the coordinates'
@@ -222,46 +192,39 @@ carry = routine(carried_at)
 
 
 @routine
-def accelerate(
-    kind: str,
-    coordinates: Free | Prescribed,
-    parent: Twist,
-    step: Step,
-    gains: Sequence[Gain],
-    forces: Sequence[Any],
-) -> tuple[list[Any], Twist]:
-    """Return the rates of a joint's positions and speeds, if free, and the acceleration of the body.
+def accelerate(kind: str, coordinates: Coordinates, parent: Twist, step: Step, gains: Gains, forces: Numbers) -> Any:
+    """Return the rates of a joint's positions and speeds, and the acceleration of the body, by L^-T.
 
     Accelerations are without the known part.  forces: L^-1 of those along the coordinates.
     """
     a, rates = parent.at(step.p_PB), list[Any]()
-    for s, gain, force in reversed(list(zip(step.S, gains, forces, strict=False))):
+    for s, gain, force in reversed(list(zip(step.S, gains, forces, strict=True))):
         rates.insert(0, gain.root * (force - gain.K.on(a)))
         a = a + s * rates[0]
-    return [*JOINTS[kind].rate(*coordinates), *rates] if isinstance(coordinates, Free) else [], a
+    return [*JOINTS[kind].rate(coordinates.x, coordinates.u), *rates], a
 
 
 @routine
-def driving_power(
-    step: Step, rest: Resistance, acceleration: Twist, closing: Sequence[Wrench], drives: Prescribed
-) -> Any:
-    """Return the power [W] that the drives of a joint supply.
+def follow(parent: Twist, step: Step) -> Twist:
+    """Return the acceleration of a body whose coordinates are prescribed, without the known part."""
+    return parent.at(step.p_PB)
 
-    acceleration: its part from unknown rates of speeds.  closing: of the closures, on the body and all beyond it.
+
+@routine
+def driving_power(step: Step, rest: Resistance, acceleration: Twist, closing: Sequence[Any], u: Numbers) -> Any:
+    """Return the power [W] that the drives of a joint supply at its speeds.
+
+    acceleration: without the known part.  closing: of each closure the wrenches of its rows on the body and all beyond,
+    and its multipliers.
     """
     F = rest.F + rest.I.of(acceleration)
-    for wrench in closing:
-        F = F - wrench
-    return F.on(total(step.S, drives.u))
+    for wrenches, multipliers in closing:
+        for wrench, size in zip(wrenches, multipliers, strict=True):
+            F = F - wrench * size
+    return F.on(total(step.S, u))
 
 
 @routine
-def sum_of(a: Any, b: Any) -> Any:
-    """Return the sum of two numbers."""
+def together(a: Any, b: Any) -> Any:
+    """Return the sum."""
     return a + b
-
-
-@routine
-def weighted(wrenches: Sequence[Wrench], sizes: Sequence[Any]) -> Wrench:
-    """Return the sum of wrenches, each times its size."""
-    return sum((wrench * size for wrench, size in zip(wrenches, sizes, strict=True)), NO_WRENCH)

@@ -143,7 +143,7 @@ class Wrench(NamedTuple):
         return Wrench(self.moment + cross(arm, self.force), self.force)
 
 
-AT_REST, NO_WRENCH = Twist(ZERO, ZERO), Wrench(ZERO, ZERO)
+AT_REST = Twist(ZERO, ZERO)
 
 
 class Inertia(NamedTuple):

@@ -27,12 +27,13 @@ from flexclear.dynamics.specialise.tape import FLOAT, Branch, Symbol
 SCENE, STATE, RATES, WORK, RESULTS = ARRAYS = "f", "y", "dy", "w", "v"
 
 
-@dataclass(frozen=True, slots=True)
 class Cell:
     """A number in memory; it has no operators, so only routines calculate with it."""
 
-    array: str
-    index: int
+    __slots__ = ("array", "index", "key")
+
+    def __init__(self, array: str, index: int) -> None:
+        self.array, self.index, self.key = array, index, (array, index)
 
 
 class Code(NamedTuple):
@@ -110,21 +111,23 @@ class CallList:
     def call(self, function: Callable, arguments: Any, into: Sequence[Cell] | None = None) -> Any:
         """Append a call and return its results; without the first of several, if cells are given to store that."""
         runs = _Runs()
-        inside = [runs.at(one) if isinstance(one, Cell) else one for one in leaves(arguments)]
+        given = leaves(arguments)
+        inside = [runs.at(one) if type(one) is Cell else one for one in given]
         targets = None if into is None else tuple(runs.at(cell) for cell in into)
         kind = (function, _shape(arguments), tuple(inside), targets, tuple(runs.arrays))
         if kind not in self._kinds:
             self._kinds[kind] = _traced(function, arguments, inside, targets, tuple(runs.arrays))
         made, where = self._kinds[kind], tuple(runs.begins)
-        if (kind, where) in self._known:
-            return self._known[kind, where]
+        known = self._known.get((id(made), where))
+        if known is not None:
+            return known
         if made.stored or into:
             self.calls.append(Call(made.code, (*where, self.size)))
-        given, base = leaves(arguments), self.size
+        base = self.size
         self.size += made.stored
         ways = {"given": given.__getitem__, "constant": lambda a: a, "stored": lambda k: Cell(RESULTS, base + k)}
         result = rebuilt(made.result, iter([ways[way](value) for way, value in made.places]))
-        self._known[kind, where] = result
+        self._known[id(made), where] = result
         return result
 
     def store(self, cells: Sequence[Cell], function: Callable, *arguments: Any) -> Any:
@@ -151,22 +154,21 @@ class _Runs:
 
     def __init__(self) -> None:
         self.arrays, self.begins, self._ends = list[str](), list[int](), list[int]()
-        self._seen: dict[Cell, Argument] = {}
+        self._seen: dict[tuple[str, int], Argument] = {}
 
     def at(self, cell: Cell) -> Argument:
         """Return a number's run, as text, and its offset there."""
-        if cell not in self._seen:
+        if cell.key not in self._seen:
             if not self.arrays or (self.arrays[-1], self._ends[-1]) != (cell.array, cell.index):
                 self.arrays.append(cell.array)
                 self.begins.append(cell.index)
                 self._ends.append(cell.index)
             self._ends[-1] += 1
-            self._seen[cell] = Argument(str(len(self.arrays) - 1), cell.index - self.begins[-1])
-        return self._seen[cell]
+            self._seen[cell.key] = Argument(str(len(self.arrays) - 1), cell.index - self.begins[-1])
+        return self._seen[cell.key]
 
 
-@dataclass(frozen=True, slots=True)
-class Argument:
+class Argument(NamedTuple):
     """An argument that is a symbol on the tape of a routine: its run and the offset there."""
 
     run: str
