@@ -13,7 +13,7 @@ import pytest
 from benchmarks.families.growth import four_bars, hinged
 from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import files, functions
+from flexclear.dynamics.compile import functions
 from flexclear.dynamics.mechanics import trees
 from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE
 from flexclear.dynamics.mechanics.mechanism import evaluation
@@ -22,6 +22,7 @@ from flexclear.dynamics.mechanics.vectors import Inertia, Matrix, Symmetric, Vec
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.routines import store
 from flexclear.dynamics.routines.calls import RESULTS, SCENE, CallList, Cell, cells, routine
 from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.routines.symbols import UndecidableError, branch, larger, smaller
@@ -312,9 +313,19 @@ def test_numbers_of_a_scene_are_inputs() -> None:
     assert_alike(evaluated(models[1]))
 
 
-def test_code_is_compiled_once_and_again_when_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(functions, "kernel_root", lambda: tmp_path)
-    monkeypatch.setattr(functions, "writable", lambda root, report: root)
+def spoilt(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-9] + b"otherwise")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder of compiled code."""
+    for module in (functions, store):
+        monkeypatch.setattr(module, "writable", lambda root, report: tmp_path)
+    return tmp_path
+
+
+def test_code_is_compiled_once_and_again_when_damaged(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with CallList().building() as calls:
         clipped(*cells(SCENE, 0, 2))
     told: list[str] = []
@@ -326,11 +337,39 @@ def test_code_is_compiled_once_and_again_when_damaged(tmp_path: Path, monkeypatc
         return bool(told)
 
     assert [compiled_anew(), compiled_anew()] == [True, False]
-    stored = sorted(tmp_path.glob(f"flexclear_routine_*{files.CODE}"))
+    stored = sorted(folder.iterdir())
     assert len(stored) == 2  # and the interpreter
     for path in stored:
-        path.write_bytes(path.read_bytes()[:-9] + b"otherwise")
+        spoilt(path)
     assert [compiled_anew(), compiled_anew()] == [True, False]
+
+
+def test_a_list_is_built_once_and_again_when_damaged(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Or when a code that it calls is."""
+    built: list[CallList] = []
+
+    def build() -> CallList:
+        with CallList().building() as calls:
+            clipped(*cells(SCENE, 0, 2))
+        built.append(calls)
+        return calls
+
+    def counts(topology: bytes = b"one") -> int:
+        """Lists built so far, after a new process has asked for one."""
+        for module in (functions, store):
+            monkeypatch.setattr(module, "loaded", {})
+        found = store.stored(topology, build, silent_text)
+        assert (len(found.codes), len(found.offsets), found.size) == (1, 2, 4)
+        return len(built)
+
+    assert [counts(), counts(), counts(b"other"), counts(b"other")] == [1, 1, 2, 2]
+    lists, codes = ([path for path in folder.iterdir() if ("list" in path.name) == kind] for kind in (True, False))
+    assert (len(lists), len(codes)) == (2, 2)
+    for path in lists:
+        spoilt(path)
+    assert [counts(), counts(), counts(b"other")] == [3, 3, 4]
+    spoilt(codes[0])
+    assert [counts(), counts(), counts(b"other")] == [5, 5, 5]
 
 
 # Steps ----------------------------------------------------------------------------------------------------------------

@@ -164,9 +164,8 @@ class Room:
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
-#: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
-#: RATES: the function that the steps evaluate, EVALUATE's or one that stores only what they read (`specialise`);
-#: CALLS: the list of calls that this function runs, if it does (`routines.emission`)
+#: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
+#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`)
 EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS = ADDRESSES = _indices(8)
 
 # Topology in h -------------------------------------------------------------------------------------------------------

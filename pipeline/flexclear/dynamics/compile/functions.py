@@ -11,7 +11,7 @@ import hashlib
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -120,8 +120,8 @@ def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], No
 
     Each is called `routine` in its text, and stored in a file of its own, without a source.
     """
-    folder, compiling = writable(kernel_root(), report), False
-    paths = {name: folder / f"flexclear_routine_{name}{CODE}" for name in texts}
+    paths, compiling = _routines(texts, report), False
+    folder = writable(kernel_root(), report)
     with disk_limits(folder):
         for name, path in paths.items():
             if path.stem not in loaded and not _loads(path):
@@ -129,13 +129,31 @@ def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], No
                     compiling = True
                     report("compiling routines (first run of a mechanism of this kind only)")
                 image = machine_code.stored("routine", *machine_code.assembled(texts[name](), 2, optimised=False))
-                with temporary(path) as scratch:  # not forced to the disk: damaged code is noticed and made again
-                    scratch.write_bytes(image)
-                    replace(scratch, path)
+                keep(path, image)
                 loaded.setdefault(path.stem, machine_code.load(image))
         if compiling:
             prune(folder)
     return {name: loaded[path.stem].address for name, path in paths.items()}
+
+
+def stored_codes(names: Iterable[str]) -> dict[str, int] | None:
+    """Return the addresses of functions of `assembled` by their names; None when one is not on disk."""
+    paths = _routines(names, lambda _: None)
+    if not all(path.stem in loaded or _loads(path) for path in paths.values()):
+        return None
+    return {name: loaded[path.stem].address for name, path in paths.items()}
+
+
+def keep(path: Path, content: bytes) -> None:
+    """Write a file without forcing it to the disk: what is damaged is noticed and made again."""
+    with temporary(path) as scratch:
+        scratch.write_bytes(content)
+        replace(scratch, path)
+
+
+def _routines(names: Iterable[str], report: Callable[[str], None]) -> dict[str, Path]:
+    folder = writable(kernel_root(), report)
+    return {name: folder / f"flexclear_routine_{name}{CODE}" for name in names}
 
 
 def _loads(path: Path) -> bool:

@@ -47,9 +47,9 @@ class Code(NamedTuple):
     runs: tuple[str, ...]
 
     @property
-    def digest(self) -> str:
+    def digest(self) -> bytes:
         """Digest of all that the machine code depends on."""
-        return hashlib.sha256(repr((self.runs, *_described(self.program))).encode()).hexdigest()
+        return hashlib.sha256(repr((self.runs, *_described(self.program))).encode()).digest()
 
 
 class _Kind(NamedTuple):

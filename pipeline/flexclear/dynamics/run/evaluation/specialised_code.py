@@ -94,13 +94,16 @@ def call_list(
     """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
     from flexclear.dynamics.mechanics.mechanism import evaluation  # here: they import the compiler
     from flexclear.dynamics.mechanics.of_model import mechanism_of
-    from flexclear.dynamics.routines.store import load
+    from flexclear.dynamics.routines.store import stored
 
     if rows not in code.running:
         if rows not in code.lists:
             h = h.copy()
             selection.write(model, h, np.frombuffer(rows, dtype=bool))
-            code.lists[rows] = load(evaluation(mechanism_of(model, h)), partial(progress, None))
+            topology = h.copy()
+            topology[list(m.ADDRESSES)] = 0
+            key = repr(model.parts).encode() + topology.tobytes()
+            code.lists[rows] = stored(key, lambda: evaluation(mechanism_of(model, h)), partial(progress, None))
         code.running[rows] = code.lists[rows].instance()
     return code.running[rows]
 
