@@ -14,11 +14,11 @@ from benchmarks.families.growth import four_bars, hinged
 from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
-from flexclear.dynamics.mechanics import trees
-from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE
-from flexclear.dynamics.mechanics.mechanism import evaluation
+from flexclear.dynamics.mechanics import closures, trees
+from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, _series
+from flexclear.dynamics.mechanics.mechanism import evaluation, status
 from flexclear.dynamics.mechanics.of_model import mechanism_of
-from flexclear.dynamics.mechanics.vectors import Inertia, Matrix, Symmetric, Vector, Wrench, cross
+from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
@@ -205,6 +205,50 @@ def test_motions_of_joints_are_rates_of_their_poses(kind: str, scale: float) -> 
     assert twist(x) == pytest.approx([spin[2, 1], spin[0, 2], spin[1, 0], *v], abs=1e-8)
     growth = (twist(x + step * rate) - twist(x - step * rate)) / (2.0 * step)
     assert np.concatenate(here.bias) == pytest.approx(growth, abs=1e-8)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in JOINTS if kind != "fixed"])
+def test_positions_of_joints_are_those_that_poses_have(kind: str) -> None:
+    """By what places the start pose; quaternions up to their norm."""
+    x = positions(kind, np.random.default_rng(4), 0.7)
+    here, size = JOINTS[kind].motion(x.tolist(), np.zeros(6).tolist()), np.ones(len(x))
+    if kind in ("spherical", "free"):
+        size[:4] = np.copysign(np.linalg.norm(x[:4]), x[0])
+    found = joint_module(kind).coordinates(np.reshape(here.R_FG, (3, 3)), np.array(here.p_FG))
+    assert found == pytest.approx(x / size, abs=1e-13)
+
+
+def test_series_of_rotation_vectors_go_over_into_closed_forms() -> None:
+    """The rates of the coefficients, which are differences over the squared angle of 0.01, lose four digits more."""
+    series, exact = (of(SERIES_ANGLE) for of in (_series, _closed))
+    assert series[:3] == pytest.approx(exact[:3], abs=1e-13)
+    assert series[3:] == pytest.approx(exact[3:], abs=1e-11)
+
+
+@pytest.mark.parametrize("mass, sound", [(1e-13, 1.0), (1e-15, 0.0), (np.nan, 0.0)])
+def test_a_coordinate_moves_mass_or_rounding(mass: float, sound: float) -> None:
+    """As share of the mass that it carries; on floats."""
+    still = trees.ground([0.0, 0.0, 0.0])
+    body = trees.Body(mass, ZERO, Symmetric([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), 1.0, 1.0)
+    step = trees.Step([trees.Twist(ZERO, Vector([0.0, 0.0, 1.0]))], ZERO)
+    assert trees.eliminate(0, still, body, step, [], 1.0)[-1] == sound
+
+
+@pytest.mark.parametrize(
+    "pivot, diagonal, scale, share", [(3.0, 3.0, 12.0, 0.25), (3.0, 6.0, 1.0, 0.5), (np.nan, 1.0, 1.0, 0.0)]
+)
+def test_pivots_of_closures_count_as_share_of_their_row(
+    pivot: float, diagonal: float, scale: float, share: float
+) -> None:
+    """Of the largest diagonal entry that it has had; on floats. The least share stays."""
+    for before in (1.0, 0.1):
+        assert closures.cholesky([[pivot]], [diagonal], [scale], before)[-1] == min(before, share)
+
+
+def test_reports_of_an_evaluation() -> None:
+    """Of massless coordinates first, then of pivots of the loops below 1e-13."""
+    found = [status(sound, least)[0] for sound, least in ((1.0, 1.0), (1.0, 2e-13), (1.0, 5e-14), (0.0, 0.0))]
+    assert found == [m.OK, m.OK, m.SINGULAR, m.NOT_POSITIVE]
 
 
 def test_spatial_quantities_refer_to_a_point() -> None:
