@@ -1,7 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
-It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Kernels serve mechanisms
-whose code would be too long. The topology alone decides, so that equal scenes give equal bytes.
+It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
+steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
+those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -99,11 +100,11 @@ def call_list(
     if rows not in code.running:
         if rows not in code.lists:
             h = h.copy()
+            h[list(m.ADDRESSES)] = 0
             selection.write(model, h, np.frombuffer(rows, dtype=bool))
-            topology = h.copy()
-            topology[list(m.ADDRESSES)] = 0
-            key = repr(model.parts).encode() + topology.tobytes()
-            code.lists[rows] = stored(key, lambda: evaluation(mechanism_of(model, h)), partial(progress, None))
+            key = repr(model.parts).encode() + h.tobytes()
+            with _making:
+                code.lists[rows] = stored(key, lambda: evaluation(mechanism_of(model, h)), partial(progress, None))
         code.running[rows] = code.lists[rows].instance()
     return code.running[rows]
 
