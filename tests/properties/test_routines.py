@@ -20,6 +20,7 @@ from flexclear.dynamics.mechanics.mechanism import evaluation, status
 from flexclear.dynamics.mechanics.of_model import mechanism_of
 from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.dynamics.model import selection
+from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.routines import store
@@ -176,14 +177,7 @@ def test_every_joint_type_has_a_row() -> None:
 
 def positions(kind: str, random: np.random.Generator, scale: float) -> np.ndarray:
     """Random positions of a joint; quaternions of another norm than 1."""
-    declared = joint_module(kind)
-    return scale * random.normal(size=len(declared.POSITIONS))
-
-
-def joint_module(kind: str) -> Any:
-    from flexclear.dynamics.model.driving import joint_type
-
-    return joint_type(kind)
+    return scale * random.normal(size=len(joint_type(kind).POSITIONS))
 
 
 @pytest.mark.parametrize("kind", [kind for kind in JOINTS if kind != "fixed"])
@@ -191,7 +185,7 @@ def joint_module(kind: str) -> Any:
 def test_motions_of_joints_are_rates_of_their_poses(kind: str, scale: float) -> None:
     """By central differences along the rate of the positions, whose error is the square of the step; on floats."""
     random, step = np.random.default_rng(3), 1e-5
-    x, u = positions(kind, random, scale), random.normal(size=len(joint_module(kind).SPEEDS))
+    x, u = positions(kind, random, scale), random.normal(size=len(joint_type(kind).SPEEDS))
     joint = JOINTS[kind]
 
     def twist(x: np.ndarray) -> np.ndarray:
@@ -214,7 +208,7 @@ def test_positions_of_joints_are_those_that_poses_have(kind: str) -> None:
     here, size = JOINTS[kind].motion(x.tolist(), np.zeros(6).tolist()), np.ones(len(x))
     if kind in ("spherical", "free"):
         size[:4] = np.copysign(np.linalg.norm(x[:4]), x[0])
-    found = joint_module(kind).coordinates(np.reshape(here.R_FG, (3, 3)), np.array(here.p_FG))
+    found = joint_type(kind).coordinates(np.reshape(here.R_FG, (3, 3)), np.array(here.p_FG))
     assert found == pytest.approx(x / size, abs=1e-13)
 
 

@@ -27,6 +27,7 @@ from flexclear.dynamics.specialise.topology import Topology, topology_of
 from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from flexclear.dynamics.routines.calls import CallList
     from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
@@ -97,14 +98,17 @@ def call_list(
     from flexclear.dynamics.mechanics.of_model import mechanism_of
     from flexclear.dynamics.routines.store import stored
 
+    def build() -> CallList:
+        topology = h.copy()
+        selection.write(model, topology, np.frombuffer(rows, dtype=bool))
+        return evaluation(mechanism_of(model, topology))
+
     if rows not in code.running:
         if rows not in code.lists:
-            h = h.copy()
-            h[list(m.ADDRESSES)] = 0
-            selection.write(model, h, np.frombuffer(rows, dtype=bool))
-            key = repr(model.parts).encode() + h.tobytes()
+            offsets = h[m.ADDRESSES[-1] + 1 : m.HEADER]
+            key = repr(model.parts).encode() + rows + model.arrays.h.tobytes() + offsets.tobytes()
             with _making:
-                code.lists[rows] = stored(key, lambda: evaluation(mechanism_of(model, h)), partial(progress, None))
+                code.lists[rows] = stored(key, build, partial(progress, None))
         code.running[rows] = code.lists[rows].instance()
     return code.running[rows]
 
