@@ -87,8 +87,8 @@ def inwards(step: Step, wrenches: Wrenches) -> Wrenches:
 
 
 @routine
-def together(one: Wrenches, other: Wrenches) -> Wrenches:
-    """Return sums of wrenches."""
+def together(one: Sequence[Any], other: Sequence[Any]) -> list[Any]:
+    """Return sums of wrenches, or of numbers."""
     return [a + b for a, b in zip(one, other, strict=True)]
 
 

@@ -9,18 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from flexclear.dynamics.mechanics.vectors import (
-    AT_REST,
-    AXES,
-    UNIT,
-    ZERO,
-    Matrix,
-    Twist,
-    Vector,
-    cross,
-    dot,
-    skew,
-)
+from flexclear.dynamics.mechanics.vectors import AT_REST, AXES, UNIT, ZERO, Matrix, Twist, Vector, cross, dot, skew
 from flexclear.dynamics.routines.symbols import branch, cos, sin, sqrt
 
 #: squared angle [rad^2] below which functions of rotation vectors come from their series; the next terms are below

@@ -227,5 +227,5 @@ def powers(mechanism: Mechanism) -> list[Any]:
     for link in mechanism.links:
         if link.driven:
             power = t.driving_power(link.step, link.rest, link.acceleration, link.closing, link.coordinates.u)
-            sums[link.book] = t.together(sums[link.book], power)
+            (sums[link.book],) = c.together([sums[link.book]], [power])
     return sums

@@ -222,9 +222,3 @@ def driving_power(step: Step, rest: Resistance, acceleration: Twist, closing: Se
         for wrench, size in zip(wrenches, multipliers, strict=True):
             F = F - wrench * size
     return F.on(total(step.S, u))
-
-
-@routine
-def together(a: Any, b: Any) -> Any:
-    """Return the sum."""
-    return a + b
