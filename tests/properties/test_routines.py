@@ -27,12 +27,12 @@ from flexclear.dynamics.routines import store
 from flexclear.dynamics.routines.calls import RESULTS, SCENE, CallList, Cell, cells, routine
 from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.routines.symbols import UndecidableError, branch, larger, smaller
+from flexclear.dynamics.run.evaluation import specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
-from flexclear.dynamics.specialise import program
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
@@ -411,15 +411,15 @@ def test_a_list_is_built_once_and_again_when_damaged(folder: Path, monkeypatch: 
 
 
 # Steps ----------------------------------------------------------------------------------------------------------------
-@pytest.fixture
-def engines(monkeypatch: pytest.MonkeyPatch) -> list[Engine]:
-    """Of loops with redundant rows that count as long: with routines, and with kernels alone."""
-    monkeypatch.setattr(program, "LONGEST", 10)
-    return [engine_of(four_bars(3, 0.3), {}, silent) for _ in range(2)]
+def long(scene: Scene) -> Engine:
+    """The engine of a scene as if it were too long for specialised code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(specialised_code, "INTERPRETED", True)
+        return engine_of(scene, {}, silent)
 
 
-def test_steps_of_long_mechanisms_run_on_routines(engines: list[Engine], monkeypatch: pytest.MonkeyPatch) -> None:
-    runs = []
+def test_steps_of_long_mechanisms_run_on_routines(monkeypatch: pytest.MonkeyPatch) -> None:
+    engines, runs = [long(four_bars(3, 0.3)) for _ in range(2)], []
     for alone, one in enumerate(engines):
         with monkeypatch.context() as patch:
             if alone:
@@ -431,10 +431,9 @@ def test_steps_of_long_mechanisms_run_on_routines(engines: list[Engine], monkeyp
     assert apart(runs[0].state, runs[1].state) < 1e-9
 
 
-def test_a_list_belongs_to_the_rows_that_are_selected(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_list_belongs_to_the_rows_that_are_selected() -> None:
     """With rows that depend on others the same pose is singular."""
-    monkeypatch.setattr(program, "LONGEST", 10)
-    one = engine_of(load_scene(TREE / "scenes/checks/four_bars_2.toml"), {}, silent)
+    one = long(load_scene(TREE / "scenes/checks/four_bars_2.toml"))
     y, lists, reports = consistent_start(one), [], []
     kept = one.selected.copy()
     for rows in (kept, np.ones_like(kept), kept):
