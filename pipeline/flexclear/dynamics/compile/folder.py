@@ -44,7 +44,8 @@ def processor() -> str:
 def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
     """Remove kernels unused for `unused` seconds, then the oldest beyond `largest` bytes; return their number."""
     sweep(folder)
-    kernels = [(_used(path), path) for path in folder.glob("flexclear_*.py")]
+    files = [*folder.glob("flexclear_*.py"), *folder.glob(f"flexclear_routine_*{CODE}")]
+    kernels = [(_used(path), path) for path in files]
     total, removed = 0, 0
     for used, path in sorted(kernels, reverse=True):
         total += size(path)
@@ -54,8 +55,8 @@ def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
 
 
 def size(path: Path) -> int:
-    """Return the bytes of a generated file and its compiled code."""
-    return sum(file.stat().st_size for file in (path, path.with_suffix(CODE)) if file.is_file())
+    """Return the bytes of a generated file and its compiled code, or of the code of a routine."""
+    return sum(file.stat().st_size for file in {path, path.with_suffix(CODE)} if file.is_file())
 
 
 def _used(path: Path) -> float:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,16 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.artifacts.disk import disk_limits, publish
+from flexclear.artifacts.disk import disk_limits, publish, temporary
 from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import reach, sources
+from flexclear.dynamics.compile import machine_code, reach, sources
 from flexclear.dynamics.compile.compiler_process import second_process
-from flexclear.dynamics.compile.files import SIGNATURES, compiled, interpreted, load_files, loaded
+from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, interpreted, load_files, loaded
 from flexclear.dynamics.compile.folder import prune, writable
 from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
 from flexclear.dynamics.effects import DEEP, METHOD, Parts, Scheme
 from flexclear.dynamics.kernels import INTERPRETED
+from flexclear.system.platforms import replace
 from flexclear.workflow.encounters import meet
 from flexclear.workflow.fingerprint import library_version
 
@@ -111,6 +113,57 @@ def specialised(name: str, source: str, report: Callable[[str], None]) -> int:
     path = _file(folder, name, source)
     _load(folder, {name: path}, report, began)
     return loaded[path.stem].address
+
+
+def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], None]) -> dict[str, int]:
+    """Return the addresses of functions given by LLVM code, by names that tell all that the code depends on.
+
+    Each is called `routine` in its text, and stored in a file of its own, without a source.
+    """
+    paths, compiling = _routines(texts, report), False
+    folder = writable(kernel_root(), report)
+    with disk_limits(folder):
+        for name, path in paths.items():
+            if path.stem not in loaded and not _loads(path):
+                if not compiling:
+                    compiling = True
+                    report("compiling routines (first run of a mechanism of this kind only)")
+                image = machine_code.stored("routine", *machine_code.assembled(texts[name](), 2, optimised=False))
+                keep(path, image)
+                loaded.setdefault(path.stem, machine_code.load(image))
+        if compiling:
+            prune(folder)
+    return {name: loaded[path.stem].address for name, path in paths.items()}
+
+
+def stored_codes(names: Iterable[str]) -> dict[str, int] | None:
+    """Return the addresses of functions of `assembled` by their names; None when one is not on disk."""
+    paths = _routines(names, lambda _: None)
+    if not all(path.stem in loaded or _loads(path) for path in paths.values()):
+        return None
+    return {name: loaded[path.stem].address for name, path in paths.items()}
+
+
+def keep(path: Path, content: bytes) -> None:
+    """Write a file without forcing it to the disk: what is damaged is noticed and made again."""
+    with temporary(path) as scratch:
+        scratch.write_bytes(content)
+        replace(scratch, path)
+
+
+def _routines(names: Iterable[str], report: Callable[[str], None]) -> dict[str, Path]:
+    folder = writable(kernel_root(), report)
+    return {name: folder / f"flexclear_routine_{name}{CODE}" for name in names}
+
+
+def _loads(path: Path) -> bool:
+    """Load the code of a routine; return False when it is missing or damaged."""
+    try:
+        loaded.setdefault(path.stem, machine_code.load(path.read_bytes()))
+        os.utime(path)  # marks it as used, against pruning
+    except (OSError, ValueError, KeyError):
+        return False
+    return True
 
 
 def _load(folder: Path, files: Mapping[str, Path], report: Callable[[str], None], began: float) -> None:

@@ -33,6 +33,8 @@ def _operator(name: str, *, reflected: bool = False) -> Callable[[Any, Any], Any
     """Return an operator of symbols, which their tape records; reflected: the symbol is the second operand."""
 
     def apply(self: Symbol, other: Any) -> Any:
+        if isinstance(other, tuple):  # a vector, whose own operators multiply each entry
+            return NotImplemented
         return getattr(self.tape, name)(other, self) if reflected else getattr(self.tape, name)(self, other)
 
     return apply

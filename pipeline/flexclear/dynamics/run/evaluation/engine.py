@@ -15,13 +15,21 @@ from flexclear.dynamics.compile.functions import function, place
 from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
 from flexclear.dynamics.effects import INTEGRATORS, scheme_of
 from flexclear.dynamics.integrate.method import Method
+from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.driving import coordinate_of
 from flexclear.dynamics.model.initial import given_rates
 from flexclear.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import start_errors
-from flexclear.dynamics.run.evaluation.specialised_code import SpecialisedCode, address, equations, made
+from flexclear.dynamics.run.evaluation.specialised_code import (
+    SpecialisedCode,
+    address,
+    call_list,
+    equations,
+    has_routines,
+    made,
+)
 from flexclear.scene.loads import SampledPid
 from flexclear.scene.registry import lookup
 from flexclear.system.errors import InputError, SolverError, refuse
@@ -61,6 +69,12 @@ class Engine:
     def has_specialised_code(self) -> bool:
         """True when evaluations use code specialised for the topology."""
         return "evaluate" not in self.entry.addresses
+
+    @property
+    def has_routines(self) -> bool:
+        """True when steps run a list of calls: of a mechanism of known routines without specialised code."""
+        alone = INTERPRETED or self.has_specialised_code or self.h[m.N_CHANGES]
+        return not alone and has_routines(self.model.parts)
 
     @cached_property
     def breaks(self) -> np.ndarray:
@@ -118,12 +132,16 @@ class Engine:
         self.connect()
 
     def connect(self) -> None:
-        """Connect the functions for the selected rows: specialised code for the steps where it exists."""
+        """Connect the functions for the selected rows: specialised code or routines for the steps where they exist."""
         rows, known = self.selected.tobytes(), self.specialised
         alone = rows in known.rows
         if self.has_specialised_code:
             self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
-        self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
+        if alone and self.has_routines:
+            calls = call_list(self.model, self.h, known, rows)
+            self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
+        else:
+            self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
 
     @property
@@ -132,20 +150,21 @@ class Engine:
         return bool(self.method.staged and self.has_specialised_code)
 
     def settle(self, progress: Progress) -> None:
-        """Let further steps use specialised code for the selected rows, at a place together with other engines.
+        """Let further steps use specialised code or routines for the selected rows, at a place together with others.
 
         The selections that the integration has met decide, so an interrupted integration continues with the same code
         as an uninterrupted one.
         """
         specialised, rows, changes = self.specialised, self.selected.tobytes(), self.h[m.N_CHANGES]
-        if self.has_specialised_code or changes:
+        if self.has_specialised_code or changes or self.has_routines:
             if specialised.place is not None and specialised.group is None and self.staged:
                 where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
                 specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
             if rows not in specialised.rows and (len(specialised.rows) < SELECTIONS or changes):
                 specialised.rows.append(rows)
             for met in specialised.rows:
-                address(self.model, self.h, specialised, met, progress=progress)
+                made_ready = call_list if self.has_routines else address
+                made_ready(self.model, self.h, specialised, met, progress=progress)
         self.connect()
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
@@ -275,6 +294,7 @@ def another(engine: Engine) -> Engine:
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
     made.specialised.exact = engine.specialised.exact
     made.specialised.addresses = engine.specialised.addresses.copy()
+    made.specialised.lists = engine.specialised.lists.copy()
     return made
 
 

@@ -1,7 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
-It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Kernels serve mechanisms
-whose code would be too long. The topology alone decides, so that equal scenes give equal bytes.
+It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
+steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
+those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from flexclear.dynamics.specialise.topology import Topology, topology_of
 from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from flexclear.dynamics.routines.calls import CallList
+    from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
@@ -41,6 +44,7 @@ class SpecialisedCode:
     place: for stepping together with others; by default each engine takes its own steps.
     group: the group at that place, for the closure rows of its code.
     addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
+    lists: of calls of routines, by closure rows, where no code is specialised.  running: these with their own results.
     rows: those for which the present integration has specialised steps.  They belong to one integration, since other
     integrations of this engine must not change a bit of this one.
     """
@@ -49,6 +53,8 @@ class SpecialisedCode:
     place: Place | None = None
     group: LaneGroup | None = None
     addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
+    lists: dict[bytes, LoadedList] = field(default_factory=dict)
+    running: dict[bytes, ListInstance] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
 
@@ -77,6 +83,34 @@ def address(
     if (rows, name) not in known:
         known[rows, name] = made(model, h, rows, progress, name, exact=code.exact)
     return known[rows, name]
+
+
+def has_routines(parts: Parts) -> bool:
+    """Return True when routines know all parts of a mechanism: rigid bodies and ideal joints."""
+    return not (parts.surfaces or parts.loads or parts.effects or parts.flexible)
+
+
+def call_list(
+    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
+) -> ListInstance:
+    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
+    from flexclear.dynamics.mechanics.mechanism import evaluation  # here: they import the compiler
+    from flexclear.dynamics.mechanics.of_model import mechanism_of
+    from flexclear.dynamics.routines.store import stored
+
+    def build() -> CallList:
+        topology = h.copy()
+        selection.write(model, topology, np.frombuffer(rows, dtype=bool))
+        return evaluation(mechanism_of(model, topology))
+
+    if rows not in code.running:
+        if rows not in code.lists:
+            offsets = h[m.ADDRESSES[-1] + 1 : m.HEADER]
+            key = repr(model.parts).encode() + rows + model.arrays.h.tobytes() + offsets.tobytes()
+            with _making:
+                code.lists[rows] = stored(key, build, partial(progress, None))
+        code.running[rows] = code.lists[rows].instance()
+    return code.running[rows]
 
 
 def made(

@@ -1,0 +1,224 @@
+r"""Trees of rigid bodies: motion from the ground outwards, elimination from the leaves inwards, accelerations outwards.
+
+From the leaves to the ground, each body has the inertia I with which it resists while all bodies beyond it move freely,
+and needs the wrench F. Each coordinate of its joint, whose motion is s, is eliminated from them:
+
+.. math:: g = I s, \quad D = s\cdot g, \quad K = g/\sqrt{D}, \qquad I \leftarrow I - K K^T ,
+
+so that M = L L^T with L_jk = s_j . K_k for k beyond j, without the mass matrix itself. All vectors of a body refer to
+the origin of its own frame, since a distant point costs digits. W is the world, B the body, P the body that carries it.
+
+Source: Rodriguez, Jain & Kreutz-Delgado (1991), International Journal of Robotics Research 10, 371-381; Featherstone
+(2008), *Rigid Body Dynamics Algorithms*, ch. 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from flexclear.dynamics.mechanics.joints import JOINTS
+from flexclear.dynamics.mechanics.vectors import (
+    UNIT,
+    ZERO,
+    Inertia,
+    Matrix,
+    Symmetric,
+    Twist,
+    Vector,
+    Wrench,
+    cross,
+    dot,
+    outer,
+    skew,
+    total,
+)
+from flexclear.dynamics.routines.calls import routine
+from flexclear.dynamics.routines.symbols import select, sqrt
+
+#: pivots D at most this fraction of the largest that all inertia beyond could give in any pose mean a coordinate that
+#: moves no mass; rounding leaves a few times 1e-16 of it
+MASSLESS = 1e-14
+
+
+Numbers = Sequence[Any]
+
+
+class Motion(NamedTuple):
+    """Motion of a frame in the world, in its axes. alpha, a: without the part from unknown rates of speeds."""
+
+    R_WB: Matrix
+    p_WB: Vector
+    omega: Vector
+    v: Vector
+    alpha: Vector
+    a: Vector
+
+
+class Site(NamedTuple):
+    """A frame S on a body."""
+
+    p_BS: Vector
+    R_BS: Matrix
+
+
+class Body(NamedTuple):
+    """A rigid body. com [m], J: inertia about it [kg m^2], axes of the body.
+
+    borne, reaching: mass of the body and all beyond [kg], and a bound of their polar moment about its origin [kg m^2].
+    """
+
+    mass: Any
+    com: Vector
+    J: Symmetric
+    borne: Any
+    reaching: Any
+
+
+class Coordinates(NamedTuple):
+    """Positions and speeds of a joint, and the known part of the rates of the speeds."""
+
+    x: Numbers
+    u: Numbers
+    du: Numbers
+
+
+class Step(NamedTuple):
+    """From a body to the one that its joint carries. S: motion of that per speed; p_PB: vector to its origin."""
+
+    S: Sequence[Twist]
+    p_PB: Vector
+
+
+class Gain(NamedTuple):
+    """Of a coordinate's row of the factor: 1/sqrt(D), and K = g/sqrt(D)."""
+
+    root: Any
+    K: Wrench
+
+
+Gains = Sequence[Gain]
+
+
+class Resistance(NamedTuple):
+    """Inertia of a body with all beyond it, and the wrench that they need without unknown rates of speeds."""
+
+    I: Inertia
+    F: Wrench
+
+
+def carried(body: Motion, site: Site) -> Motion:
+    """Return the motion of a site on a body."""
+    p_BS = body.R_WB @ site.p_BS
+    swing = cross(body.omega, p_BS)
+    a = body.a + cross(body.alpha, p_BS) + cross(body.omega, swing)
+    return Motion(body.R_WB @ site.R_BS, body.p_WB + p_BS, body.omega, body.v + swing, body.alpha, a)
+
+
+on_body = routine(carried)
+
+
+@routine
+def ground(gravity: Any) -> Motion:
+    """Return the motion of the ground; gravity is an upward acceleration of it."""
+    return Motion(UNIT, ZERO, ZERO, ZERO, ZERO, -Vector(gravity))
+
+
+@routine
+def place(kind: str, parent: Motion, site: Site, coordinates: Coordinates) -> tuple[Motion, Step]:
+    """Return a body's motion, from that of the body on which its joint sits at a site, and the step between them."""
+    F = carried(parent, site)
+    x, u, du = coordinates
+    R_FG, p_FG, S, bias = JOINTS[kind].motion(x, u)
+    p_FG = F.R_WB @ p_FG
+    S = [s.seen(F.R_WB) for s in S]
+    relative, growing = total(S, u), total(S, du) + bias.seen(F.R_WB)
+    swing = cross(F.omega, p_FG)
+    alpha = F.alpha + cross(F.omega, relative.angular) + growing.angular
+    a = F.a + cross(F.alpha, p_FG) + cross(F.omega, swing + 2.0 * relative.linear) + growing.linear
+    v = F.v + swing + relative.linear
+    body = Motion(F.R_WB @ R_FG, F.p_WB + p_FG, F.omega + relative.angular, v, alpha, a)
+    return body, Step(S, parent.R_WB @ site.p_BS + p_FG)
+
+
+def resistance(motion: Motion, body: Body, beyond: Sequence[Resistance]) -> Resistance:
+    """Return the inertia of a body about its origin, and the wrench that its known acceleration needs.
+
+    beyond: about the same point, of the bodies that it carries, which move freely.
+    """
+    c, m, w = motion.R_WB @ body.com, body.mass, motion.omega
+    about_com = (motion.R_WB @ body.J @ motion.R_WB.T).symmetric
+    away = ((m * dot(c, c)) * UNIT - m * outer(c, c)).symmetric
+    I = Inertia(about_com + away, skew(m * c), Symmetric([m, m, m, 0.0, 0.0, 0.0]))
+    a = motion.a + cross(motion.alpha, c) + cross(w, cross(w, c))
+    spin = about_com @ motion.alpha + cross(w, about_com @ w)
+    F = Wrench(spin, m * a).about(c)
+    for one in beyond:
+        I, F = I + one.I, F + one.F
+    return Resistance(I, F)
+
+
+resist = routine(resistance)
+
+
+@routine
+def eliminate(carried_on: int, motion: Motion, body: Body, step: Step, beyond: Sequence[Resistance], sound: Any) -> Any:
+    """Eliminate the coordinates of a body's joint from the resistance of the body and all beyond.
+
+    Returns what remains for the body that carries it, about that one's origin, if `carried_on` is 1; the coordinates'
+    gains; L^-1 of the forces along them; and `sound`, which becomes 0 when a coordinate moves no mass.
+    """
+    I, F = resistance(motion, body, beyond)
+    gains, forces = [], []
+    for s in step.S:
+        g = I.of(s)
+        D, rest = g.on(s), -F.on(s)
+        least = MASSLESS * (body.reaching * dot(s.angular, s.angular) + body.borne * dot(s.linear, s.linear))
+        sound = select(least < D, sound, 0.0)  # also if D is not a number
+        inverse = 1.0 / D
+        root = sqrt(inverse)
+        gains.append(Gain(root, g * root))
+        forces.append(root * rest)
+        I, F = I.without(g, inverse), F + g * (inverse * rest)
+    return carried_at(step, Resistance(I, F)) if carried_on else None, gains, forces, sound
+
+
+def carried_at(step: Step, rest: Resistance) -> Resistance:
+    """Return a resistance about the origin of the body that carries it."""
+    return Resistance(rest.I.about(step.p_PB), rest.F.about(step.p_PB))
+
+
+carry = routine(carried_at)
+
+
+@routine
+def accelerate(kind: str, coordinates: Coordinates, parent: Twist, step: Step, gains: Gains, forces: Numbers) -> Any:
+    """Return the rates of a joint's positions and speeds, and the acceleration of the body, by L^-T.
+
+    Accelerations are without the known part.  forces: L^-1 of those along the coordinates.
+    """
+    a, rates = parent.at(step.p_PB), list[Any]()
+    for s, gain, force in reversed(list(zip(step.S, gains, forces, strict=True))):
+        rates.insert(0, gain.root * (force - gain.K.on(a)))
+        a = a + s * rates[0]
+    return [*JOINTS[kind].rate(coordinates.x, coordinates.u), *rates], a
+
+
+@routine
+def follow(parent: Twist, step: Step) -> Twist:
+    """Return the acceleration of a body whose coordinates are prescribed, without the known part."""
+    return parent.at(step.p_PB)
+
+
+@routine
+def driving_power(step: Step, rest: Resistance, acceleration: Twist, closing: Sequence[Any], u: Numbers) -> Any:
+    """Return the power [W] that the drives of a joint supply at its speeds.
+
+    acceleration: without the known part.  closing: of each closure the wrenches of its rows on the body and all beyond,
+    and its multipliers.
+    """
+    F = rest.F + rest.I.of(acceleration)
+    for wrenches, multipliers in closing:
+        for wrench, size in zip(wrenches, multipliers, strict=True):
+            F = F - wrench * size
+    return F.on(total(step.S, u))

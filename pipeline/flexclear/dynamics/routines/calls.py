@@ -1,0 +1,233 @@
+"""Routines, and lists of their calls.
+
+A *routine* is a Python function of numbers in nested tuples (vectors, matrices, objects with named fields) and of
+strings or integers, on which its code depends. Called with numbers it calculates; called by another routine it is a
+part of that one. Called while a `CallList` is built, on numbers in memory, it is traced on a tape, once per *kind* of
+its arguments: which of them are constant, and which are adjacent in memory. The call becomes an entry of the list: the
+code with the offset of each run of adjacent numbers. So a list is data, however long; equal kinds share one code, and
+numbers of the scene are read when the list runs. Results are numbers in memory, each of a place of its own; a result
+that is the same constant for each call of a kind stays a constant, and one that is an argument stays where it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
+from typing import Any, NamedTuple
+
+from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
+from flexclear.dynamics.specialise.code import Program
+from flexclear.dynamics.specialise.tape import FLOAT, Branch, Symbol
+
+#: numbers of the scene, the state, its rates, the work space of the engine, and the results of the list's own calls
+SCENE, STATE, RATES, WORK, RESULTS = ARRAYS = "f", "y", "dy", "w", "v"
+
+
+class Cell:
+    """A number in memory; it has no operators, so only routines calculate with it."""
+
+    __slots__ = ("array", "index", "key")
+
+    def __init__(self, array: str, index: int) -> None:
+        self.array, self.index, self.key = array, index, (array, index)
+
+
+class Code(NamedTuple):
+    """A traced routine: name, operations, and the array of each run of adjacent numbers that a call locates.
+
+    Loads and stores name the run by its number, as text, with the offset in it.
+    """
+
+    name: str
+    program: Program
+    runs: tuple[str, ...]
+
+    @property
+    def digest(self) -> bytes:
+        """Digest of all that the machine code depends on."""
+        return hashlib.sha256(repr((self.runs, *_described(self.program))).encode()).digest()
+
+
+class _Kind(NamedTuple):
+    """A routine traced for a kind of arguments: its results, and where each is: given, constant or stored."""
+
+    code: Code
+    result: Any
+    places: list[tuple[str, Any]]
+    stored: int
+
+
+class Call(NamedTuple):
+    """An entry of a list: a code, and the offset of each of its runs."""
+
+    code: Code
+    offsets: tuple[int, ...]
+
+
+_building: ContextVar[CallList | None] = ContextVar("building", default=None)
+
+
+def routine(function: Callable) -> Callable:
+    """Make a function a routine."""
+
+    @wraps(function)
+    def called(*arguments: Any) -> Any:
+        calls = _building.get()
+        return function(*arguments) if calls is None else calls.call(function, arguments)
+
+    return called
+
+
+@dataclass
+class CallList:
+    """A list of calls under construction.
+
+    size: number of results in memory; the first one is kept free, for what the list reports.
+    """
+
+    calls: list[Call] = field(default_factory=list)
+    size: int = 1
+    _kinds: dict[Any, _Kind] = field(default_factory=dict)
+    _known: dict[Any, Any] = field(default_factory=dict)
+
+    @contextmanager
+    def building(self) -> Iterator[CallList]:
+        """Append the calls of routines to the list during the context."""
+        token = _building.set(self)
+        try:
+            yield self
+        finally:
+            _building.reset(token)
+
+    @cached_property
+    def codes(self) -> list[Code]:
+        """Codes that the finished list calls, in the order of their first calls."""
+        return list({id(call.code): call.code for call in self.calls}.values())
+
+    def call(self, function: Callable, arguments: Any, into: Sequence[Cell] | None = None) -> Any:
+        """Append a call and return its results; without the first of several, if cells are given to store that."""
+        runs = _Runs()
+        given = leaves(arguments)
+        inside = [runs.at(one) if type(one) is Cell else one for one in given]
+        targets = None if into is None else tuple(runs.at(cell) for cell in into)
+        kind = (function, _shape(arguments), tuple(inside), targets, tuple(runs.arrays))
+        if kind not in self._kinds:
+            self._kinds[kind] = _traced(function, arguments, inside, targets, tuple(runs.arrays))
+        made, where = self._kinds[kind], tuple(runs.begins)
+        known = self._known.get((id(made), where))
+        if known is not None:
+            return known
+        if made.stored or into:
+            self.calls.append(Call(made.code, (*where, self.size)))
+        base = self.size
+        self.size += made.stored
+        ways = {"given": given.__getitem__, "constant": lambda a: a, "stored": lambda k: Cell(RESULTS, base + k)}
+        result = rebuilt(made.result, iter([ways[way](value) for way, value in made.places]))
+        self._known[id(made), where] = result
+        return result
+
+    def store(self, cells: Sequence[Cell], function: Callable, *arguments: Any) -> Any:
+        """Append a call of a routine, the first of whose results is stored in cells, and return the others."""
+        return self.call(function.__wrapped__, arguments, cells)  # type: ignore[attr-defined]
+
+    def write(self, cells: Sequence[Cell], values: Sequence[Any]) -> None:
+        """Append a call that stores values in cells."""
+        if cells:
+            self.call(_same, (list(values),), cells)
+
+
+def _same(values: Any) -> Any:
+    return (values,)
+
+
+def cells(array: str, begin: int, count: int) -> list[Cell]:
+    """Return adjacent numbers of an array."""
+    return [Cell(array, begin + k) for k in range(count)]
+
+
+class _Runs:
+    """Runs of adjacent numbers among the arguments of a call, each with its array, first index and length."""
+
+    def __init__(self) -> None:
+        self.arrays, self.begins, self._ends = list[str](), list[int](), list[int]()
+        self._seen: dict[tuple[str, int], Argument] = {}
+
+    def at(self, cell: Cell) -> Argument:
+        """Return a number's run, as text, and its offset there."""
+        if cell.key not in self._seen:
+            if not self.arrays or (self.arrays[-1], self._ends[-1]) != (cell.array, cell.index):
+                self.arrays.append(cell.array)
+                self.begins.append(cell.index)
+                self._ends.append(cell.index)
+            self._ends[-1] += 1
+            self._seen[cell.key] = Argument(str(len(self.arrays) - 1), cell.index - self.begins[-1])
+        return self._seen[cell.key]
+
+
+class Argument(NamedTuple):
+    """An argument that is a symbol on the tape of a routine: its run and the offset there."""
+
+    run: str
+    offset: int
+
+
+def _traced(
+    function: Callable, arguments: Any, inside: list[Any], into: Sequence[Argument] | None, runs: tuple[str, ...]
+) -> _Kind:
+    """Trace a routine; inside: its numbers, symbolic ones by their run."""
+    tape, token = new_tape(), _building.set(None)
+    try:
+        symbols = [tape.write(FLOAT, "load", a.run, a.offset) if isinstance(a, Argument) else a for a in inside]
+        result = function(*rebuilt(arguments, iter(symbols)))
+    finally:
+        _building.reset(token)
+    first, rest = ((), result) if into is None else (result[0], result[1] if len(result) == 2 else result[1:])
+    stores = [(one.run, one.offset, value) for one, value in zip(into or (), leaves(first), strict=True)]
+    given = {id(one): k for k, one in enumerate(symbols) if isinstance(one, Symbol)}
+    places, slots = list[tuple[str, Any]](), dict[Symbol, int]()
+    for value in leaves(rest):
+        if not isinstance(value, Symbol):
+            places.append(("constant", value))
+        elif id(value) in given:
+            places.append(("given", given[id(value)]))
+        else:
+            places.append(("stored", slots.setdefault(value, len(slots))))
+    stores += [(str(len(runs)), slot, value) for value, slot in slots.items()]
+    code = Code(function.__name__.lstrip("_"), Program(tape.block, stores), (*runs, RESULTS))
+    return _Kind(code, rest, places, len(slots))
+
+
+def _shape(tree: Any) -> Any:
+    """Return the nesting of arguments without their numbers."""
+    if isinstance(tree, (tuple, list)):
+        return (type(tree), *map(_shape, tree))
+    return None
+
+
+def _described(program: Program) -> Iterator[Any]:
+    """Yield operations and stores of a program, with symbols by their order."""
+    numbers: dict[Symbol, int] = {}
+
+    def name(a: Any) -> Any:
+        return f"%{numbers[a]}" if isinstance(a, Symbol) else a
+
+    def block(items: list[Any]) -> Iterator[Any]:
+        for item in items:
+            if isinstance(item, Branch):
+                yield "branch", name(item.condition)
+                for inner in item.blocks:
+                    yield from block(inner)
+                    yield "end"
+                for joined, *both in item.joins:
+                    numbers[joined] = len(numbers)
+                    yield "join", joined.kind, *map(name, both)
+            else:
+                numbers[item] = len(numbers)
+                yield item.kind, item.operation, *map(name, item.arguments)
+
+    yield from block(program.block)
+    yield from ((run, offset, name(value)) for run, offset, value in program.stores)

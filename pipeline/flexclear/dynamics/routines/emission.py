@@ -1,0 +1,77 @@
+"""LLVM code of routines, and of the function that runs a list of their calls.
+
+The function is ``evaluate(h, f, w, n, t, y, dy)`` like that of kernels: it evaluates the laws of time at t, then calls
+each code of the list whose address is in h (`memory`), and reports in n the status that is the list's first result. The
+list is four words: number of calls, addresses of their codes, addresses of their offsets, address of the results.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.routines.calls import ARRAYS, Code
+from flexclear.dynamics.specialise.code import Emitter
+
+#: name of the function in each text
+NAME = "routine"
+_WORD, _OFFSET, _FLOAT = ir.IntType(64), ir.IntType(32), ir.DoubleType()
+#: of routines: the arrays, and the offsets of the call's runs
+_ROUTINE = ir.FunctionType(ir.VoidType(), [*[_FLOAT.as_pointer()] * len(ARRAYS), _OFFSET.as_pointer()])
+_EVALUATE = ir.FunctionType(
+    _WORD,
+    [*(kind.as_pointer() for kind in (_WORD, _FLOAT, _FLOAT, _WORD)), _FLOAT, _WORD, _WORD],
+)
+
+
+def routine_text(code: Code) -> str:
+    """Return the LLVM text of a traced routine."""
+    function, builder = _begun(_ROUTINE)
+    arrays, offsets = dict(zip(ARRAYS, function.args, strict=False)), function.args[-1]
+    begins = {}
+    for k, array in enumerate(code.runs):
+        offset = builder.load(builder.gep(offsets, [_OFFSET(k)]))
+        begins[str(k)] = builder.gep(arrays[array], [offset])
+    Emitter(builder, code.program, lambda run, k, lane: builder.gep(begins[run], [_OFFSET(k)])).emit()
+    builder.ret_void()
+    return str(builder.module)
+
+
+def interpreter_text() -> str:
+    """Return the LLVM text of the function that runs a list of calls."""
+    function, builder = _begun(_EVALUATE)
+    h, f, w, n, t, y, dy = function.args
+    laws = ir.FunctionType(_WORD, _EVALUATE.args[:5]).as_pointer()
+    builder.call(builder.inttoptr(_read(builder, h, m.PRESCRIBE), laws), [h, f, w, n, t])
+    head = builder.inttoptr(_read(builder, h, m.CALLS), _WORD.as_pointer())
+    count, codes, offsets, results = (_read(builder, head, k) for k in range(4))
+    codes, offsets = (builder.inttoptr(one, _WORD.as_pointer()) for one in (codes, offsets))
+    results = builder.inttoptr(results, _FLOAT.as_pointer())
+    given = [f, builder.gep(w, [y]), builder.gep(w, [dy]), w, results]
+    before, loop, after = builder.block, builder.append_basic_block(), builder.append_basic_block()
+    builder.branch(loop)
+    builder.position_at_end(loop)
+    k = builder.phi(_WORD)
+    code, where = (_read(builder, table, k) for table in (codes, offsets))
+    builder.call(builder.inttoptr(code, _ROUTINE.as_pointer()), [*given, builder.inttoptr(where, _OFFSET.as_pointer())])
+    following = builder.add(k, _WORD(1))
+    k.add_incoming(_WORD(0), before)
+    k.add_incoming(following, loop)
+    builder.cbranch(builder.icmp_signed("<", following, count), loop, after)
+    builder.position_at_end(after)
+    status = builder.fptosi(builder.load(results), _WORD)
+    for index, value in ((m.STATE, y), (m.EVALUATION, status), (m.ABRIDGED, _WORD(1))):
+        builder.store(value, builder.gep(n, [_WORD(index)]))
+    builder.ret(_WORD(0))
+    return str(builder.module)
+
+
+def _begun(kind: ir.FunctionType) -> tuple[ir.Function, ir.IRBuilder]:
+    function = ir.Function(ir.Module(NAME), kind, NAME)
+    return function, ir.IRBuilder(function.append_basic_block())
+
+
+def _read(builder: ir.IRBuilder, words: Any, index: Any) -> Any:
+    return builder.load(builder.gep(words, [index if isinstance(index, ir.Value) else _WORD(index)]))

@@ -1,0 +1,116 @@
+"""Routines and lists of their calls on disk, and lists ready to run.
+
+Code of a routine is stored by its content: a tape that another mechanism has as well is compiled once for both. A list
+is stored by the topology from which it was made, so that a process which finds it traces nothing. Both depend on the
+processor, whose folder they are in, on the compiler's release, and on the modules that make them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+
+from flexclear.artifacts.disk import checked, disk_limits, read_checked
+from flexclear.artifacts.paths import kernel_root
+from flexclear.dynamics.compile import functions
+from flexclear.dynamics.compile.folder import writable
+from flexclear.dynamics.routines.calls import CallList
+from flexclear.dynamics.routines.emission import interpreter_text, routine_text
+from flexclear.workflow.fingerprint import TREE, library_version, sources_of
+
+DYNAMICS = "flexclear.dynamics"
+#: modules that make code of a tape; and those that make lists
+EMITTING = ("routines.emission", "specialise.code")
+LISTING = (*EMITTING, "specialise.tape", *(f"routines.{name}" for name in ("calls", "store", "symbols")))
+LISTING += tuple(f"mechanics.{name}" for name in ("closures", "joints", "mechanism", "of_model", "trees", "vectors"))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedList:
+    """A list of calls as the interpreter reads it.
+
+    interpreter: its address.  codes: address per call.  offsets: of the runs of all calls.  begins: per call, the index
+    of its first one.  size: number of results.
+    """
+
+    interpreter: int
+    codes: np.ndarray
+    offsets: np.ndarray
+    begins: np.ndarray
+    size: int
+
+    def instance(self) -> ListInstance:
+        """Return the list with results of its own."""
+        return ListInstance(self)
+
+
+#: lists of this process, by their files
+loaded: dict[Path, LoadedList] = {}
+
+
+class ListInstance:
+    """A list of calls with its results, for one engine. words: what the interpreter reads (`routines.emission`)."""
+
+    def __init__(self, loaded: LoadedList) -> None:
+        self.loaded, self.results = loaded, np.zeros(loaded.size)
+        self._starts = (loaded.offsets.ctypes.data + loaded.offsets.itemsize * loaded.begins).astype(np.int64)
+        tables = (loaded.codes, self._starts, self.results)
+        self.words = np.array([len(loaded.codes), *(table.ctypes.data for table in tables)], dtype=np.int64)
+
+
+def stored(topology: bytes, build: Callable[[], CallList], report: Callable[[str], None]) -> LoadedList:
+    """Return the list of a topology, from disk or built; `report` receives a message before routines are compiled."""
+    path = writable(kernel_root(), report) / f"flexclear_routine_list_{_name(LISTING, topology)}{functions.CODE}"
+    if path not in loaded:
+        table = read_checked(path)
+        at = functions.stored_codes(table["names"]) if table else None
+        if table and at:
+            loaded[path] = _loaded(table, at)
+        else:
+            calls = build()
+            loaded[path] = load(calls, report)
+            with disk_limits(path.parent):
+                functions.keep(path, checked(_table(calls)))
+    return loaded[path]
+
+
+def load(calls: CallList, report: Callable[[str], None]) -> LoadedList:
+    """Return a list ready to run; `report` receives a message before routines are compiled."""
+    table = _table(calls)
+    texts: list[Callable[[], str]] = [interpreter_text, *(partial(routine_text, code) for code in calls.codes)]
+    return _loaded(table, functions.assembled(dict(zip(table["names"], texts, strict=True)), report))
+
+
+def _table(calls: CallList) -> dict[str, list]:
+    """Return a list as numbers: names of the interpreter and its codes, code of each call, and offsets of its runs."""
+    number = {id(code): k for k, code in enumerate(calls.codes, start=1)}
+    return {
+        "names": [_name(EMITTING, content) for content in (b"interpreter", *(code.digest for code in calls.codes))],
+        "codes": [number[id(call.code)] for call in calls.calls],
+        "counts": [len(call.offsets) for call in calls.calls],
+        "offsets": [offset for call in calls.calls for offset in call.offsets],
+        "size": [calls.size],
+    }
+
+
+def _loaded(table: dict[str, list], at: dict[str, int]) -> LoadedList:
+    addresses = np.array([at[name] for name in table["names"]], dtype=np.int64)
+    begins = np.cumsum([0, *table["counts"]])[:-1]
+    offsets = np.array(table["offsets"], dtype=np.int32)
+    return LoadedList(int(addresses[0]), addresses[table["codes"]], offsets, begins, table["size"][0])
+
+
+@cache
+def _made_by(modules: tuple[str, ...]) -> bytes:
+    sources = sources_of(TREE)
+    digests = (getattr(sources.module(f"{DYNAMICS}.{name}"), "digest", "") for name in modules)
+    return " ".join([library_version("llvmlite"), *digests]).encode()
+
+
+def _name(modules: tuple[str, ...], content: bytes) -> str:
+    return hashlib.sha256(_made_by(modules) + content).hexdigest()[:20]

@@ -1,0 +1,86 @@
+"""Functions and conditions for numbers that may be symbols: on numbers they calculate, on symbols they are recorded.
+
+A condition on symbols is known only when the code runs. It is written `branch`, of which one side is computed, or
+`select`, of which both are; Python's own `if`, `and`, `max` ... on a symbol raise an error that names the line.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from flexclear.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape
+
+
+class UndecidableError(TypeError):
+    """Python was to decide by a number that is known only when the code runs."""
+
+
+def _undecidable(condition: Symbol) -> bool:
+    frame = sys._getframe(2)  # of the statement that asked for the truth of the condition
+    raise UndecidableError(
+        f"{frame.f_code.co_filename}:{frame.f_lineno}: '{condition.operation}' compares numbers that are known only "
+        f"when the code runs, so Python cannot decide here; write `branch` or `select` (routines.symbols)"
+    )
+
+
+def new_tape() -> Tape:
+    """Return an empty tape without limit of length."""
+    return Tape(_undecidable, sys.maxsize)
+
+
+def _function(name: str) -> Callable[[Any], Any]:
+    plain = getattr(math, name)
+
+    def apply(a: Any) -> Any:
+        return a.tape.write(FLOAT, name, a) if isinstance(a, Symbol) else plain(a)
+
+    return apply
+
+
+sqrt, sin, cos = map(_function, ("sqrt", "sin", "cos"))
+
+
+def select(condition: Any, a: Any, b: Any) -> Any:
+    """Return the number a where the condition holds, else b."""
+    return condition.tape.select(condition, a, b) if isinstance(condition, Symbol) else a if condition else b
+
+
+def larger(a: Any, b: Any) -> Any:
+    """Return the larger of two numbers."""
+    return select(b > a, b, a)
+
+
+def smaller(a: Any, b: Any) -> Any:
+    """Return the smaller of two numbers."""
+    return select(b < a, b, a)
+
+
+def branch(condition: Any, first: Callable[[], Any], second: Callable[[], Any]) -> Any:
+    """Return first() where the condition holds, else second(): nested tuples of numbers of the same shape."""
+    if not isinstance(condition, Symbol):
+        return first() if condition else second()
+    tape, made, ways = condition.tape, Branch(condition, ([], [])), []
+    for block, way in zip(made.blocks, (first, second), strict=True):
+        with tape.inside(block):
+            ways.append(way())
+    tape.block.append(made)
+    a, b = map(leaves, ways)
+    return rebuilt(ways[0], iter([tape.join(made, *both) for both in zip(a, b, strict=True)]))
+
+
+def leaves(tree: Any) -> list[Any]:
+    """Return what nested tuples and lists hold, in order."""
+    if isinstance(tree, (tuple, list)):
+        return [leaf for one in tree for leaf in leaves(one)]
+    return [tree]
+
+
+def rebuilt(tree: Any, given: Iterator[Any]) -> Any:
+    """Return nested tuples and lists like `tree`, which hold the next values of `given`."""
+    if not isinstance(tree, (tuple, list)):
+        return next(given)
+    parts = [rebuilt(one, given) for one in tree]
+    return type(tree)(*parts) if hasattr(tree, "_fields") else type(tree)(parts)
