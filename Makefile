@@ -63,12 +63,13 @@ interpreters: $(TOOLS) ## A short run under every other Python, with the lowest 
 		try $$v $$p "" 365 -c constraints.txt || exit 1; \
 	done; test "$$ran" != " " || echo "skipped: there is no other Python here"; \
 	try lowest $(RUN) "[render]" 365 -c .ci/lowest.txt && try newest $(RUN) "[render]" 7 --upgrade --upgrade-strategy eager
+	@echo "-- plain numba"; FLEXCLEAR_PLAIN_NUMBA=1 FLEXCLEAR_KERNELS=$(VENV)/others/plain $(RUN) -m pytest -q $(CORE)
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation peers runs commands cold growth ensembles exudyn
 
 chaos: $(READY) ## Periodic or chaotic, with evidence: docs/chaos.md (an hour; keeps every scene that is finished)
-	@$(RUN) -m benchmarks.chaos sps4/csj $(foreach d,sps4 sps4/damped,$(d)/far_csj_free $(d)/far_csj_fixed $(d)/far_csj_cb)
+	@$(RUN) -m flexclear sections sps4/csj $(foreach d,sps4 sps4/damped,$(d)/far_csj_free $(d)/far_csj_fixed $(d)/far_csj_cb) --page docs/chaos.md
 
 atlas: $(READY) ## Stability of 301 hard cases: docs/stability.md (half an hour; goes on where it stopped)
 	@$(RUN) -m benchmarks stability

@@ -1,4 +1,4 @@
-"""A campaign of faults: damaged files, killed commands and child processes, full disks.
+"""A campaign of faults: damaged files, folders instead of files, killed commands and child processes, full disks.
 
 A fault is *detected* when damaged content counts as absent, or when a command ends with an exit code of its own and a
 message. It is *harmless* when nothing is lost. It is *used* when damaged content would be used, or when a command ends
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -66,12 +67,14 @@ Judge = Callable[[], str]
 DAMAGED = (
     "artifacts",
     "records",
+    "shown files",
     "memo of imports",
     "generated sources",
     "digests of kernels",
     "compiled code",
     "unfinished work",
 )
+FOLDERS, FILES = "folders instead of files", "files instead of folders"
 FULL_DISKS, AT_ONCE = "disks full (files of at most so many bytes)", "equal commands at once"
 COLUMNS: Columns = {
     "fault in": lambda r: r["case"],
@@ -95,7 +98,7 @@ class Faults:
 def cases(seed: int, flips: int, cuts: int, kills: int) -> list[Case]:
     """Return all kinds of faults as cases."""
     made = [Case(kind, Faults(seed, flips, cuts)) for kind in DAMAGED]
-    made += [Case(kind, Faults(seed)) for kind in (FULL_DISKS, AT_ONCE)]
+    made += [Case(kind, Faults(seed)) for kind in (FOLDERS, FILES, FULL_DISKS, AT_ONCE)]
     for verb, (fraction, _) in COMMANDS.items():
         count = max(1, round(fraction * kills))
         made.append(Case(f"`{verb}` killed", Faults(seed, kills=count)))
@@ -151,7 +154,7 @@ def _counted(case: Case, place: Place) -> Counter[str]:
     of, rng = case.of, random.Random(f"{case.of.seed} {case.name}")
     if case.name in DAMAGED:
         return _damage(rng, _damaged(place)[case.name], of.flips, of.cuts)
-    for kind, bring_about in ((FULL_DISKS, _full), (AT_ONCE, _concurrent)):
+    for kind, bring_about in ((FOLDERS, _folders), (FILES, _files), (FULL_DISKS, _full), (AT_ONCE, _concurrent)):
         if case.name == kind:
             return bring_about(place)
     which, verb, _ = case.name.split("`")
@@ -164,9 +167,11 @@ def _damaged(place: Place) -> dict[str, list[tuple[Path, Judge]]]:
     store, folder = place.store(), place.folder
     records = sorted((store.root / "cache").glob("*/*.json"))
     kernels = sorted((folder / "kernels").glob("*/flexclear_*.py"))
+    shown = sorted((store.root / "runs").rglob("*.nc"))
     return {
         "artifacts": [(path.with_suffix(".nc"), _artifact(store, path)) for path in records],
         "records": [(path, _same(read_record, path)) for path in records],
+        "shown files": [(path, partial(_shown, store)) for path in shown],
         "memo of imports": [(path, _same(read_checked, path)) for path in [store.root / "cache" / "imports.json"]],
         "generated sources": [(path, _kernel(path)) for path in kernels],
         "digests of kernels": [(path.with_suffix(".sum"), _kernel(path)) for path in kernels],
@@ -178,6 +183,54 @@ def _damaged(place: Place) -> dict[str, list[tuple[Path, Judge]]]:
 def _damage(rng: random.Random, files: list[tuple[Path, Judge]], flips: int, cuts: int) -> Counter[str]:
     """Count the outcomes of flips and cuts in one kind of file; each file is restored afterwards."""
     return Counter(_fault(rng, *rng.choice(files), flip=k < flips) for k in range(flips + cuts))
+
+
+def _shown(store: Store) -> str:
+    return "detected" if maintenance.shown_faults(store, store.root / "runs") else "used"
+
+
+def _folders(place: Place) -> Counter[str]:
+    """Put a folder in place of each file of a run in turn: it must be renamed, and the result must be the same."""
+    store, count = place.store(), Counter[str]()
+    before = _artifacts(store)
+    cached = [
+        path for suffix in ("nc", "json", "names") for path in sorted((store.root / "cache").glob(f"*/*.{suffix}"))
+    ]
+    shown = sorted((store.root / "runs").rglob("*.nc"))
+    for path in [*cached, *shown, store.root / "cache" / "imports.json"]:
+        path.unlink(missing_ok=True)
+        path.mkdir()
+        (path / "mine").write_text("stays", encoding="utf-8", newline="\n")
+        code = place.start(["run", SCENE]).wait()
+        lost = not any(left.read_text(encoding="utf-8") == "stays" for left in path.parent.glob(f"{path.name}*/mine"))
+        sound = code == 0 and not lost and _artifacts(store) == before and _shown(store) == "used"
+        count["detected" if sound else "used"] += 1
+    return count
+
+
+def _files(place: Place) -> Counter[str]:
+    """Put a file in place of each folder of a run in turn: it must be renamed, or named in a message, and survive."""
+    store, count = place.store(), Counter[str]()
+    before = _artifacts(store)
+    for path in [
+        store.root / "runs" / SCENE,
+        *sorted(path for path in (store.root / "cache").iterdir() if path.is_dir()),
+    ]:
+        away = path.rename(place.folder / "away")
+        path.write_text("stays", encoding="utf-8", newline="\n")
+        process = place.start(["run", SCENE], stderr=subprocess.PIPE)
+        output = process.communicate()[1].decode(errors="replace")
+        left = [one for one in path.parent.glob(f"{path.name}*") if one.is_file()]
+        sound = process.returncode in (0, 2, 4) and "Traceback" not in output
+        count["detected" if sound and any(one.read_text(encoding="utf-8") == "stays" for one in left) else "used"] += 1
+        if path.is_file():
+            path.unlink()
+            away.rename(path)
+        else:
+            shutil.rmtree(away)
+    code = place.start(["run", SCENE]).wait()
+    count["used"] += code != 0 or _artifacts(store) != before
+    return count
 
 
 def _unfinished(folder: Path) -> list[Path]:

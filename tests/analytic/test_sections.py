@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flexclear as fc
-from benchmarks.chaos import write_page
 from flexclear import dynamics
 from flexclear.commands.__main__ import main
+from flexclear.commands.sections import write_page
 from flexclear.dynamics import analyses
 from flexclear.post.sections import chaos
 from flexclear.post.sections.verdict import derive, judge

@@ -16,6 +16,7 @@ import pytest
 
 import flexclear as fc
 from flexclear.commands.__main__ import COMMANDS, main
+from flexclear.system import platforms
 from flexclear.system.errors import InputError
 from tests.architecture import windows_rules as rules
 from tests.processes import copied, python
@@ -126,6 +127,7 @@ def test_the_pipeline_runs_under_the_rules_of_windows(windows: Callable[..., str
     shown.write_bytes(b"edited")
     windows("run", "checks/pendulum")
     assert shown.read_bytes() == before
+    assert shown.with_name("run.edited.nc").read_bytes() == b"edited"
     left = [path for path in shown.parents[3].rglob("*") if path.suffix in (".tmp", ".lock", ".part")]
     assert left == []
 
@@ -136,6 +138,57 @@ def test_a_console_of_an_old_code_page_shows_what_it_can(root: Path, tmp_path: P
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert "\\u2192" in done.stderr + done.stdout
+
+
+def test_a_running_process_is_alive_and_one_that_ended_is_not() -> None:
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        assert platforms.alive(process.pid)
+        process.communicate(b"\n")
+    assert not platforms.alive(process.pid)
+
+
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A file that somebody else has open for as many attempts as the list says."""
+    left, replace, unlink = [0], os.replace, os.unlink
+
+    def refusing(change: Callable[..., None]) -> Callable[..., None]:
+        def tried(*paths: Path) -> None:
+            if left[0]:
+                left[0] -= 1
+                raise PermissionError(13, "Permission denied")
+            change(*paths)
+
+        return tried
+
+    monkeypatch.setattr(os, "replace", refusing(replace))
+    monkeypatch.setattr(os, "unlink", refusing(unlink))
+    return left
+
+
+def test_a_file_that_is_open_elsewhere_is_waited_for(tmp_path: Path, held: list[int]) -> None:
+    new, old = tmp_path / "new", tmp_path / "old"
+    new.write_bytes(b"new")
+    old.write_bytes(b"old")
+    held[0] = 3
+    platforms.replace(new, old)
+    assert old.read_bytes() == b"new"
+    held[0] = 3
+    platforms.remove(old)
+    assert not old.exists()
+
+
+def test_a_file_that_stays_open_elsewhere_is_named(
+    tmp_path: Path, held: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(platforms, "WAIT_FOR_FILE", 0.0)
+    new, old = tmp_path / "new", tmp_path / "run.nc"
+    new.write_bytes(b"new")
+    old.write_bytes(b"old")
+    held[0] = 1000
+    with pytest.raises(PermissionError, match=r"run\.nc is protected, or open in another program"):
+        platforms.replace(new, old)
+    assert old.read_bytes() == b"old"
 
 
 @pytest.mark.parametrize("page", ["cp1252", "cp437", "ascii"])

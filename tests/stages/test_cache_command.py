@@ -1,13 +1,17 @@
 """``flexclear cache``: tells what is kept and whether it is whole, and removes nothing that is shown or needed."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
+import flexclear as fc
 from flexclear.artifacts.disk import checked
 from flexclear.artifacts.store import Record, Store
-from flexclear.commands import cache
+from flexclear.commands import cache, why
+from flexclear.commands.__main__ import main
+from flexclear.system import machine
 from tests.stages.conftest import Command
 
 
@@ -91,3 +95,98 @@ def test_the_inputs_of_an_artifact_are_reported(store: Store, command: Command):
         assert "parameter c: a" in reported
     command("cache", "explain", "b", code=2)
     assert "simulate          1 artifacts" in command("cache", "size").out
+
+
+def test_kernels_of_another_build_are_counted_and_are_no_damage(store: Store, command: Command):
+    """Their sums name other files than source and code; one of this build whose code is another's is damaged."""
+    folder = store.root.parent / "kernels" / "abc"
+    folder.mkdir(parents=True)
+    for name, ends in (("old", (".py", ".nbi")), ("bad", (".py", ".code"))):
+        (folder / f"flexclear_{name}.py").write_text("")
+        (folder / f"flexclear_{name}.sum").write_bytes(checked({f"flexclear_{name}{end}": "1" for end in ends}))
+    reported = command("cache", "check", code=4).out
+    assert "2 compiled kernels, 1 unused of another build" in reported
+    assert "flexclear_bad.py is damaged" in reported
+    assert "flexclear_old.py is damaged" not in reported
+
+
+def test_results_of_another_processor_are_reported_and_are_fresh():
+    """Numbers differ by rounding under one key: the record names the instructions, `why` and `explain` report them."""
+    here = machine.instruction_set()
+    assert {"processor", "instructions"} <= here.keys()
+    of_here, of_others = (
+        Record("simulate", "a" * 32, {"nc": "b"}, {}, {}, facts)
+        for facts in (here, {**here, "NUMBA_CPU_NAME": "generic"})
+    )
+    assert why.notes("simulate", of_here) == []
+    (note,) = why.notes("simulate", of_others)
+    assert note.endswith("numbers differ by rounding: NUMBA_CPU_NAME generic, here (none)")
+    # records of before have none
+    assert why.notes("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
+
+
+# Files that are shown below results/runs ----------------------------------------------------------------------------
+
+SCENE = "checks/pendulum"
+
+
+@pytest.fixture(scope="module")
+def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a run."""
+    made = tmp_path_factory.mktemp("made") / "results"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FLEXCLEAR_RESULTS", str(made))
+        assert main(["run", SCENE, "-q", "--jobs", "1"]) == 0
+    return made
+
+
+@pytest.fixture
+def shown(pendulum: Path, fresh: Path) -> Path:
+    """The run, in a copy of its results."""
+    shutil.copytree(pendulum, fresh)
+    return fresh / "runs" / SCENE / "run.nc"
+
+
+def rot(path: Path) -> None:
+    """One byte changed, size and time as before."""
+    status = path.stat()
+    path.chmod(0o644)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(bytes(content))
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    path.chmod(0o444)
+
+
+def test_the_record_of_a_run_names_its_processor(shown: Path, command: Command):
+    said = command("cache", "explain", shown).out
+    assert f"computed by processor: {machine.instruction_set()['processor']}" in said
+
+
+def test_bit_rot_in_a_shown_file_is_detected_and_run_shows_it_again(shown: Path, command: Command):
+    good = shown.read_bytes()
+    command("cache", "check")
+    rot(shown)
+    assert "run.nc differs from its artifact" in command("cache", "check", code=4).out
+    with pytest.raises(fc.ResourceError, match="flexclear run checks/pendulum"):
+        fc.open(SCENE)
+    command("run", SCENE, "-q", "--jobs", "1")
+    assert shown.read_bytes() == good
+    assert "run" in fc.open(SCENE)
+
+
+@pytest.mark.parametrize("kind", ["shown", "artifact", "record", "lock"])
+def test_a_folder_in_the_place_of_a_file_is_renamed(shown: Path, fresh: Path, command: Command, kind: str):
+    artifact = next((fresh / "cache" / "simulate").glob("*.nc"))
+    places = {"shown": shown, "artifact": artifact}
+    places |= {"record": artifact.with_suffix(".json"), "lock": artifact.with_suffix(".lock")}
+    place, good = places[kind], shown.read_bytes()
+    place.unlink(missing_ok=True)
+    place.mkdir()
+    (place / "somebody's").write_text("kept")
+    if kind == "lock":
+        artifact.with_suffix(".json").unlink()
+    command("run", SCENE, "-q", "--jobs", "1")
+    assert shown.read_bytes() == good
+    assert [path.read_text() for path in fresh.rglob("somebody's")] == ["kept"]
+    command("cache", "prune")

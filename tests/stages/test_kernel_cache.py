@@ -1,4 +1,4 @@
-"""Compiled kernels: loaded only if every byte is as it was written."""
+"""Compiled kernels: loaded only if every byte is as it was written, from a folder in which nobody else writes."""
 
 import ctypes
 import os
@@ -11,6 +11,7 @@ from flexclear.artifacts.disk import checked, publish
 from flexclear.artifacts.paths import kernel_root, results_root
 from flexclear.dynamics.compile import files, folder, machine_code
 from flexclear.dynamics.compile.files import compiled, file_lock, load_files, loaded
+from flexclear.system.errors import InputError
 
 #: a constant that a flipped bit of the code would change
 SOURCE = """from numba import cfunc
@@ -98,6 +99,27 @@ def test_code_of_other_names_is_not_loaded(kernel: Path, before: bytes, after: b
     content = kernel.with_suffix(files.CODE).read_bytes()
     with pytest.raises(ValueError, match=r"no function|is not known"):
         machine_code.load(content.replace(before, after, 1))
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o1777])
+def test_a_folder_that_others_can_write_is_refused(tmp_path: Path, mode: int) -> None:
+    """To load what lies there would run their code."""
+    made = folder.writable(tmp_path / "kernels", lambda _: None)
+    made.chmod(mode)
+    with pytest.raises(InputError, match=r"others can write to .*\n.*chmod go-w") as caught:
+        folder.writable(tmp_path / "kernels", lambda _: None)
+    assert caught.value.exit_code == 2
+    made.chmod(0o755)
+    assert folder.writable(tmp_path / "kernels", lambda _: None) == made
+
+
+def test_a_folder_that_others_could_replace_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o777)
+    with pytest.raises(InputError, match="others can write to"):
+        folder.writable(tmp_path / "open" / "kernels", lambda _: None)
+    (tmp_path / "open").chmod(0o1777)  # as /tmp: only owners rename
+    folder.writable(tmp_path / "open" / "kernels", lambda _: None)
 
 
 def test_results_hold_no_code(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The store: atomic, checked, deterministic, and honest about full disks."""
 
+import errno
 import os
 import resource
 import subprocess
@@ -13,7 +14,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.artifacts import netcdf
+from flexclear.artifacts import disk, netcdf
+from flexclear.artifacts.disk import publish
 from flexclear.artifacts.labelled import of
 from flexclear.artifacts.store import Record, Store, write_dataset
 from flexclear.commands.new import write
@@ -123,6 +125,18 @@ def test_without_a_record_there_is_no_artifact(store: Store):
     assert store.find("simulate", "0" * 32) is None
 
 
+def test_a_failed_read_back_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The disk returns something else than was written: the new file must not take the name."""
+    path = tmp_path / "a.bin"
+    publish(path, b"old")
+    monkeypatch.setattr(Path, "read_bytes", lambda self: b"not what was written")
+    with pytest.raises(OSError, match="cannot be read back"):
+        publish(path, b"new")
+    monkeypatch.undo()
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.bin"]
+
+
 @contextmanager
 def largest_file(size: int) -> Iterator[None]:
     """A limit on the size of files answers a write as a full disk does: with an error from the system."""
@@ -158,6 +172,23 @@ def test_the_library_reports_every_byte_that_it_cannot_write(
     with largest_file(size):
         netcdf.write(tmp_path / "again.nc", data)
     assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
+
+
+def test_a_disk_that_takes_no_more_when_it_is_forced_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Network disks may tell only then that they are full; the file is forced by a thread next to its digest."""
+    path = tmp_path / "a.nc"
+    digest = write_dataset(path, dataset(9))
+
+    def full(handle: int) -> None:
+        raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(ResourceError, match="the disk is full"), disk.disk_limits(tmp_path):
+        write_dataset(path, dataset(10))
+    assert os.listdir(tmp_path) == ["a.nc"]
+    assert disk.digest_of(path) == digest
 
 
 def test_what_a_killed_process_left_is_swept_and_never_read(store: Store):
@@ -219,7 +250,9 @@ def test_what_is_shown_shares_no_bytes_with_the_cache(store: Store, said: list[s
     assert store.find("simulate", KEY) == record
     store.show(record, "runs/tiny", {"nc": "run.nc"}, "simulate")
     assert shown.read_bytes() == kept.read_bytes()
-    assert said == []
+    assert shown.with_name("run.edited.nc").read_bytes() == kept.read_bytes() + b"edited"
+    (reported,) = said
+    assert "run.nc was edited; the edited file is now run.edited.nc" in reported
 
 
 def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Store, said: list[str]):
@@ -248,19 +281,66 @@ def test_a_flipped_bit_in_a_record_makes_the_artifact_absent(store: Store, said:
     assert store.last("runs/tiny", "simulate") == record
 
 
+def test_a_folder_in_the_place_of_a_file_is_renamed_with_a_word(store: Store, capsys: pytest.CaptureFixture[str]):
+    store.path("simulate", KEY, "nc").mkdir(parents=True)
+    record = put(store)
+    assert store.find("simulate", KEY) == record
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{KEY}.nc was a folder" in line
+    assert f"the folder is now {KEY}.nc.folder1" in line
+
+
 def test_what_the_dead_left_is_swept_and_what_is_held_stays(store: Store):
     put(store)
     folder = store.path("simulate", KEY, "nc").parent
-    for name in ("old.tmp", "young.tmp", "d.lock"):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    names = {
+        f".a.{disk._host()}-{dead.pid}.0badcafe.tmp": False,
+        f".b.{disk._host()}-{os.getpid()}.0badcafe.tmp": True,
+        f".c.0badcafe-{dead.pid}.0badcafe.tmp": True,  # of another machine, and young
+        "d.lock": False,
+        "notes.tmp": True,  # none of ours
+    }
+    for name in names:
         (folder / name).touch()
-    os.utime(folder / "old.tmp", (0.0, 0.0))
     with store.lock("simulate", "e" * 32):
         store.sweep()
-        assert {path.name for path in folder.iterdir() if path.suffix in (".tmp", ".lock")} == {
-            "young.tmp",
-            f"{'e' * 32}.lock",
-        }
+        assert {name: (folder / name).exists() for name in names} == names
+        assert (folder / f"{'e' * 32}.lock").exists()
     assert not (folder / f"{'e' * 32}.lock").exists()
+    os.utime(folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp", (0.0, 0.0))
+    store.sweep()
+    assert not (folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp").exists()
+
+
+@pytest.fixture
+def forced(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Files and folders in the order in which they are forced to the disk."""
+    found: list[Path] = []
+    real = os.fsync
+
+    def noted(handle: int) -> None:
+        found.append(Path(os.readlink(f"/proc/self/fd/{handle}")))
+        real(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    return found
+
+
+def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, forced: list[Path]):
+    """The folder is forced to the disk after the file has got its name there."""
+    publish(tmp_path / "a.bin", b"content")
+    assert forced[0].suffix == ".tmp"
+    assert forced[1:] == [tmp_path]
+
+
+def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(store: Store, forced: list[Path]):
+    """Each takes milliseconds of a disk, and an artifact is what has a record."""
+    store.put("simulate", KEY, {"nc": dataset()}, {})
+    folder = store.path("simulate", KEY, "nc").parent
+    assert [path.parent for path in forced[:2]] == [folder, folder]
+    assert forced[2:] == [folder]
 
 
 def test_whoever_writes_into_what_was_just_stored_is_noticed(store: Store) -> None:

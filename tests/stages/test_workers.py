@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -72,6 +74,32 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
     assert {failure.task for failure in outcome.failures} == {task for task in tasks}
+
+
+BROKEN = """
+import sys
+from flexclear.commands import __main__, schema
+def command(options):
+    raise BrokenPipeError(32, "Broken pipe")
+if sys.argv[1] == "helper":
+    schema.command = command
+sys.exit(__main__.main(["schema"]))
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems do not say who reads")
+@pytest.mark.parametrize("whose, code, words", [("helper", 4, "a helper process was killed"), ("reader", 141, "")])
+def test_a_broken_pipe_is_that_of_the_output_or_of_a_helper(root: Path, whose: str, code: int, words: str) -> None:
+    """A helper that was killed while it started ended commands with exit code 141, without a word."""
+    command = [sys.executable, "-c", BROKEN, whose]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=root, **pipes) as process:
+        if whose == "reader":
+            process.stdout.close()
+        said = process.stderr.read()
+        assert process.wait() == code
+    assert words in said
+    assert "Traceback" not in said
 
 
 def test_a_worker_that_is_killed_between_two_calls_is_one_sentence() -> None:

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
+from flexclear.artifacts.disk import _host
 from tests.stages.conftest import CONTACT, JOINT, PATIENCE, SCENE, Project
 
 
@@ -206,6 +207,10 @@ def test_two_files_of_one_name_are_distinguished_or_refused(here: Project):
     assert done.returncode == 2
     assert "is called 'a', as" in done.stderr
     assert "replace each other" in done.stderr
+    here.run("run", paths[0], "--to", "simulate")
+    done = here.run("run", str(twin), "--to", "simulate")
+    assert done.returncode == 0
+    assert f"runs/a showed {paths[0]} and now shows {twin}" in done.stderr
 
 
 def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_current(project: Project):
@@ -246,9 +251,8 @@ def test_workers_and_what_they_left_are_gone_after_their_parent_was_killed(proje
     process.communicate(timeout=PATIENCE)
     _wait_for(lambda: not any(_alive(pid) for pid in family))
     left = project.results / "cache" / "simulate" / locks[0].name.replace(".lock", ".json")
-    stem = f".{left.stem}.0badcafe.tmp"
+    stem = f".{left.stem}.{_host()}-{process.pid}.0badcafe.tmp"
     (left.parent / stem).write_bytes(b"half a record")
-    os.utime(left.parent / stem, (0.0, 0.0))
     assert project.run("why", "tiny/ideal").returncode == 0
     assert project.run("run", "tiny/ideal").returncode == 0
     assert not list(project.results.rglob("*.lock"))

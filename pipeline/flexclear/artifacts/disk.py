@@ -1,7 +1,7 @@
 """Atomically written files with their own digests, copies for display, locks, and the removal of leftovers.
 
 Temporary files and locks of a process that died stay on disk, whatever ended it; `sweep` recognises temporary files by
-their age, and locks by nobody holding them.
+the name of their owner, and locks by nobody holding them.
 """
 
 from __future__ import annotations
@@ -11,9 +11,13 @@ import errno
 import hashlib
 import json
 import os
+import platform
+import re
 import shutil
+import stat
 import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +27,17 @@ from flexclear.system.errors import ResourceError
 if TYPE_CHECKING:
     from filelock import FileLock
 
+#: bytes that no table of records, facts or imports exceeds
+LARGEST_TABLE = 64 << 20
+#: bytes copied at once: a larger buffer is newly allocated each time, which takes longer than copying
+PIECE = 1 << 17
 #: error numbers of a full or limited disk
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-#: ages at which temporary files and unfinished work are removed: no file takes so long to write [s]
-ABANDONED = {".tmp": 3600.0, ".part": 7 * 86400.0}
+#: age at which temporary files of other machines that share the disk, and unfinished work, are removed [s]
+ABANDONED_AFTER = 7 * 86400.0
+#: error numbers of a file system without locks
+LOCKLESS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
+_TEMPORARY = re.compile(r"\.(?P<stem>[^.]*)\.(?P<host>[0-9a-f]{8})-(?P<pid>\d+)\.[0-9a-f]{8}\.tmp")
 
 
 def sha256(content: bytes) -> str:
@@ -34,8 +45,25 @@ def sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+def require_ordinary(path: Path) -> int:
+    """Return a file's size [bytes]; raise OSError for a folder, a device (possibly endless) or a pipe (may wait)."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "it is not an ordinary file", str(path))
+    return status.st_size
+
+
+def read_whole(path: Path, largest: int | None = None) -> bytes:
+    """Read an ordinary file; raise OSError for other files, and for more bytes than `largest`."""
+    size = require_ordinary(path)
+    if largest is not None and size > largest:
+        raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
+    return path.read_bytes()
+
+
 def digest_of(path: Path) -> str:
-    """Return the SHA-256 digest of a file of any size."""
+    """Return the SHA-256 digest of an ordinary file of any size; raise OSError for other files."""
+    require_ordinary(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -44,8 +72,23 @@ def publish(path: Path, content: bytes) -> str:
     """Write a file so that it exists in full or not at all; return its SHA-256 digest."""
     with temporary(path) as scratch:
         scratch.write_bytes(content)
-        platforms.replace(scratch, path)
-    return sha256(content)
+        if scratch.read_bytes() != content:
+            raise OSError(errno.EIO, "the written content cannot be read back", str(path))
+        digest = settle(scratch, path)
+    platforms.sync_folder(path.parent)
+    return digest
+
+
+def settle(scratch: Path, path: Path) -> str:
+    """Force a file's bytes to the disk and rename the file to `path`; return its SHA-256 digest.
+
+    The new name is on the disk only after `platforms.sync_folder`, which covers all names of the folder.
+    """
+    with scratch.open("rb+") as file:  # Windows syncs only files that are open for writing
+        os.fsync(file.fileno())
+    digest = digest_of(scratch)
+    platforms.replace(scratch, path)
+    return digest
 
 
 def checked(table: Mapping[str, Any]) -> bytes:
@@ -57,7 +100,7 @@ def checked(table: Mapping[str, Any]) -> bytes:
 def read_checked(path: Path) -> dict[str, Any] | None:
     """Return the table in a file of `checked`; None when there is no such file or a bit of it has changed."""
     try:
-        whole = json.loads(path.read_bytes())
+        whole = json.loads(read_whole(path, LARGEST_TABLE))
         table = whole["content"]
         return dict(table) if whole["sha256"] == _digest(table) else None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -69,31 +112,38 @@ def _digest(table: Mapping[str, Any]) -> str:
 
 
 def copy(source: Path, target: Path) -> None:
-    """Make `target` a read-only copy with the time of `source`."""
+    """Make `target` a read-only copy with the time of `source`; where the disk can share blocks, it takes no space."""
     target.parent.mkdir(parents=True, exist_ok=True)
     with temporary(target) as scratch:
-        shutil.copy2(source, scratch)
+        with source.open("rb") as old, scratch.open("wb") as new:
+            if not platforms.share_blocks(old, new):
+                shutil.copyfileobj(old, new, PIECE)
+        status = source.stat()
+        os.utime(scratch, ns=(status.st_atime_ns, status.st_mtime_ns))
         scratch.chmod(0o444)
         platforms.replace(scratch, target)
 
 
 def is_copy(source: Path, target: Path) -> bool:
-    """Return True when `target` is as `copy` left it: of equal size and time."""
+    """Return True when `target` is as `copy` left it: a file of its own, of equal size and time."""
     try:
         old, new = source.stat(), target.stat()
     except OSError:
         return False
-    return (old.st_size, old.st_mtime_ns) == (new.st_size, new.st_mtime_ns)
+    separate = (old.st_dev, old.st_ino) != (new.st_dev, new.st_ino)
+    return separate and (old.st_size, old.st_mtime_ns) == (new.st_size, new.st_mtime_ns)
 
 
 @contextlib.contextmanager
 def temporary(path: Path) -> Iterator[Path]:
     """Yield a name next to `path` that no other process uses; remove the file at the end, also after an error."""
-    scratch = path.with_name(f".{path.name.lstrip('.').partition('.')[0]}.{os.urandom(8).hex()}.tmp")
+    stem = path.name.lstrip(".").partition(".")[0]
+    scratch = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
     try:
         yield scratch
     finally:
-        scratch.unlink(missing_ok=True)
+        with contextlib.suppress(PermissionError):  # on Windows, open in a library that failed: `sweep` removes it
+            platforms.remove(scratch)
 
 
 @contextlib.contextmanager
@@ -114,29 +164,46 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
     """
     from filelock import FileLock  # here, since a command whose results are all up to date locks nothing
 
-    lock = FileLock(path, thread_local=False)
+    platforms.set_aside(path)
+    lock = FileLock(path, thread_local=False, fallback_to_soft=False)
     held = _acquire(lock, wait=False)
-    if not held and wait:
+    if held is None and wait:
         waiting()
         held = _acquire(lock, wait=True)
     try:
-        yield held
+        yield held is not None
     finally:
-        if held:
-            with contextlib.suppress(OSError):  # Windows removes no open file
-                path.unlink(missing_ok=True)  # while held: waiting processes then look for the file again
+        remains = held is not None and not _removed(path)  # while held: waiting processes then look for the file again
         lock.release()
+        if remains:  # Windows removes no open file; this attempt, too, fails where another process now holds the lock
+            _removed(path)
 
 
-def _acquire(lock: FileLock, *, wait: bool) -> bool:
-    """Acquire the lock and return True; return False when another process holds it."""
+def _removed(path: Path) -> bool:
+    """Remove a file; return True when it no longer exists."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True
+
+
+def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
+    """Return the lock, or None when another process holds it.
+
+    A file system without locks counts as free: unique temporary names and atomic replacement keep results correct, but
+    work may then be done twice.
+    """
     from filelock import Timeout
 
     try:
         lock.acquire(blocking=wait)
     except Timeout:
-        return False
-    return True
+        return None
+    except OSError as error:
+        if error.errno not in LOCKLESS:
+            raise
+    return lock
 
 
 def sweep(root: Path) -> int:
@@ -144,12 +211,35 @@ def sweep(root: Path) -> int:
     for long; return the number of removed files."""
     removed = 0
     for folder, _, names in os.walk(root):
-        for path in (Path(folder, name) for name in names if name.endswith((*ABANDONED, ".lock"))):
-            with contextlib.suppress(OSError):  # the folder is read-only, or another process removes the file
-                if path.suffix == ".lock":
-                    with locked(path, wait=False) as held:
-                        removed += held  # its release removes it
-                elif time.time() - path.stat().st_mtime > ABANDONED[path.suffix]:
+        for name in names:
+            if not name.endswith((".tmp", ".part", ".lock")):
+                continue
+            path = Path(folder, name)
+            if (name.endswith(".tmp") and _abandoned(path)) or (name.endswith(".part") and _old(path)):
+                with contextlib.suppress(OSError):  # the folder is read-only, or another process removes the file
                     path.unlink()
                     removed += 1
+            elif name.endswith(".lock"):
+                with contextlib.suppress(OSError), locked(path, wait=False) as held:
+                    removed += held  # its release removes it
     return removed
+
+
+def _abandoned(path: Path) -> bool:
+    match = _TEMPORARY.fullmatch(path.name)
+    if match is None:
+        return False  # not a file of this program
+    if match["host"] != _host():
+        return _old(path)
+    return not platforms.alive(int(match["pid"]))
+
+
+def _old(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return time.time() - path.stat().st_mtime > ABANDONED_AFTER
+    return False
+
+
+@cache
+def _host() -> str:
+    return sha256(platform.node().encode())[:8]

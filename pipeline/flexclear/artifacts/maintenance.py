@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexclear.artifacts.disk import digest_of
-from flexclear.artifacts.store import FAMILY, Record, Store, read_record
+from flexclear.artifacts.disk import digest_of, sha256
+from flexclear.artifacts.store import FAMILY, PARTIAL, Record, Store, read_record
+from flexclear.system import platforms
 
 #: suffixes of files next to artifacts that belong to none
 NO_ARTIFACT = (".json", ".lock", ".part", ".tmp")
@@ -80,7 +81,30 @@ def remove(store: Store, artifact: Artifact) -> None:
     record = artifact.record
     with store.lock(record.stage, record.key):
         for name in ("json", *record.files):
-            store.path(record.stage, record.key, name).unlink(missing_ok=True)
+            remove_file(store.path(record.stage, record.key, name))
+
+
+def remove_file(path: Path) -> None:
+    """Remove a file; a folder of its name is renamed."""
+    platforms.set_aside(path)
+    path.unlink(missing_ok=True)
+
+
+def shown_faults(store: Store, below: Path) -> list[str]:
+    """Return sentences on the files in a folder of results that differ from the artifacts shown there.
+
+    A shown file has the content of one of the artifacts whose records are in its folder's ``.facts``.
+    """
+    faults = []
+    for facts in sorted(below.rglob(".facts")):
+        records = [r for path in facts.glob("*.json") if (r := read_record(path)) is not None]
+        known = {digest for record in records for digest in record.files.values()}
+        names = {name for record in records for name in record.files}
+        for path in sorted(facts.parent.iterdir()) if known else ():
+            whole = path.suffix == ".nc" and not path.stem.endswith((PARTIAL, ".edited"))
+            if (whole or path.name in names) and path.is_file() and sha256(path.read_bytes()) not in known:
+                faults.append(f"{store.below(path)} differs from its artifact; the next command restores it")
+    return faults
 
 
 def find(store: Store, what: str) -> Record | None:

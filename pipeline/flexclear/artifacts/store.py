@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +25,8 @@ from flexclear.artifacts.disk import (
     locked,
     publish,
     read_checked,
+    read_whole,
+    settle,
     sha256,
     sweep,
     temporary,
@@ -38,6 +41,8 @@ if TYPE_CHECKING:
 
     Product = Mapping[str, xr.Dataset | LabelledArrays | bytes]
 
+#: part of a stage (those of sweeps have subfolders), key or file name of an artifact: it cannot lead to another folder
+_PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
 #: the file of an artifact that other stages read
 MAIN = "nc"
 #: key of a record that stands for all artifacts of a stage, such as the batches of a sweep's points
@@ -55,7 +60,8 @@ OUTDATED_TEXT = "Results in this folder are outdated: updating them failed.\n\n"
 class Record:
     """The record of a stored artifact: SHA-256 digest of each file by name, and the facts of its key.
 
-    said: attributes of the main file that a command reports to its user (`REPORTED`).
+    said: attributes of the main file that a command reports to its user (`REPORTED`). computed_by: the processor and
+    its settings, not part of the key (`machine.instruction_set`).
     """
 
     stage: str
@@ -63,6 +69,7 @@ class Record:
     files: Mapping[str, str]
     facts: Mapping[str, str]
     said: Mapping[str, str] = field(default_factory=dict)
+    computed_by: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
@@ -71,7 +78,7 @@ class Record:
 
     def table(self) -> dict[str, object]:
         """Return the content of the record's file, which `read_record` reads."""
-        content = {"files": self.files, "facts": self.facts, "said": self.said}
+        content = {"files": self.files, "facts": self.facts, "said": self.said, "computed_by": self.computed_by}
         return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in content.items()}}
 
 
@@ -115,6 +122,7 @@ class Store:
         key: str,
         product: Product,
         facts: Mapping[str, str],
+        computed_by: Mapping[str, str] | None = None,
     ) -> Record:
         """Store an artifact; its record is written last and makes it valid.
 
@@ -126,10 +134,10 @@ class Store:
             folder.mkdir(parents=True, exist_ok=True)
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
-                digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
+                digests[name] = publish(path, content) if isinstance(content, bytes) else _written(path, content)
             attributes = getattr(product.get(MAIN), "attrs", {})  # empty where the main file is no dataset
             reported = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
-            record = Record(stage, key, digests, dict(facts), reported)
+            record = Record(stage, key, digests, dict(facts), reported, computed_by or {})
             publish(self.path(stage, key, "json"), checked(record.table()))
         return record
 
@@ -142,7 +150,7 @@ class Store:
         from flexclear.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
-        content = path.read_bytes()
+        content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self.below(path)} changed while it was read; run again to rebuild it")
         try:
@@ -153,7 +161,7 @@ class Store:
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Show the current artifact: read-only copies in `folder`, and its facts in ``folder/.facts``.
 
-        An empty `folder` shows nothing.
+        An empty `folder` shows nothing. A shown file that somebody has edited is renamed, and the renaming is reported.
         """
         if not folder:
             return
@@ -162,11 +170,26 @@ class Store:
         with disk_limits(self.root / folder):
             for name, target in shown.items():
                 source = self.path(record.stage, record.key, name)
-                if not is_copy(source, target):
+                # bit rot changes neither size nor time, so the file that users read as data is compared by content
+                if not is_copy(source, target) or (name == MAIN and digest_of(target) != record.files[name]):
+                    self._set_edited_aside(target, name, folder, label)
                     copy(source, target)
             _partial(shown[MAIN] if MAIN in shown else self.root / folder / label).unlink(missing_ok=True)
             self._facts(folder, label, "failed").unlink(missing_ok=True)
             self._write_outdated_note(folder)
+
+    def _set_edited_aside(self, target: Path, name: str, folder: str, label: str) -> None:
+        """Rename a shown file that was edited, so that showing the artifact does not overwrite the edit."""
+        last = self.last(folder, label)
+        platforms.set_aside(target)
+        if not target.is_file() or target.is_symlink():
+            return
+        # a file without known digest is taken as the user's when it is writable: shown copies are read-only
+        known = last.files.get(name) if last is not None else None
+        if digest_of(target) != known if known else target.stat().st_mode & 0o222:
+            aside = target.with_name(f"{target.stem}.edited{target.suffix}")
+            platforms.replace(target, aside)
+            self.say(f"{self.below(target)} was edited; the edited file is now {aside.name}, the result is restored")
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
         """Write an incomplete run next to the shown files; return its path, or None where nothing is shown.
@@ -256,12 +279,14 @@ def read_record(path: Path) -> Record | None:
     """Return the record in a file; None when the file is absent, damaged, or not understood."""
     try:
         table = read_checked(path) or {}
-        named = (table.get(name, {}).items() for name in ("files", "facts", "said"))
+        named = (table.get(name, {}).items() for name in ("files", "facts", "said", "computed_by"))
         files, facts, *others = ({str(name): str(value) for name, value in texts} for texts in named)
         record = Record(str(table["stage"]), str(table["key"]), files, facts, *others)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
-    return record if record.files or record.key == FAMILY else None
+    # a foreign record must not lead out of its folder, since pruning removes the files that records name
+    inside = all(_PART.fullmatch(name) for name in (*record.stage.split("/"), record.key, *record.files))
+    return record if inside and (record.files or record.key == FAMILY) else None
 
 
 def _partial(shown: Path) -> Path:
@@ -274,6 +299,13 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
     Equal datasets give equal bytes: no times or names of this machine.
     """
+    digest = _written(path, dataset)
+    platforms.sync_folder(path.parent)
+    return digest
+
+
+def _written(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
+    """Write a dataset as `write_dataset` does, without forcing its name to the disk."""
     from flexclear.artifacts import netcdf  # here, since commands with nothing to compute write nothing
     from flexclear.artifacts.labelled import of
 
@@ -285,6 +317,4 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
             # the HDF5 library does not report that the disk is full; writing plain bytes raises that error
             scratch.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
-        digest = digest_of(scratch)
-        platforms.replace(scratch, path)
-    return digest
+        return settle(scratch, path)

@@ -72,7 +72,10 @@ def _check(options: argparse.Namespace) -> None:
     inventory = maintenance.inventory(store, whole=True)
     # a kernel without a checksum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
-    faults = [*inventory.damaged, *(f"{path} is damaged" for path in kernels if not files.compiled(path))]
+    others = {path for path in kernels if files.stored_by_another_build(path)}
+    damaged = [path for path in kernels if path not in others and not files.compiled(path)]
+    in_results = maintenance.shown_faults(store, store.root)
+    faults = [*inventory.damaged, *in_results, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:LISTED_FAULTS]:
         print(shown(fault))
     if len(faults) > LISTED_FAULTS:
@@ -80,7 +83,8 @@ def _check(options: argparse.Namespace) -> None:
     text = (
         f"{len(inventory.artifacts)} artifacts, {len(faults)} faults, {len(inventory.orphans)} files without a record"
     )
-    print(f"{text}; {len(kernels)} compiled kernels")
+    unused = f", {len(others)} unused of another build" if others else ""
+    print(f"{text}; {len(kernels)} compiled kernels{unused}")
     if faults:
         raise ResourceError(
             "damaged files are never used: they are computed again when needed; `cache prune` removes them"
@@ -95,6 +99,8 @@ def _explain(options: argparse.Namespace) -> None:
     print(f"{record.stage} {record.key}")
     for name, digest in record.files.items():
         print(shown(f"  holds {name}: sha256 {digest}"))
+    for fact, value in record.computed_by.items():
+        print(shown(f"  computed by {fact}: {value}"))
     for fact, value in record.facts.items():
         print(shown(f"  {fact}: {value}"))
 
@@ -110,7 +116,7 @@ def _prune(options: argparse.Namespace) -> None:
     for artifact in chosen:
         maintenance.remove(store, artifact)
     for path in (*inventory.orphans, *inventory.unreadable):
-        path.unlink(missing_ok=True)
+        maintenance.remove_file(path)
     kernels = sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
     print(f"removed {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
     if kernels:

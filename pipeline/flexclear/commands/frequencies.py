@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: characters of a bare number
 NUMBER = "+-.0123456789eE"
+#: largest number of speeds of one diagram
+MOST_SPEEDS = 10_000
 #: endings of pictures of Campbell diagrams
 PICTURES = (".png", ".svg")
 
@@ -114,6 +116,10 @@ def speeds(text: str) -> list[float]:
     if not (step > 0.0 and last > first):
         raise InputError(f"--speeds {text}", rule, "for example 0:500rpm:50")
     count = int(np.floor((last - first) / step * (1.0 + 1e-12))) + 1
+    if count > MOST_SPEEDS:
+        raise InputError(
+            f"--speeds {text}", f"asks for {count} speeds; at most {MOST_SPEEDS} are computed", "a larger step"
+        )
     return [first + k * step for k in range(count)]
 
 

@@ -11,6 +11,7 @@ from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.scenes import (
     FACTS,
     check_out,
+    claim,
     conclude,
     copy_run,
     deficits,
@@ -55,6 +56,9 @@ def command(options: argparse.Namespace) -> None:
     requested = [Graph(one.planned) for one in plans] or requested
     for graph in requested:
         check_run(graph.scene, workplace.store.root)
+        taken = claim(graph.scene, workplace.store)
+        if taken is not None:
+            workplace.monitor.say(taken)
     outcome = workplace.bring([task for graph in requested for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle" and not options.json:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 
+from flexclear.artifacts.store import Record
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.stages.graph import STAGES
 from flexclear.stages.workplace import open_workplace
 from flexclear.system.errors import shown
+from flexclear.system.machine import instruction_set
 from flexclear.workflow.execute import states
 
 
@@ -21,18 +23,28 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
-    workplace, reasons = open_workplace(options), dict[str, dict[str, list[str]]]()
+    workplace, reasons, others = open_workplace(options), dict[str, dict[str, list[str]]](), dict[str, list[str]]()
     for graph in scenes.graphs(options.scenes, options.set):
         stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
         reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
-    print(as_json(reasons) if options.json else text(reasons))
+        others[graph.scene.name] = [text for state in stages for text in notes(state.task.label, state.record)]
+    print(as_json(reasons) if options.json else text(reasons, others))
 
 
-def text(reasons: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
-    """Return for each scene its stages, and why each would run again."""
+def notes(label: str, record: Record | None) -> list[str]:
+    """Return a note on a fresh result that other instructions than this process's computed: rounding differs."""
+    stored = record.computed_by if record is not None else {}
+    here = instruction_set() if stored else {}
+    names = [name for name in {**stored, **here} if stored.get(name) != here.get(name)]
+    changes = ", ".join(f"{name} {stored.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
+    return [f"{label}: other processor instructions, numbers differ by rounding: {changes}"] if names else []
+
+
+def text(reasons: Mapping[str, Mapping[str, Sequence[str]]], others: Mapping[str, Sequence[str]]) -> str:
+    """Return for each scene its stages, why each would run again, and notes on results of other instructions."""
     lines = []
     for scene, stages in reasons.items():
-        lines.append(scene)
+        lines += [scene, *(f"  note: {shown(note)}" for note in others.get(scene, ()))]
         for label, why in stages.items():
             first, *more = map(shown, why or ["fresh"])
             lines += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in more)]

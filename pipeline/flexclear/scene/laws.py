@@ -28,6 +28,8 @@ _LIST = BeforeValidator(_listed, json_schema_input_type=float | str | tuple[floa
 Values: TypeAlias = Annotated[tuple[Value, ...], _LIST]
 Times: TypeAlias = Annotated[tuple[Time, ...], _LIST]
 
+#: largest size of a table [bytes]; every row is a piece of a law, at which integration stops
+LARGEST_TABLE = 16 << 20
 #: largest number of coefficients of a polynomial law
 COEFFICIENTS = 8
 #: largest number of steps of one law, and of pieces of composed laws: each is compared with all others
@@ -346,6 +348,10 @@ def law_types(node: object) -> Iterator[str]:
 def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list[tuple[float, float]]:
     """Return two columns of a CSV file, time in seconds; raise ValueError, in words, for unreadable files."""
     try:
+        if not path.is_file() and path.exists():
+            raise ValueError(f"the table {path.name} cannot be read: it is not an ordinary file")
+        if path.stat().st_size > LARGEST_TABLE:
+            raise ValueError(f"the table {path.name} is larger than {LARGEST_TABLE >> 20} MB: leave rows out")
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if row and not row[0].lstrip().startswith("#")]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -24,6 +24,8 @@ from flexclear.system.errors import InputError, ResourceError, shown
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
+#: largest number of scenes that extend each other in a row; each is read, and the extended ones are copied
+LONGEST_CHAIN = 50
 #: keys of parts that name files, which are searched for next to the scene
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
@@ -221,6 +223,8 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     if path in above:
         chain = " -> ".join(p.name for p in (*above, path))
         raise InputError(str(path), f"extends itself: {chain}", "break the circle")
+    if len(above) == LONGEST_CHAIN:
+        raise InputError(str(above[0]), f"extends more than {LONGEST_CHAIN} scenes in a row", "leave some out")
     table = read_toml(path)
     require_kind(table, path, SCENE)
     _require_tables(table, path)

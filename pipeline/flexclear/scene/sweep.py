@@ -17,6 +17,8 @@ from flexclear.scene.validation_errors import input_errors
 
 #: largest number of points of one sweep
 MOST_POINTS = 1_000_000
+#: largest number of parameters of one sweep, and of values of all parameters at all points of a sample
+MOST_PARAMETERS, MOST_VALUES = 1000, 10_000_000
 
 Value = float | str
 #: dimensions and variables that results have besides the parameters
@@ -128,7 +130,7 @@ class Sweep(Part):
     """a scene file, or the name of one below scenes/"""
     set: dict[str, Any] = Field(default_factory=dict)
     """changes of the scene that hold at all points"""
-    vary: Annotated[dict[str, Parameter], Field(min_length=1)]
+    vary: Annotated[dict[str, Parameter], Field(min_length=1, max_length=MOST_PARAMETERS)]
     """parameters by name; the name is a key path in the scene unless `places` gives others"""
     combine: Literal["grid", "list"] = "grid"
     """every value with every other (grid), or the first values, the second ones and so on (list)"""
@@ -191,6 +193,8 @@ class Sweep(Part):
     def _check_sample(self) -> None:
         if self.combine == "list":
             raise ValueError('combine: a [sample] chooses its own points; remove combine = "list"')
+        if self.sample is not None and self.sample.points * len(self.vary) > MOST_VALUES:
+            raise ValueError(f"sample.points: all points together have more than {MOST_VALUES} values; request fewer")
         for name, parameter in self.vary.items():
             if parameter.values is not None or parameter.count is not None:
                 raise ValueError(f"vary.{name}: in a [sample] write from and to without count, or mean and deviation")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import stat
 import tomllib
 from functools import lru_cache
 from pathlib import Path
@@ -11,11 +13,29 @@ from flexclear.scene.lines import not_toml
 from flexclear.scene.registry import suggestion
 from flexclear.system.errors import InputError
 
+#: largest size of a scene or recipe [bytes]: the TOML reader takes a second for the worst content of this size
+LARGEST_FILE = 1 << 20
+#: a key with more parts than a scene has levels; the TOML reader's time grows with their number squared
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+DEEP = re.compile(rf"(?<![\w\\-])(?:{_PART}[ \t]*+\.[ \t]*+){{50}}")
+
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file as a table; raise InputError when it cannot be read or parsed."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(str(path), "cannot be read: it is not an ordinary file", "name a TOML file")
+        if status.st_size > LARGEST_FILE:
+            raise InputError(
+                str(path),
+                f"is larger than {LARGEST_FILE >> 20} MB",
+                "name a TOML file; put long tables of laws into a CSV file",
+            )
+        text = path.read_text(encoding="utf-8-sig")
+        if DEEP.search(text):
+            raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
+        return tomllib.loads(text)
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:

@@ -17,12 +17,12 @@ from flexclear.system.progress import Progress
 
 def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Classify the motion (schema VERDICT) and draw its figure; the input is ``sections``, `params` names its scene."""
-    from flexclear.post.sections import verdict_figure
+    from flexclear.post.sections import verdict_page
     from flexclear.post.sections.verdict import derive
 
     sections = inputs["sections"].assign_attrs(scene=params["scene"])
     judged = derive(sections)
-    return {"nc": judged, **verdict_figure.make(sections, judged)}
+    return {"nc": judged, **verdict_page.make(sections, judged)}
 
 
 def overview(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from flexclear.artifacts.disk import disk_limits, publish, sha256
+from flexclear.artifacts import maintenance
+from flexclear.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.artifacts.paths import DATA, results_root
 from flexclear.artifacts.store import PARTIAL, Store
 from flexclear.post.pages import media
@@ -135,6 +136,9 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     )
     if not files:
         raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
+    changed = maintenance.shown_faults(Store(results_root()), folder)
+    if changed:
+        raise ResourceError(f"{changed[0]}: flexclear run {name}")
     if _of_another_run(folder):
         files = [path for path in files if path != folder / "post.nc"]
     # datasets are loaded and closed: the garbage collector closes open ones inside of whatever NetCDF call runs then
@@ -396,6 +400,8 @@ def check_target(target: Path, option: str = "--out") -> None:
             raise InputError(where, "its folder does not exist", f"mkdir -p {target.parent}")
         if target.is_dir():
             raise InputError(where, "is a folder", "name a file in it")
+        if target.exists() and not target.is_file():  # replacing a device by a file would destroy it
+            raise InputError(where, "is not an ordinary file", "name an ordinary file")
     except OSError as error:
         raise InputError(where, f"cannot be a file: {error.strerror}", "name another one") from None
 
@@ -411,6 +417,23 @@ def _refuse_namesakes(scenes: list[Scene]) -> None:
                 f"is called '{scene.name}', as is {folders[scene.name]}: their results would replace each other",
                 "rename one, or call the command from a folder above both, where their paths name them",
             )
+
+
+def claim(scene: Scene, store: Store) -> str | None:
+    """Note that results/runs/<name> belongs to this file; return a sentence when it belonged to another one."""
+    path = _file(scene)
+    if path is None:
+        return None
+    note = store.root / "runs" / scene.name / FACTS / "scene.owner"
+    before = (read_checked(note) or {}).get("file")
+    if before == str(path):
+        return None
+    with disk_limits(note.parent):
+        note.parent.mkdir(parents=True, exist_ok=True)
+        publish(note, checked({"file": str(path)}))
+    if not isinstance(before, str) or not is_file(Path(before)):
+        return None
+    return f"results/runs/{scene.name} showed {before} and now shows {path}, which has the same name"
 
 
 def _file(scene: Scene) -> Path | None:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 from flexclear.system.errors import ResourceError
 from flexclear.system.platforms import memory
 
-__all__ = ["disk", "memory", "require_disk", "require_memory", "size"]
+__all__ = ["disk", "instruction_set", "memory", "require_disk", "require_memory", "size"]
+
+#: instruction sets that change the rounding of sums and products, by their names in LLVM
+INSTRUCTIONS = ("avx512f", "avx2", "fma", "neon", "sve")
+#: environment variables that select other instructions
+CHOOSING = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT", "OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
 
 #: fraction of the remaining memory or disk that one piece of work may take
 ALLOWED_FRACTION = 0.8
@@ -42,3 +50,16 @@ def size(count: float) -> str:
     """Return a number of bytes in words: ``3.2 GB``."""
     power = next((k for k in range(5) if count < 1000.0 ** (k + 1)), 4)
     return f"{count / 1000.0**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
+
+
+@cache
+def instruction_set() -> dict[str, str]:
+    """Return what decides the rounding of results on this machine, in words: processor, vector units, settings.
+
+    It is not part of any key: results of other processors differ within the tolerances of their runs.
+    """
+    llvm = import_module("llvmlite.binding")  # by name, so that the library's version enters no key
+    features = llvm.get_host_cpu_features()
+    vectors = ", ".join(name for name in INSTRUCTIONS if features.get(name)) or "none of " + ", ".join(INSTRUCTIONS)
+    facts = {"processor": llvm.get_host_cpu_name(), "instructions": vectors}
+    return facts | {name: os.environ[name] for name in CHOOSING if os.environ.get(name)}

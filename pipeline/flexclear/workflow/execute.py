@@ -8,7 +8,7 @@ from importlib import import_module
 from itertools import combinations
 
 from flexclear.artifacts.store import Record, Store
-from flexclear.system import threads
+from flexclear.system import machine, threads
 from flexclear.system.errors import ResourceError
 from flexclear.system.progress import Progress
 from flexclear.workflow import encounters, journal
@@ -59,7 +59,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             if changed:
                 raise ResourceError(f"{changed[0]} changed while it was read; run again")
             of_this = _facts(task, inputs, sources, [name for name in task.met if name in met])
-            record = store.put(task.stage, key(of_this), product, of_this)
+            record = store.put(task.stage, key(of_this), product, of_this, machine.instruction_set())
             storage.remove()
     store.show(record, task.folder, task.names, task.label)
     return record

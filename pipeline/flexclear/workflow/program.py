@@ -11,7 +11,7 @@ from collections.abc import Callable
 from types import FrameType
 
 from flexclear.system.errors import INTERRUPTED, FlexclearError, ResourceError, shown
-from flexclear.system.platforms import plain_output
+from flexclear.system.platforms import plain_output, reader_has_gone
 from flexclear.workflow import workers
 
 CLOSED_PIPE = 141
@@ -45,6 +45,9 @@ def exit_code(work: Callable[[], object], *, own: bool = True) -> int:
         print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
+        if not reader_has_gone():
+            print(f"flexclear: {workers.LOST}", file=sys.stderr)
+            return ResourceError.exit_code
         # the reader (`| head`) has closed the pipe; keep the interpreter from reporting that at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED_PIPE

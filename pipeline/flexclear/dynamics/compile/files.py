@@ -96,6 +96,12 @@ def _load_stored(path: Path) -> bool:
     return True
 
 
+def stored_by_another_build(path: Path) -> bool:
+    """Return True when a file's code is undamaged but stored as by another build of the program, and so unused."""
+    noted = read_checked(path.with_suffix(".sum"))
+    return noted is not None and set(noted) != {path.name, path.with_suffix(CODE).name}
+
+
 def _digests(path: Path) -> dict[str, str]:
     """Return the digests of source and compiled code, those that exist, by file name."""
     there = (file for file in (path, path.with_suffix(CODE)) if file.is_file())

@@ -1,4 +1,7 @@
-"""Folder of compiled kernels: its processor, and the limit of its size."""
+"""Folder of compiled kernels: its owner, its processor, and the limit of its size.
+
+Loading a kernel runs code, so a folder in which other users could write is refused.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,18 @@ from tempfile import TemporaryDirectory
 
 from flexclear.artifacts.disk import sweep
 from flexclear.dynamics.compile.files import CODE, file_lock, remove_code
+from flexclear.system.errors import InputError
+from flexclear.system.platforms import others_can_write
 
 #: kernels unused for this time [s] are removed, and the least recently used ones beyond this many bytes
 UNUSED, LARGEST = 90 * 86400.0, 2 << 30
 
 
 def writable(root: Path, report: Callable[[str], None]) -> Path:
-    """Return the folder for this processor below `root`; if it cannot be written, a temporary one of this process."""
+    """Return the folder for this processor below `root`; if it cannot be written, a temporary one of this process.
+
+    Raises InputError when other users could write there.
+    """
     folder = root / processor()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -28,7 +36,19 @@ def writable(root: Path, report: Callable[[str], None]) -> Path:
     if problem:
         report(f"compiled kernels cannot be stored in {folder} ({problem}); every process will compile its own")
         return Path(_temporary().name)
+    refuse_shared(folder)
     return folder
+
+
+def refuse_shared(folder: Path) -> None:
+    """Raise InputError when anyone but this user and the system's can write to a folder of kernels, or replace it."""
+    for part in (folder, *folder.parents):
+        if others_can_write(part, inside=part == folder):
+            raise InputError(
+                str(folder),
+                f"compiled kernels are not loaded from this folder, since others can write to {part}",
+                f"chmod go-w {part}, or name another folder with FLEXCLEAR_KERNELS",
+            )
 
 
 @cache

@@ -8,6 +8,7 @@ two processes may be equal.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 from dataclasses import dataclass
@@ -55,6 +56,7 @@ def stored(name: str, module: Any, binary: bytes) -> bytes:
     facts = {
         "name": name,
         "foreign": sorted(name for name in foreign if not name.startswith("llvm.")),
+        "sha256": hashlib.sha256(binary).hexdigest(),
     }
     return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
@@ -85,6 +87,8 @@ def load(stored: bytes) -> Code:
     facts = json.loads(line)
     if not facts:
         return Code(0, None)
+    if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM ends the process over a damaged object file
+        raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))
     for name in facts["foreign"]:
         _register(llvm, name)

@@ -1,22 +1,22 @@
-"""The page docs/chaos.md: whether repeated motions are periodic, quasi-periodic or chaotic."""
+"""The figure of sections and their verdict, and the page with the verdicts on several scenes."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
-from pathlib import Path
 
+import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 
+from flexclear.post.plotting import style
 from flexclear.post.plotting.table import Table, as_csv, pipe_table
-from flexclear.stages import scenes
-from flexclear.stages.workplace import open_workplace
 
 INTRODUCTION = """# Periodic, quasi-periodic or chaotic
 
 Made from the datasets `results/runs/<scene>/sections.nc` and `verdict.nc` by
 
-    python -m benchmarks.chaos {scenes}
+    flexclear sections {scenes} \\
+        --page {page}
 
 Nothing on this page is typed in. Each scene's laws are repeated, period after period; {transient} periods are left to
 settle, and {periods} are examined, once each at the same phase. For {followed} of them a neighbour is followed that
@@ -37,11 +37,12 @@ COLUMNS = ("scene", "verdict", "periods", "exponent", "exponent_low", "exponent_
 HEAD = ("scene", "verdict", "exponent, 1/s", "95 %", "K", "returns after", "to", "contraction", "in 16 lines")
 
 
-def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: str) -> str:
+def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], page: str, pictures: str) -> str:
     """Return the whole page. verdicts, sections: schemas VERDICT and SECTIONS, by scene; pictures: their folder."""
     first = next(iter(sections.values()))
     text = INTRODUCTION.format(
         scenes=" ".join(verdicts),
+        page=page,
         transient=first.attrs["transient"],
         periods=first.sizes["section"],
         followed=first.sizes["followed"],
@@ -82,23 +83,64 @@ def row(name: str, verdict: xr.Dataset) -> tuple[str, ...]:
     )
 
 
-def write_page(
-    verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
-) -> None:
-    """Write the verdicts as a page, with figures (PNG) and a table (CSV) in a folder of the same name next to it."""
-    files = {f"{name.replace('/', '_')}.png": picture for name, picture in pictures.items()}
-    files["verdicts.csv"] = csv_text(verdicts).encode()
-    scenes.write_page(page, markdown(verdicts, sections, page.stem), files)
+COLOR, LIGHT = "#1f6f8b", "#b9b9b9"
+POINT = {"s": 9, "lw": 0, "color": COLOR, "alpha": 0.8}
 
 
-def main(names: list[str]) -> None:
-    """Judge scenes and write the page."""
-    workplace, graphs = open_workplace(), scenes.graphs(names)
-    made = {g.scene.name: one for g, one in zip(graphs, workplace.made(*(g.verdict for g in graphs)), strict=True)}
-    sections = dict(zip(made, workplace.datasets(*(g.sections for g in graphs)), strict=True))
-    pictures = {name: one.read("sections.png") for name, one in made.items()}
-    write_page({name: one.dataset() for name, one in made.items()}, sections, pictures, Path("docs/chaos.md"))
+def make(sections: xr.Dataset, verdict: xr.Dataset) -> dict[str, bytes]:
+    """Draw sections.png and sections.svg."""
+    with style.style():
+        figure, axes = style.grid(1, 4, (13.2, 3.9))
+        section, returns, power, growth = axes[0]
+        _section(section, verdict)
+        _returns(returns, verdict)
+        _power(power, verdict)
+        _growth(growth, sections, verdict)
+        style.heading(
+            figure,
+            f"A {verdict.attrs['verdict']} motion" if verdict.attrs["verdict"] != "undecided" else "Undecided",
+            verdict.attrs["reasons"],
+        )
+        return style.files("sections", figure)
 
 
-if __name__ == "__main__":
-    main(sys.argv[1:])
+def _section(axes: Axes, verdict: xr.Dataset) -> None:
+    shown = verdict.principal.values
+    other = shown[:, 1] if shown.shape[1] > 1 else np.zeros(len(shown))
+    axes.scatter(shown[:, 0], other, **POINT)  # type: ignore[arg-type]
+    axes.set(title="section", xlabel="along the largest variance", ylabel="along the second largest")
+
+
+def _returns(axes: Axes, verdict: xr.Dataset) -> None:
+    first = verdict.principal.values[:, 0]
+    low, high = float(first.min()), float(first.max())
+    axes.plot([low, high], [low, high], color=LIGHT, lw=1.0, zorder=1)
+    axes.scatter(first[:-1], first[1:], **POINT)  # type: ignore[arg-type]
+    axes.set(title="return map", xlabel="this period", ylabel="next period")
+
+
+def _power(axes: Axes, verdict: xr.Dataset) -> None:
+    axes.set(title="spectrum", xlabel="cycles per period", ylabel="fraction of the variance")
+    if not verdict.power.values.any():
+        axes.text(0.5, 0.5, "the states are constant", transform=axes.transAxes, ha="center", color=style.SOFT)
+        return
+    for component in range(verdict.sizes["component"])[::-1]:
+        power = np.maximum(verdict.power.values[1:, component], 1e-16)
+        axes.semilogy(verdict.frequency.values[1:], power, lw=0.9, color=COLOR if component == 0 else LIGHT)
+    axes.set_ylim(bottom=max(1e-16, axes.get_ylim()[0]))
+
+
+def _growth(axes: Axes, sections: xr.Dataset, verdict: xr.Dataset) -> None:
+    grown = np.cumsum(sections.growth.values)
+    number = np.arange(1, len(grown) + 1)
+    axes.plot(number, grown, color=COLOR)
+    period = float(sections.attrs["period"])
+    axes.fill_between(
+        number,
+        float(verdict.exponent_low) * period * number,
+        float(verdict.exponent_high) * period * number,
+        color=COLOR,
+        alpha=0.18,
+        lw=0,
+    )
+    axes.set(title="separation of a neighbour", xlabel="period", ylabel="logarithm of its distance's growth factor")
