@@ -9,7 +9,7 @@ import gzip
 import os
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.artifacts.store import Store
+from flexclear.artifacts import maintenance
+from flexclear.artifacts.disk import checked, read_checked, sha256
+from flexclear.artifacts.store import Store, read_record
 from flexclear.post.render import forms
 from flexclear.scene.load import load_scene
 from flexclear.scene.sweep import read_sweep
 from flexclear.stages import scenes
+from flexclear.stages.graph import Graph
 from flexclear.structure.fe.exchange import files
 from flexclear.structure.fe.recipe import Matrices
 from flexclear.structure.fe.solid import imported
@@ -87,6 +90,23 @@ def test_a_scene_that_asks_for_endless_work_is_refused_at_once(name: str, tmp_pa
         load_scene(tmp_path / "scene.toml")
 
 
+def test_paths_that_are_no_files_are_refused(tmp_path: Path) -> None:
+    """Reading the first of them would never end, the second would wait for a writer."""
+    pipe, loop, dots = (tmp_path / f"{name}.toml" for name in ("pipe", "loop", ".."))
+    os.mkfifo(pipe)
+    loop.symlink_to(loop)
+    dots.write_text('title = "a"')
+    paths = {"/dev/zero": "not an ordinary file", pipe: "not an ordinary file", loop: None, dots: "cannot name a scene"}
+    for path, words in {**paths, "a\0b.toml": None, "x" * 5000 + ".toml": None}.items():
+        with refused(words):
+            load_scene(path)
+    body = 'title = "a"\ntime.end = 1\n[body.b]\ntype = "flexible"\nmodes = { reference = "x", count = 1 }\nmesh = '
+    for mesh in ("/dev/zero", str(pipe), "x" * 5000, "a\\u0000b"):
+        (tmp_path / "scene.toml").write_text(f'{body}"{mesh}"')
+        with refused():
+            Graph(load_scene(tmp_path / "scene.toml")).up_to("mesh")
+
+
 def test_a_long_row_of_scenes_that_extend_each_other_is_refused(tmp_path: Path) -> None:
     for k in range(60):
         (tmp_path / f"{k}.toml").write_text(f'extends = "{k + 1}.toml"')
@@ -109,6 +129,13 @@ def test_many_changes_give_a_name_that_a_folder_can_have(tmp_path: Path) -> None
     assert max(map(len, names)) < 255  # bytes of a name on all usual file systems
 
 
+def test_results_take_the_place_of_no_device() -> None:
+    """A new file of that name would be put there, and the device be gone."""
+    for target in ("/dev/null", "/" + "x" * 5000):
+        with refused("not an ordinary file|cannot be a file"):
+            scenes.check_target(Path(target))
+
+
 SWEEP: dict[str, Any] = {"scene": "s", "keep": ["b.position.final"], "vary": {}}
 MASS = {"values": [1, 2], "places": ["body.b.mass"]}
 
@@ -126,12 +153,16 @@ def test_samples_of_more_values_than_there_is_memory_for_are_refused() -> None:
             read_sweep({**SWEEP, "sample": {"method": "sobol", "points": points}, "vary": vary}, "sweep.toml")
 
 
+GRID = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 300 300 300\n"
 POINTS = "ply\nformat binary_little_endian 1.0\nelement vertex 10000000000\nproperty double x\nend_header\n"
 MESHES: dict[str, tuple[bytes | None, str]] = {
+    "mesh.vtk": (GRID.encode(), "declares a grid of 2.7e\\+07 points"),
+    "mesh.inp": (b"*INCLUDE, INPUT=/dev/zero\n", "not an ordinary file"),
     "mesh.xdmf": (b"<a>" + b"a" * 1_000_000, "cannot read|not a surface"),
     "mesh.stl": (b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 100, "cannot read|no solid cells|no triangles"),
     "mesh.vtu": (b"<VTKFile type='UnstructuredGrid'>" + b"<a>" * 200_000, "cannot read|not a surface"),
     "mesh.ply": (POINTS.encode(), "is damaged, or needs more memory than available"),
+    "pipe.vtu": (None, "not an ordinary file"),
 }
 
 
@@ -222,6 +253,65 @@ def test_runs_of_other_programs_are_numbers(text: str, tmp_path: Path) -> None:
     (tmp_path / "p.json").write_text(text)
     with refused("--peer"):
         cost.read_peers(tmp_path / "p.json")
+
+
+# Folders of results that somebody else sent ----------------------------------------------------------------------
+
+
+def stored(root: Path) -> tuple[Store, Path]:
+    store = Store(root / "results")
+    store.put("stage", "key", {"txt": b"content"}, {"a": "b"})
+    return store, store.path("stage", "key", "json")
+
+
+def altered(path: Path, **changes: Any) -> None:
+    """With a sum that is right: a digest is no signature."""
+    path.write_bytes(checked({**(read_checked(path) or {}), **changes}))
+
+
+def test_what_is_pruned_lies_in_the_cache(tmp_path: Path) -> None:
+    store, record = stored(tmp_path)
+    (tmp_path / "precious.txt").write_text("precious")
+    (record.parent / "key.x").mkdir()
+    altered(record, files={"x/../../../../precious.txt": sha256(b"other")})
+    assert read_record(record) is None
+    assert maintenance.inventory(store, whole=True).unreadable == (record,)
+    for stage in ("../stage", "stage/../..", "/stage", ""):
+        altered(record, stage=stage, files={"txt": sha256(b"content")})
+        assert read_record(record) is None
+    for artifact in maintenance.prunable(store, maintenance.inventory(store, whole=True), -1.0):
+        maintenance.remove(store, artifact)
+    assert (tmp_path / "precious.txt").read_text() == "precious"
+
+
+REPLACED: dict[str, Callable[[Path], Any]] = {
+    "pipe": os.mkfifo,
+    "device": lambda path: path.symlink_to("/dev/zero"),
+    "loop": lambda path: path.symlink_to(path.name),
+    "folder": Path.mkdir,
+}
+
+
+@pytest.mark.parametrize("kind", REPLACED)
+@pytest.mark.parametrize("file", ["json", "txt"])
+def test_what_is_no_file_counts_as_absent(file: str, kind: str, tmp_path: Path) -> None:
+    store, _ = stored(tmp_path)
+    store.path("stage", "key", file).unlink(missing_ok=True)
+    REPLACED[kind](store.path("stage", "key", file))
+    begun = time.process_time()
+    assert store.find("stage", "key") is None
+    assert time.process_time() - begun < SECONDS
+
+
+def test_strange_tables_with_right_sums_are_read_as_texts(tmp_path: Path) -> None:
+    store, record = stored(tmp_path)
+    altered(record, facts={"a": {"b": [1]}, "c": 3}, said={"warnings": 5})
+    found = store.find("stage", "key")
+    assert found is not None
+    assert found.facts == {"a": "{'b': [1]}", "c": "3"}
+    for strange in ([], 3, None):
+        altered(record, files=strange)
+        assert store.find("stage", "key") is None
 
 
 def test_a_result_that_is_no_dataset_is_refused(tmp_path: Path) -> None:

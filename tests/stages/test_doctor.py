@@ -69,5 +69,14 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> 
     assert code() == before
 
 
-def test_what_cannot_be_compiled_is_refused_at_once(command: Command) -> None:
-    assert "none.toml" in command("doctor", "--compile", "nowhere/none.toml", code=2).err
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (("--bundle", "four_bar", "--out", "x.csv"), "unknown format '.csv'"),
+        (("--bundle", "four_bar", "--out", "none/x.zip"), "its folder does not exist"),
+        (("--out", "x.zip"), "of --bundle, which is not given"),
+        (("--compile", "nowhere/none.toml"), "none.toml"),
+    ],
+)
+def test_what_the_doctor_cannot_do_is_refused_at_once(options: tuple[str, ...], words: str, command: Command) -> None:
+    assert words in command("doctor", *options, code=2).err

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import meshio
@@ -18,7 +19,7 @@ from flexclear.stages import meshing, simulation
 from flexclear.stages.graph import Graph
 from flexclear.structure.fe.exchange import files
 from flexclear.structure.kinds.kind import of_mesh
-from flexclear.system.errors import ResourceError
+from flexclear.system.errors import InputError, ResourceError
 from flexclear.system.external_files import companions, read_mesh
 from flexclear.system.progress import silent
 from flexclear.workflow.execute import execute, find, states
@@ -205,6 +206,62 @@ def test_numbers_next_to_xdmf_are_companions(tmp_path: Path, monkeypatch: pytest
     assert list(companions(tmp_path / "x.xdmf")) == [tmp_path / "x.h5", Path("b.bin")]
     (tmp_path / "x.xdmf").write_text("<Xdmf>")
     assert not list(companions(tmp_path / "x.xdmf"))
+
+
+@pytest.mark.parametrize(
+    "includes, words",
+    [
+        ({"a.inp": ["b.inp"], "b.inp": ["/dev/zero", "a.inp"]}, "in a circle"),
+        ({"a.inp": ["s/../a.inp", "t/../a.inp"]}, "in a circle"),
+        ({f"{name}.inp": 2 * [f"{other}.inp"] for name, other in pairwise("abcdefghijkl")}, "after 1000 others"),
+    ],
+    ids=["two files", "spellings that grow", "twice in twice"],
+)
+def test_includes_without_end_are_refused(tmp_path: Path, includes: dict[str, list[str]], words: str) -> None:
+    """Before they are read, which meshio would do again and again."""
+    for folder in ("s", "t"):
+        (tmp_path / folder).mkdir()
+    for name, others in includes.items():
+        (tmp_path / name).write_text("".join(f"*INCLUDE, INPUT={other}\n" for other in others))
+    with pytest.raises(InputError, match=words):
+        list(companions(tmp_path / "a.inp"))
+    (tmp_path / "body.toml").write_text(TETRAHEDRA.replace("body.ele", "a.inp"))
+    with pytest.raises(InputError, match=words):
+        mesh_task(tmp_path)
+
+
+def test_a_name_that_is_a_pattern_is_refused(tmp_path: Path) -> None:
+    """Of DOLFIN, whose reader may search with it without end."""
+    (tmp_path / "(a+)+b.xml").write_text(DOLFIN)
+    (tmp_path / ("a" * 40)).touch()
+    with pytest.raises(InputError, match="its reader interprets as a pattern"):
+        read_mesh(tmp_path / "(a+)+b.xml", "recipe", "cannot be read", "remedy")
+
+
+def test_parts_of_hdf5_in_other_files_are_refused(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    mesh = meshio.Mesh(np.eye(4, 3), [("tetra", np.array([[0, 1, 2, 3]]))])
+    mesh.write(tmp_path / "a.med")
+    assert len(read_mesh(tmp_path / "a.med", "recipe", "cannot be read", "remedy").points) == 4
+    with h5py.File(tmp_path / "a.med", "a") as file:
+        file["elsewhere"] = h5py.ExternalLink("other.h5", "/data")
+        with h5py.File(tmp_path / "b.med", "w", userblock_size=1024) as copy:
+            copy["elsewhere"] = h5py.ExternalLink("other.h5", "/data")
+    for name in ("a.med", "b.med"):
+        with pytest.raises(InputError, match=r"parts in other files, such as 'elsewhere'"):
+            read_mesh(tmp_path / name, "recipe", "cannot be read", "remedy")
+
+
+@pytest.mark.parametrize("start, needed", [(0, True), (512, True), (4096, True), (100, False)])
+def test_hdf5_may_begin_after_a_block_of_the_users(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: int, needed: bool
+) -> None:
+    """Seen here by the library that it asks for."""
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    (tmp_path / "a.stl").write_bytes(bytes(start) + b"\x89HDF\r\n\x1a\n" + bytes(100))
+    with pytest.raises(InputError) as error:
+        read_mesh(tmp_path / "a.stl", "recipe", "cannot be read", "remedy")
+    assert ("h5py" in str(error.value)) == needed
 
 
 def test_a_file_that_changes_while_it_is_read_stores_nothing(

@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING
 
 from flexclear.artifacts.paths import kernel_root, results_root
 from flexclear.artifacts.store import Store
-from flexclear.commands import new
+from flexclear.commands import new, reproduction
 from flexclear.dynamics.compile.folder import writable
 from flexclear.post.render import gl
 from flexclear.stages import scenes, simulation
 from flexclear.stages.kernels import warm
-from flexclear.stages.workplace import Workplace, open_workplace
+from flexclear.stages.workplace import Workplace, add_options, open_workplace
 from flexclear.system import machine
-from flexclear.system.errors import FlexclearError
+from flexclear.system.errors import FlexclearError, InputError
 from flexclear.workflow.fingerprint import TREE, library_version
 
 if TYPE_CHECKING:
@@ -91,16 +91,39 @@ class UnwellError(FlexclearError):
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
-    parser.add_argument(
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument("--bundle", metavar="SCENE", help="run a scene, and write all that repeats it into one file")
+    either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="repeat the run in such a file")
+    either.add_argument(
         "--compile",
         nargs="*",
         metavar="SCENE",
         help="compile the functions of these scenes without a run; without names those of most scenes",
     )
+    add_options(parser, "set")
+    parser.add_argument("--out", type=Path, metavar="FILE.zip", help="file that --bundle writes")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the findings line by line; raise UnwellError at the end when something is wrong."""
+    if options.out is not None:
+        if options.bundle is None:
+            raise InputError(
+                f"--out {options.out}", "is the file of --bundle, which is not given", "add --bundle SCENE"
+            )
+        scenes.check_out(options.out, (options.bundle,), endings=(".zip",))
+    if options.bundle is not None:
+        path, left_out = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
+        print(f"{path}: the scene's files, versions and messages; repeat with: flexclear doctor --repeat {path.name}")
+        for file in left_out:
+            print(f"left out: {file}, which is outside of the scene's folder; copy it there if it may be shared")
+        return
+    if options.repeat is not None:
+        same, report = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
+        print(report)
+        if not same:
+            raise UnwellError("the run ends differently here")
+        return
     if options.compile is not None:
         names = compiled_for(options.compile, open_workplace())
         print(f"compiled: all functions for runs of {', '.join(names)}; {_kernels()[0]}")

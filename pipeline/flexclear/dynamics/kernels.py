@@ -20,6 +20,8 @@ from typing import Any
 
 #: for debugging: kernels stay functions of Python, as with Numba's own setting
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
+#: for tests: nothing private of Numba is used, which takes two to three times as long
+PLAIN = os.environ.get("FLEXCLEAR_PLAIN_NUMBA", "") not in ("", "0")
 
 
 class Kernel:
@@ -54,7 +56,7 @@ def kernel(function: Callable) -> Any:
 # No kernel allocates, so none counts references; and only compiled code calls kernels: wrappers for Python and C took a
 # fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
 def _compiled(function: Callable) -> Any:
-    options = {
+    options: dict[str, Any] = {
         "error_model": "numpy",
         "fastmath": {"contract", "reassoc", "nsz"},
         "_nrt": False,
@@ -64,5 +66,6 @@ def _compiled(function: Callable) -> Any:
     from numba import njit
 
     import_module("flexclear.dynamics.field_types")  # named fields, which kernels use
-    compiler = import_module("flexclear.dynamics.lowering").KernelCompiler
-    return njit(**options, pipeline_class=compiler)(function)
+    if not PLAIN:
+        options["pipeline_class"] = import_module("flexclear.dynamics.lowering").KernelCompiler
+    return njit(**options)(function)

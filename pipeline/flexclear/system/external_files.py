@@ -1,16 +1,21 @@
-"""Files from other programs, read by libraries; every failure of a reader becomes an error in words."""
+"""Files from other programs: checks before and after a library reads them, since few libraries check.
+
+The files are read in this process. Every failure of a reader is reported as an error in words.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 from collections.abc import Iterator, Mapping
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.system import machine
-from flexclear.system.errors import FlexclearError, InputError, ResourceError
+from flexclear.system.errors import FlexclearError, InputError, ResourceError, shown
 
 if TYPE_CHECKING:
     import meshio
@@ -18,18 +23,37 @@ if TYPE_CHECKING:
 #: memory of a mesh while it is read, over the size of its file: text of 20 bytes becomes a number of 8 bytes, but in
 #: several copies
 COPIES = 5.0
+#: largest number of points of a structured grid: a header of a hundred bytes can announce any number
+MOST_POINTS = 2_000_000
+#: what a reader quotes of a file
+_QUOTED = re.compile(r"(['\"]).*?\1")
+_GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
+#: bytes of the header of a VTK file that are examined
+HEADER = 2000
+#: largest number of files that an Abaqus file may include, counted as often as they are read
+MOST_INCLUDES = 1000
+#: characters forbidden in names of DOLFIN files: meshio searches for their parts by a pattern that contains the name
+PATTERN = set("\\^$*+?{}[]|()")
 #: entry that meshio puts among the cell sets of a Gmsh 4 file, although it holds numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
 
-#: first bytes of an HDF5 file, or of one after a user block
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HDF5 = "MED and other formats in HDF5 need h5py: pip install 'flexclear[med]'"
 
 
 def require_file(path: Path, where: str) -> None:
-    """Raise InputError where there is no file to be read."""
-    if not path.is_file():
+    """Raise InputError unless a file to be read is an ordinary one.
+
+    Reading a device may never end; a pipe waits for a writer.
+    """
+    try:
+        exists, ordinary = path.exists(), path.is_file()
+    except (OSError, ValueError) as error:
+        raise InputError(where, f"'{path}' cannot be a file: {error}") from None
+    if not exists:
         raise InputError(where, f"there is no file {path}", "paths are relative to the file that names them")
+    if not ordinary:
+        raise InputError(where, f"'{path}' is not an ordinary file")
 
 
 @contextlib.contextmanager
@@ -47,7 +71,8 @@ def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> 
     except MemoryError:
         raise ResourceError(f"{where}: '{path.name}' is damaged, or needs more memory than available") from None
     except Exception as error:
-        raise InputError(where, f"{problem}: {error or type(error).__name__}", remedy) from None
+        reason = _QUOTED.sub("...", str(error)) or type(error).__name__  # the file may be private
+        raise InputError(where, f"{problem}: {shown(reason)}", remedy) from None
 
 
 def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | None = None) -> meshio.Mesh:
@@ -56,15 +81,28 @@ def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | 
     problem, remedy: of the InputError for unreadable files. largest: size limit [bytes]; default: the available memory.
     Raises ResourceError for larger files.
     """
+    _require_mesh(path, where, largest)
+    with reading(path, where, problem, remedy):
+        opened = [path, *companions(path)]
+        for file in opened:
+            require_file(file, where)
+            require_whole(file, where)
+        return _parsed(path)
+
+
+def _require_mesh(path: Path, where: str, largest: int | None) -> None:
+    """Raise InputError for no ordinary file or an oversized grid, ResourceError where memory does not suffice."""
     require_file(path, where)
     size = path.stat().st_size
     if largest is not None and size > largest:
         raise InputError(where, f"'{path.name}' is larger than {machine.size(largest)}", "export it coarser")
     machine.require_memory(COPIES * size, f"{where}: '{path.name}'", "use a coarser mesh")
-    with reading(path, where, problem, remedy):
-        for file in companions(path):
-            require_file(file, where)
-        return _parsed(path)
+    if path.suffix == ".vtk":
+        with path.open("rb") as file:
+            match = _GRID.search(file.read(HEADER))
+        count = prod(int(number) for number in match[1].split()) if match is not None else 0
+        if count > MOST_POINTS:
+            raise InputError(where, f"'{path.name}' declares a grid of {count:.3g} points, more than {MOST_POINTS}")
 
 
 def require_whole(path: Path, where: str) -> None:
@@ -144,16 +182,24 @@ def companions(path: Path) -> Iterator[Path]:
     """Yield the files that meshio reads with this one: of TetGen, DOLFIN and XDMF, and nested includes of Abaqus.
 
     Callers that depend on a mesh file depend on these, too: their content decides the result as well. A file that
-    cannot be examined has none, since its reader refuses it.
+    cannot be examined has none, since its reader refuses it. Raises InputError, after the existing files, where no
+    reader ends: for circular or too many includes; and for a name that DOLFIN's reader takes for a pattern.
     """
     includes = path.suffix.lower() == ".inp"
-    found = [path]
-    for file in found:  # grows by the includes of each file
+    waiting: list[tuple[Path, tuple[str, ...]]] = [(path, ())]
+    for file, above in waiting:  # grows by the includes of each file, as often as it is read
+        within = (*above, os.path.realpath(file))
         with contextlib.suppress(OSError, ValueError, SyntaxError):
+            if not file.is_file():  # a device has no end
+                continue
             for other in _included_by(file) if includes else _named_by(file):
-                if other not in found:
-                    yield other
-                    found += [other] if includes else []
+                circle = includes and os.path.realpath(other) in within
+                if circle or len(waiting) > MOST_INCLUDES:
+                    problem = "in a circle" if circle else f"after {MOST_INCLUDES} others, and more are not read"
+                    raise InputError(str(path), f"includes '{other}' {problem}", "remove that include")
+                yield other
+                if includes:
+                    waiting.append((other, within))
 
 
 def _included_by(path: Path) -> Iterator[Path]:
@@ -173,7 +219,10 @@ def _named_by(path: Path) -> Iterator[Path]:
     if path.suffix in (".ele", ".node"):
         yield path.with_suffix(".node" if path.suffix == ".ele" else ".ele")
     elif suffix == ".xml":
-        part = re.compile(f"{re.escape(path.stem)}_([^.]+)\\.xml")
+        if PATTERN & set(path.stem):
+            problem = f"its name has one of {' '.join(sorted(PATTERN))}, which its reader interprets as a pattern"
+            raise InputError(str(path), problem, "rename it")
+        part = re.compile(f"{path.stem}_([^.]+)\\.xml")
         yield from sorted(file for file in path.resolve().parent.iterdir() if part.match(file.name))
     elif suffix in (".xdmf", ".xmf"):
         yield from dict.fromkeys(_numbers_of_xdmf(path))

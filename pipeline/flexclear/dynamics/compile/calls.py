@@ -18,8 +18,7 @@ import flexclear.dynamics.field_types  # noqa: F401  (Numba knows named fields b
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile.files import SIGNATURES, compiles, interpreted
 from flexclear.dynamics.fields import data
-from flexclear.dynamics.kernels import INTERPRETED, kernel
-from flexclear.dynamics.lowering import WholeCompiler
+from flexclear.dynamics.kernels import INTERPRETED, PLAIN, kernel
 
 #: Numba's types of the arguments in `files.SIGNATURES`
 TYPES = {"I": types.CPointer(types.int64), "F": types.CPointer(types.float64), "i": types.int64, "f": types.float64}
@@ -46,7 +45,9 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 def exported(name: str) -> Callable[[Callable], int]:
     """Return the decorator that compiles a C function and returns its address."""
     options: dict[str, Any] = {"error_model": "numpy"}
-    if not INTERPRETED:
+    if not (INTERPRETED or PLAIN):
+        from flexclear.dynamics.lowering import WholeCompiler
+
         options["pipeline_class"] = WholeCompiler
     arguments = (TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
     return compiles(cfunc(types.int64(*arguments), **options))

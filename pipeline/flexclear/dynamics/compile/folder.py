@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 
 from flexclear.artifacts.disk import sweep
 from flexclear.dynamics.compile.files import CODE, file_lock, remove_code
+from flexclear.dynamics.kernels import PLAIN
 from flexclear.system.errors import InputError
 from flexclear.system.platforms import others_can_write
 
@@ -57,7 +58,7 @@ def processor() -> str:
     import llvmlite.binding as llvm
 
     settings = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
-    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings)
+    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings, *["plain"][: int(PLAIN)])
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
 
 

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from flexclear.dynamics.kernels import PLAIN
+
 #: names that only the exits of functions refer to which raise Python exceptions; no kernel does, and reaching one ends
 #: the process
 NEVER_REACHED = {
@@ -46,6 +48,8 @@ NOTHING = b"{}\n"
 
 def image(function: Any) -> bytes:
     """Return the code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
+    if PLAIN:
+        return stored(function.native_name, *assembled(function.inspect_llvm()))
     library = function._library  # private attributes of Numba, as those in `dynamics.lowering`
     return stored(function.native_name, library._final_module, bytes(library._get_compiled_object()))
 
