@@ -64,6 +64,16 @@ def alone(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> xr.Dataset:
     return found
 
 
+def test_without_a_horizon_the_run_is_integrated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same run to the last bit, without what only the perturbed run gives."""
+    whole = alone(check("bounce", **{"output.interval": 0.05}), monkeypatch)
+    monkeypatch.setattr(Pair, "perturbed_run", lambda *_: pytest.fail("a second run"))
+    once = dynamics.simulate(check("bounce", **{"output.interval": 0.05, "output.horizon": False}), {}, silent)
+    dropped = {"horizon", "separation", "separation_time"}
+    assert set(whole.variables) - set(once.variables) == dropped
+    assert once.equals(whole.drop_vars(dropped))
+
+
 @pytest.mark.usefixtures("parting")
 def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody, the run, and the twin."""

@@ -20,6 +20,7 @@ from flexclear.workflow.fingerprint import Sources
 from flexclear.workflow.progress import Monitor
 from flexclear.workflow.schedule import bring
 from flexclear.workflow.task import Task
+from tests.processes import python
 
 
 def one(width: int = 1) -> int:
@@ -100,6 +101,25 @@ def test_a_broken_pipe_is_that_of_the_output_or_of_a_helper(root: Path, whose: s
         assert process.wait() == code
     assert words in said
     assert "Traceback" not in said
+
+
+UNGUARDED = """
+from flexclear.stages.workplace import open_workplace
+from flexclear.workflow.task import Task
+tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in "ab"]
+open_workplace().bring(tasks, 2)
+"""
+
+
+def test_a_script_without_a_guard_is_told_to_have_one(root: Path, tmp_path: Path) -> None:
+    """Python runs it again in each process that it starts; each of these calls refuses to start more."""
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED, encoding="utf-8")
+    own = {"PYTHONPATH": str(root / "pipeline"), "FLEXCLEAR_RESULTS": str(tmp_path / "results")}
+    done = python(script, cwd=tmp_path, succeeds=False, **own)
+    assert done.returncode == 1
+    assert "put its calls below `if __name__ == '__main__':`" in done.stderr
+    assert "does the calling script lack `if __name__ == '__main__':`?" in done.stderr
 
 
 def test_a_worker_that_is_killed_between_two_calls_is_one_sentence() -> None:

@@ -67,5 +67,7 @@ def _compiled(function: Callable) -> Any:
 
     import_module("flexclear.dynamics.field_types")  # named fields, which kernels use
     if not PLAIN:
-        options["pipeline_class"] = import_module("flexclear.dynamics.lowering").KernelCompiler
+        from flexclear.dynamics.lowering import KernelCompiler
+
+        options["pipeline_class"] = KernelCompiler
     return njit(**options)(function)

@@ -21,7 +21,7 @@ from flexclear.artifacts.store import Record, Store
 from flexclear.scene.units import quantity
 from flexclear.system.errors import InputError, error_of
 from flexclear.system.log import set_level
-from flexclear.workflow import stopping
+from flexclear.workflow import stopping, workers
 from flexclear.workflow.fingerprint import Sources, sources_of
 from flexclear.workflow.progress import Monitor
 from flexclear.workflow.schedule import Outcome, bring
@@ -162,6 +162,7 @@ def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
 
     options: of a command, with `jobs`, `limit` and the amount of output.
     """
+    workers.require_guard()
     if options is not None:
         set_level(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
     monitor, root = Monitor(), results_root()

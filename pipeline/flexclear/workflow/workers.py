@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from flexclear.system.errors import ResourceError
+from flexclear.system.errors import InputError, ResourceError
 from flexclear.workflow import cores, stopping
 
 if TYPE_CHECKING:
@@ -63,6 +64,19 @@ class Channel:
         while not self.reports.empty():
             news.append(self.reports.get())
         return news
+
+
+def require_guard() -> None:
+    """Raise InputError in a worker that, while it starts, runs calls of its parent's script again."""
+    again = sys.modules.get(
+        "__mp_main__"
+    )  # as `multiprocessing` calls the script there; `__main__`, too, once it ended
+    if again is not None and again is not sys.modules["__main__"]:
+        raise InputError(
+            "the calling script",
+            "runs again in each of its processes",
+            "put its calls below `if __name__ == '__main__':`",
+        )
 
 
 def pool(width: int, channel: Channel | None = None) -> ProcessPoolExecutor:

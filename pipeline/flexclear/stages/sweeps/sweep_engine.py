@@ -87,8 +87,7 @@ class Engine:
                     running.clear()
                     lost += 1
                     if lost > MOST_LOSSES:
-                        text = f"worker processes were killed {lost} times in a row; is the memory full?"
-                        raise ResourceError(text) from None
+                        raise ResourceError(f"{lost} times in a row {workers.LOST}") from None
                     waiting += [list(reversed(batch)) for batch in again]
                     self.renew()
                     break
