@@ -26,7 +26,7 @@ from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 DYNAMICS = "flexclear.dynamics"
 #: modules that make code of a tape; and those that make lists
 EMITTING = ("routines.emission", "specialise.code")
-LISTING = (*EMITTING, "specialise.tape", *(f"routines.{name}" for name in ("calls", "store", "symbols")))
+LISTING = (*EMITTING, "memory", "specialise.tape", *(f"routines.{name}" for name in ("calls", "store", "symbols")))
 LISTING += tuple(f"mechanics.{name}" for name in ("closures", "joints", "mechanism", "of_model", "trees", "vectors"))
 
 
@@ -65,7 +65,10 @@ class ListInstance:
 
 def stored(topology: bytes, build: Callable[[], CallList], report: Callable[[str], None]) -> LoadedList:
     """Return the list of a topology, from disk or built; `report` receives a message before routines are compiled."""
-    path = writable(kernel_root(), report) / f"flexclear_routine_list_{_name(LISTING, topology)}{functions.CODE}"
+    path = (
+        writable(kernel_root(), report)
+        / f"flexclear_routine_list_{_name(LISTING, _interpreter() + topology)}{functions.CODE}"
+    )
     if path not in loaded:
         table = read_checked(path)
         at = functions.stored_codes(table["names"]) if table else None
@@ -90,7 +93,7 @@ def _table(calls: CallList) -> dict[str, list]:
     """Return a list as numbers: names of the interpreter and its codes, code of each call, and offsets of its runs."""
     number = {id(code): k for k, code in enumerate(calls.codes, start=1)}
     return {
-        "names": [_name(EMITTING, content) for content in (b"interpreter", *(code.digest for code in calls.codes))],
+        "names": [_name(EMITTING, content) for content in (_interpreter(), *(code.digest for code in calls.codes))],
         "codes": [number[id(call.code)] for call in calls.calls],
         "counts": [len(call.offsets) for call in calls.calls],
         "offsets": [offset for call in calls.calls for offset in call.offsets],
@@ -103,6 +106,12 @@ def _loaded(table: dict[str, list], at: dict[str, int]) -> LoadedList:
     begins = np.cumsum([0, *table["counts"]])[:-1]
     offsets = np.array(table["offsets"], dtype=np.int32)
     return LoadedList(int(addresses[0]), addresses[table["codes"]], offsets, begins, table["size"][0])
+
+
+@cache
+def _interpreter() -> bytes:
+    """Return the interpreter's text, which reads places of h: the declarations of effects move them."""
+    return interpreter_text().encode()
 
 
 @cache
