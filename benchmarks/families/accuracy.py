@@ -49,7 +49,8 @@ def show(records: list[Record]) -> str:
     for scene in (name for name in SCENES if name in measured):
         mine = [r for r in records if r["case"] == scene]
         tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r and _shown(r["table"]))
-        pictures = {r["picture"]: r["path"] for r in mine if "picture" in r}
+        # the log of former studies has pictures of causes and means as well, which are tables now
+        pictures = {r["picture"]: r["path"] for r in mine if r.get("file") == "work_precision.png"}
         advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(
             " To refine"
         )  # as the table of causes

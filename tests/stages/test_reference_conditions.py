@@ -90,10 +90,9 @@ def test_the_page_has_a_part_and_a_figure_per_group() -> None:
     assert isinstance(parts, dict)
     assert parts.keys() == {"short", "claims", "far", "clearance"}
     assert "**Holds** at all three places." in parts["claims"]
-    assert reference_conditions.files(records).keys() == {
-        "reference-conditions/far.png",
-        "reference-conditions/clearance.png",
-    }
+    found = reference_conditions.files(records).keys()
+    names = ("claims.csv", "far.csv", "far.png", "clearance.csv", "clearance.png")
+    assert found == {f"reference-conditions/{name}" for name in names}
 
 
 def test_cases_take_the_scene_of_their_place() -> None:

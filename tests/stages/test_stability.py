@@ -162,7 +162,7 @@ def test_the_page_counts_and_quotes_refusals():
     records[0] |= {"verdict": REFUSED, "reason": "at t = 0.1 s: the step shrank"}
     written = FAMILY.show(records)
     assert f"**{len(made) - 1} of {len(made)} finished**, 1 were refused" in written
-    assert "refused (clearance 1e-06): at t = 0.1 s: the step shrank" in written
+    assert "refused (clearance): at t = 0.1 s: the step shrank" in written
     assert "Seed of the random points: 7." in written
     pictures = FAMILY.files(records)
     assert set(pictures) == {f"stability/{name}.png" for name in ("sweeps", "ledger", "horizon", "random")}
