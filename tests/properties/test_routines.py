@@ -447,14 +447,3 @@ def test_a_list_belongs_to_the_rows_that_are_selected() -> None:
     assert not kept.all()
     assert lists[0] == lists[2] != lists[1]
     assert reports == [m.OK, m.SINGULAR, m.OK]
-
-
-def test_the_interpreter_belongs_to_the_header_that_it_reads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The declarations of effects move the header's entries, without a change of the interpreter's own source."""
-    names = []
-    for place in (m.CALLS, m.CALLS + 1):
-        monkeypatch.setattr(m, "CALLS", place)
-        store._interpreter.cache_clear()
-        names.append(store._table(CallList())["names"])
-    store._interpreter.cache_clear()
-    assert names[0] != names[1]

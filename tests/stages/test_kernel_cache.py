@@ -9,8 +9,10 @@ import pytest
 
 from flexclear.artifacts.disk import checked, publish
 from flexclear.artifacts.paths import kernel_root, results_root
+from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import files, folder, machine_code
 from flexclear.dynamics.compile.files import compiled, file_lock, load_files, loaded
+from flexclear.dynamics.routines import calls, store
 from flexclear.system.errors import InputError
 
 #: a constant that a flipped bit of the code would change
@@ -146,3 +148,14 @@ def test_what_nobody_uses_is_pruned(kernel: Path) -> None:
     assert folder.prune(kernel.parent, largest=1) == 1
     assert not parts(kernel)[1:]
     assert not kernel.exists()
+
+
+def test_the_interpreter_belongs_to_the_header_that_it_reads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The declarations of effects move the header's entries, without a change of the interpreter's own source."""
+    names = []
+    for place in (m.CALLS, m.CALLS + 1):
+        monkeypatch.setattr(m, "CALLS", place)
+        store._interpreter.cache_clear()
+        names.append(store._table(calls.CallList())["names"])
+    store._interpreter.cache_clear()
+    assert names[0] != names[1]
