@@ -51,9 +51,8 @@ def show(records: list[Record]) -> str:
         tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r and _shown(r["table"]))
         # the log of former studies has pictures of causes and means as well, which are tables now
         pictures = {r["picture"]: r["path"] for r in mine if r.get("file") == "work_precision.png"}
-        advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(
-            " To refine"
-        )  # as the table of causes
+        # what to refine is in the table of causes
+        advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(" To refine")
         found.append(Studied(scene, advice, tables, pictures))
     return sections(tuple(found))
 

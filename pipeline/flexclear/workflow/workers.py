@@ -68,9 +68,8 @@ class Channel:
 
 def require_guard() -> None:
     """Raise InputError in a worker that, while it starts, runs calls of its parent's script again."""
-    again = sys.modules.get(
-        "__mp_main__"
-    )  # as `multiprocessing` calls the script there; `__main__`, too, once it ended
+    # `multiprocessing` calls the script `__mp_main__` while it runs, and `__main__` as well once it has ended
+    again = sys.modules.get("__mp_main__")
     if again is not None and again is not sys.modules["__main__"]:
         raise InputError(
             "the calling script",

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.artifacts.disk import disk_limits, publish, temporary
+from flexclear.artifacts.disk import disk_limits, publish
 from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import machine_code, reach, sources
@@ -30,7 +30,6 @@ from flexclear.dynamics.compile.folder import prune, writable
 from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
 from flexclear.dynamics.effects import DEEP, METHOD, Parts, Scheme
 from flexclear.dynamics.kernels import INTERPRETED
-from flexclear.system.platforms import replace
 from flexclear.workflow.encounters import meet
 from flexclear.workflow.fingerprint import library_version
 
@@ -129,7 +128,7 @@ def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], No
                     compiling = True
                     report("compiling routines (first run of a mechanism of this kind only)")
                 image = machine_code.stored("routine", *machine_code.assembled(texts[name](), 2, optimised=False))
-                keep(path, image)
+                publish(path, image)
                 loaded.setdefault(path.stem, machine_code.load(image))
         if compiling:
             prune(folder)
@@ -142,13 +141,6 @@ def stored_codes(names: Iterable[str]) -> dict[str, int] | None:
     if not all(path.stem in loaded or _loads(path) for path in paths.values()):
         return None
     return {name: loaded[path.stem].address for name, path in paths.items()}
-
-
-def keep(path: Path, content: bytes) -> None:
-    """Write a file without forcing it to the disk: what is damaged is noticed and made again."""
-    with temporary(path) as scratch:
-        scratch.write_bytes(content)
-        replace(scratch, path)
 
 
 def _routines(names: Iterable[str], report: Callable[[str], None]) -> dict[str, Path]:
