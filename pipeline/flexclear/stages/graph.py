@@ -62,7 +62,7 @@ class Graph:
             body: self._task(
                 "mesh",
                 "meshing:run",
-                meshing.params(recipe, self.recipe),
+                meshing.params(recipe, self.recipe, getattr(self.scene.body[body], "segment", None)),
                 part=body,
                 modules=meshing.modules(recipe),
                 context={"folder": str(recipe.parent.resolve()), "file": self.scene.recipes()[body]},

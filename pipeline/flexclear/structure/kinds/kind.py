@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,7 @@ class Kind:
     vtu: a VTU file of the mesh dataset, for ParaView.
     assemble: the model of the mesh dataset.
     words: one word for the motion of each mode, from its family and vectors of shape (ndof, n).
+    cut: one segment of a mesh dataset; None for kinds without any.
     exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
         families and the interfaces' names; None for kinds without any.
     second_order: second-order motion of vectors (ndof, n) that follows from stresses: without stiffening by forces and
@@ -45,17 +46,29 @@ class Kind:
     vtu: Callable[[xr.Dataset], bytes]
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
+    cut: Callable[[xr.Dataset, Sequence[int]], xr.Dataset] | None = None
     exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] | None = None
     second_order: Callable[[xr.Dataset, Model, np.ndarray, bool, Interface | None], SecondOrder | None] = no_stresses
 
 
-def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLACE) -> xr.Dataset:
+def build(
+    recipe: Mapping[str, Any],
+    folder: str | Path = ".",
+    where: str = PLACE,
+    segment: Sequence[int] | None = None,
+) -> xr.Dataset:
     """Build the mesh dataset of a recipe's table; raise InputError for a wrong recipe or frames off the body.
 
-    folder: base of relative paths in the recipe.  where: name of the recipe in messages.
+    folder: base of relative paths in the recipe.  where: name of the recipe in messages.  segment: of its rod, (k, n)
+    for the k-th of n; default: the whole.
     """
     kind: Kind = lookup(FAMILY, name_of(recipe), where="shape.type")
-    return kind.build(parse(recipe, where), Path(folder), where)
+    mesh = kind.build(parse(recipe, where), Path(folder), where)
+    if segment is None:
+        return mesh
+    if kind.cut is None:
+        raise InputError(where, "is no rod, so that it has no segments", "remove segment")
+    return kind.cut(mesh, segment)
 
 
 def of_mesh(mesh: xr.Dataset) -> Kind:
