@@ -78,6 +78,7 @@ def _task(
         run=f"flexclear.stages.effect_study:{stage}",
         params={"title": scene.title, **watched, **params},
         inputs=inputs,
+        code=("flexclear.post",),
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": f"{stage}.nc"},
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flexclear.scene.registry import lookup, module_of
+from flexclear.scene.registry import listed, lookup
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,9 +25,10 @@ def params(scene: Scene, body: str) -> dict[str, Any]:
     return requested | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
 
 
-def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
-    """Return the module for the requested stresses; raise InputError when there is none."""
-    return (module_of(STRESS, kind, where=WHERE),) if "stress" in params(scene, body) else ()
+def check(scene: Scene, body: str, kind: str) -> None:
+    """Raise InputError where stresses are requested of a kind of body that has none."""
+    if "stress" in params(scene, body):
+        listed(STRESS, kind, where=WHERE)
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
             "members": _members(variant, members),
         },
         inputs=graph.bodies(),
-        modules=simulation.modules(variant),
+        code=("flexclear.stages.kernels", *simulation.CODE),
     )
 
 

@@ -21,7 +21,6 @@ from flexclear.scene import integrators
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.registry import lookup, module_of
 from flexclear.scene.variants import WITHOUT_CLEARANCE, loose
-from flexclear.workflow.encounters import meet
 
 if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
@@ -34,10 +33,8 @@ LOADS, LAWS = "flexclear.dynamics.loads", "flexclear.dynamics.drives"
 RECORDS = "flexclear.dynamics.record"
 EVENTS, RUNS = "flexclear.dynamics.events", "flexclear.dynamics.run"
 INTEGRATORS, STARTS = "flexclear.dynamics.integrate", "flexclear.dynamics.starts"
-#: ways that start at singular poses and pass over them, and the word for them: only runs with loops may need them
-POSES, SINGULAR = ("beginning", "collocation", "passing"), "singular poses"
-#: words for what a run encounters: a deep tree, or an integration method
-DEEP, METHOD = "a deep tree", "the method {}"
+#: ways that start at singular poses and pass over them: only runs with loops may need them
+POSES = ("beginning", "collocation", "passing")
 #: laws of time that are polynomials throughout, or composed of other laws
 WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated", "delayed"}
 
@@ -196,14 +193,9 @@ def ways(scene: Scene) -> list[str]:
 
 
 def way(scene: Scene, name: str) -> Any:
-    """Import and return the way that `dynamics.run` lists under a name where the scene needs it; else None.
-
-    Only then the key of a run contains it.
-    """
+    """Import and return the way that `dynamics.run` lists under a name where the scene needs it; else None."""
     if name not in ways(scene):
         return None
-    if name in POSES:
-        meet(SINGULAR)
     return lookup(RUNS, name, where="run")
 
 
