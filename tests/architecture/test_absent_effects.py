@@ -168,13 +168,13 @@ EFFECTS = {
     "flexible bodies": ("flexible_bodies", "flexclear.dynamics.bodies.flexible"),
     "closures": ("closures=", "flexclear.dynamics.equations.closures"),
     "singular poses": ("poses=singular_step", "flexclear.dynamics.integrate.singular_step"),
-    "couplings": ("make_coupled_closing", "flexclear.dynamics.effects.gears.equations"),
-    "stops": ("make_stops", "flexclear.dynamics.effects.stops.contact"),
-    "stiffening": ("flexible_bodies(bodies)", "flexclear.dynamics.effects.stiffening.bodies"),
+    "couplings": ("make_coupled_closing", "flexclear.dynamics.equations.gears"),
+    "stops": ("make_stops", "flexclear.dynamics.contact.stops"),
+    "stiffening": ("flexible_bodies(bodies)", "flexclear.dynamics.bodies.stiffening"),
     "loads": ("make_loads", "flexclear.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "flexclear.dynamics.drives.oscillation"),
-    "joint friction": ("make_joint_friction", "flexclear.dynamics.effects.joint_friction.equations"),
-    "wear": ("import wearing", "flexclear.dynamics.effects.wear.contact"),
+    "joint friction": ("make_joint_friction", "flexclear.dynamics.equations.joint_friction"),
+    "wear": ("import wearing", "flexclear.dynamics.contact.wear"),
     "guards": ("integrate.guards import", "flexclear.dynamics.integrate.guards"),
 }
 SPRING = ("spring-damper",)

@@ -112,12 +112,12 @@ BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
             }
         },
         Parts(("cylindrical",), forms=("hysteretic",), effects=("stops",)),
-        "flexclear.dynamics.effects.stops.contact",
+        "flexclear.dynamics.contact.stops",
     ),
     "gear": (
         {"gear": {"screw": {"first": "J.rotation", "second": "J.translation", "ratio": 0.1}}},
         Parts(("cylindrical",), closures=True, effects=("gears",)),
-        "flexclear.dynamics.effects.gears.equations",
+        "flexclear.dynamics.equations.gears",
     ),
 }
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import cache, cached_property
-from importlib import import_module
 from typing import Any
 
 #: releases of Numba with which `lowering` has been tested
@@ -87,6 +86,5 @@ def _compiled(function: Callable) -> Any:
     }
     from numba import njit
 
-    import_module("flexclear.dynamics.field_types")  # named fields, which kernels use
     module = lowering()
     return njit(**options, **({"pipeline_class": module.KernelCompiler} if module else {}))(function)

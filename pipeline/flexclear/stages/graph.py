@@ -32,7 +32,7 @@ ARTIFACTS = {name: name for name in (*STAGES, "sections", "verdict", "tight")}
 ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
 #: code that decides the results of a module of `stages`, besides its own
 STRUCTURE, POST = ("flexclear.structure",), ("flexclear.post",)
-CODE = dict.fromkeys(("meshing", "modal_analysis", "reduction", "rigid_body"), STRUCTURE)
+CODE: dict[str, tuple[str, ...]] = dict.fromkeys(("meshing", "modal_analysis", "reduction", "rigid_body"), STRUCTURE)
 CODE |= dict.fromkeys(("simulation", "analyses"), simulation.CODE)
 CODE |= {"derived_series": ("flexclear.stages.meshing", *POST), "evaluation": POST}
 CODE |= {"rendering": ("flexclear.stages.simulation", *POST)}

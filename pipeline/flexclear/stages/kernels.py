@@ -34,14 +34,14 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
     )
 
 
-def shared(scene: Scene) -> tuple[object, ...]:
+def shared(scene: Scene) -> tuple[str, ...]:
     """Return a tuple that is equal for scenes that run on the same kernels: numbers are not compiled, and code
     specialised for one topology is left to the runs, a second of processor time each."""
     from flexclear.dynamics.effects import most_parts, schemes
     from flexclear.scene.events import with_switched
 
     whole = with_switched(scene) if scene.event else scene
-    return (most_parts(whole), *schemes(whole))
+    return (repr(most_parts(whole)), *map(repr, schemes(whole)))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from flexclear.scene.parts import FlexibleBody
     from flexclear.system.progress import Progress
 
-CONDITIONS = "flexclear.structure.modes.reference"
-
 
 def params(body: FlexibleBody) -> dict[str, Any]:
     """Return the selected modal coordinates; nothing else of the body decides its modes."""
@@ -23,9 +21,11 @@ def params(body: FlexibleBody) -> dict[str, Any]:
 
 def check(params: Mapping[str, Any]) -> None:
     """Raise InputError for the name of an unknown reference condition."""
+    from flexclear.structure.modes.reference import CONDITIONS
+
     for key in ("reference", "of"):
         if params.get(key):
-            lookup(CONDITIONS, params[key], where=f"modes.{key}")
+            lookup(CONDITIONS, params[key], kind="reference condition", where=f"modes.{key}")
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -7,5 +7,5 @@ from flexclear.dynamics.effects.effect import Effect
 STIFFENING = Effect(
     "stiffening",
     lambda scene: () if any(body.stiffening is not None for body in scene.flexible().values()) else None,
-    compose={"forces": {"flexible": "flexible_bodies(<bodies>)"}},
+    compose={"forces": {"flexible": "flexible_bodies(<bodies.stiffening>)"}},
 )
