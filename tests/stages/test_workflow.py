@@ -118,7 +118,7 @@ def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
     assert "the disk is full" in done.stderr
     assert "Traceback" not in done.stderr
     left = [path.name for path in project.results.rglob("*") if path.is_file() and path.stat().st_size]
-    assert left == ["imports.json"]  # which was there before
+    assert left == ["code.json"]  # which was there before
 
 
 def test_a_scene_that_says_the_same_under_another_name_is_not_run_again(here: Project):
