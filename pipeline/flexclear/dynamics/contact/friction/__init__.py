@@ -8,4 +8,8 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.friction import ambrosio, lugre, modified_coulomb
 
-FRICTION_LAWS = {"modified-coulomb": modified_coulomb.LAW, "ambrosio": ambrosio.LAW, "lugre": lugre.LAW}
+FRICTION_LAWS = {
+    "modified-coulomb": modified_coulomb.LAW,
+    "ambrosio": ambrosio.LAW,
+    "lugre": lugre.LAW,
+}
