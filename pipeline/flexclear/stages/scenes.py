@@ -192,12 +192,23 @@ def linear(scene: Scene, time: float | None = None, workplace: Workplace | None 
 
     pose: as of `Graph.linear`.
     """
+    return _at_rest(scene, "linear", time, workplace, pose)
+
+
+def state_space(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
+    """Return the state space of a scene about its equilibrium, brought up to date; pose: as of `Graph.state_space`."""
+    return _at_rest(scene, "state_space", time, workplace, pose)
+
+
+def _at_rest(
+    scene: Scene, task: str, time: float | None, workplace: Workplace | None, pose: Mapping[str, Any]
+) -> xr.Dataset:
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
-    task = Graph(scene, shown=as_in_its_file(scene)).linear(time, **pose)
-    return (workplace or open_workplace()).datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
+    made = getattr(Graph(scene, shown=as_in_its_file(scene)), task)(time, **pose)
+    return (workplace or open_workplace()).datasets(made)[0].assign_attrs(title=scene.title, scene=scene.name)
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
