@@ -252,7 +252,7 @@ def state_space(
     >>> fc.state_space("scenes/checks/oscillator.toml")["A"].values.round(9).tolist()
     [[0.0, 1.0], [-100.0, -2.0]]
     """
-    return scenes.state_space(_loaded(scene), time, drives=drives, held=held)
+    return scenes.linear(_loaded(scene), time, task="state_space", drives=drives, held=held)
 
 
 def export(scene: Scene | str | Path, format: str, target: str | Path | None = None, **options: Any) -> str:

@@ -109,7 +109,7 @@ def _carriers(scene: Scene, body: str, workplace: Workplace) -> tuple[str, Calla
 
 
 def _write_state_space(scene: Scene, target: Path, asked: Mapping[str, Any], workplace: Workplace) -> str:
-    made = scenes.state_space(scene, asked.get("at"), workplace, held=bool(asked.get("held")))
+    made = scenes.linear(scene, asked.get("at"), workplace, "state_space", held=bool(asked.get("held")))
     export.write(made, target)
     counts = {what: made.sizes[what] for what in ("state", "input", "output")}
     sizes = ", ".join(f"{count} {what}{'' if count == 1 else 's'}" for what, count in counts.items())

@@ -187,22 +187,13 @@ def deficits(graph: Graph, workplace: Workplace) -> str:
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
-def linear(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
+def linear(
+    scene: Scene, time: float | None = None, workplace: Workplace | None = None, task: str = "linear", **pose: Any
+) -> xr.Dataset:
     """Return the equilibrium of a scene in one pose, and its natural vibrations; brought up to date as `run` is.
 
-    pose: as of `Graph.linear`.
+    task, pose: `Graph.linear` or `Graph.state_space`, and its arguments.
     """
-    return _at_rest(scene, "linear", time, workplace, pose)
-
-
-def state_space(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
-    """Return the state space of a scene about its equilibrium, brought up to date; pose: as of `Graph.state_space`."""
-    return _at_rest(scene, "state_space", time, workplace, pose)
-
-
-def _at_rest(
-    scene: Scene, task: str, time: float | None, workplace: Workplace | None, pose: Mapping[str, Any]
-) -> xr.Dataset:
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
