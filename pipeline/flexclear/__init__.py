@@ -36,6 +36,7 @@ __all__ = [
     "sections",
     "sensitivities",
     "show",
+    "simulation",
     "stability",
     "stage",
     "sweep",
