@@ -321,3 +321,90 @@ def test_a_motion_that_cannot_continue_says_so_until_it_is_restored():
         sim.state = state
         sim.advance(0.1)
         assert sim.time == 0.1
+
+
+# Going on from a run -------------------------------------------------------------------------------------------------
+
+
+def split(scene: Any, fraction: float, folder: Path) -> tuple[Any, Any]:
+    """The run of a scene at its end, in one piece and in two."""
+    between = fraction * scene.time.end
+    fc.run(fc.edited(scene, {"time.end": between})).to_netcdf(folder / "run.nc")
+    later = fc.edited(scene, {"time.start": between, "start": {"from": str(folder / "run.nc")}})
+    return fc.run(scene), fc.run(later)
+
+
+@pytest.mark.parametrize(
+    "name, fraction, allowed",
+    [
+        ("four_bars_2", 0.5, 1e-7),  # closed loops that have turned three times
+        ("controllers", 0.504, 1e-10),  # integrals, limited ones too; at the 72nd sample of one controller
+        ("clearance_slider_crank", 0.5, 1e-9),  # in contact
+        ("stops", 0.5, 1e-9),
+        ("bushing", 0.5, 1e-9),
+        ("spinup_beam_stiffened", 0.5, 1e-7),  # modes that move the centre of mass to second order
+    ],
+)
+def test_a_run_goes_on_from_a_run(root: Path, tmp_path: Path, name: str, fraction: float, allowed: float):
+    """allowed: some hundred times what two runs at the scene's tolerance differ by."""
+    whole, later = split(check(root, name), fraction, tmp_path)
+    assert "start_mended" not in later.attrs
+    for kind in ("position", "angular_velocity", "joint_position", "modal_coordinate", "controller_force"):
+        if kind in whole:
+            assert later[kind][-1].values == pytest.approx(whole[kind][-1].values, abs=allowed), kind
+
+
+def test_bristles_go_on(root: Path, tmp_path: Path):
+    """A pendulum whose pin's bristles hold it bent; half a run later they still do."""
+    bristles = {"law": "lugre", "static": 0.5, "dynamic": 0.4, "v_stribeck": 2e-2, "bristle_stiffness": 1e3}
+    scene = fc.edited(check(root, "pendulum"), {"joint.hinge.friction": {**bristles, "radius": 0.2}, "time.end": 1.0})
+    whole, later = split(scene, 0.5, tmp_path)
+    assert np.abs(whole.internal_state.values).max() > 1e-6
+    for kind in ("position", "internal_state"):
+        assert later[kind][-1].values == pytest.approx(whole[kind][-1].values, abs=1e-9)
+
+
+def test_a_run_goes_on_from_a_time_in_it(root: Path, tmp_path: Path):
+    scene = check(root, "pendulum")
+    whole = fc.run(scene)
+    whole.to_netcdf(tmp_path / "run.nc")
+    middle = float(whole.time[len(whole.time) // 2])
+    start = {"from": str(tmp_path / "run.nc"), "time": middle}
+    later = fc.run(fc.edited(scene, {"time.start": middle, "start": start}))
+    assert later.position[-1].values == pytest.approx(whole.position[-1].values, abs=1e-8)
+    assert float(later.time[0]) == middle
+
+
+def test_a_run_that_cannot_be_continued_is_refused_in_words(root: Path, tmp_path: Path):
+    scene, file = check(root, "pendulum"), tmp_path / "run.nc"
+    whole = fc.run(fc.edited(scene, {"time.end": 0.1}))
+    whole.to_netcdf(file)
+    data = file.read_bytes()
+
+    def refused(said: str, start: dict[str, Any] | None = None, other: Any = scene) -> None:
+        with pytest.raises(fc.InputError, match=said) as error:
+            fc.run(fc.edited(other, {"start": {"from": str(file), **(start or {})}}))
+        assert "start" in str(error.value)
+
+    refused(r"no row at 0\.0333 s; the nearest are at ", {"time": 0.0333})
+    refused("determines the whole start: remove start.at", {"at": "equilibrium"})
+    refused("of other bodies: this scene has 'slide', that run has not", None, slide())
+    file.write_bytes(data[: len(data) // 2])
+    refused("run.nc cannot be read as a run")
+    file.write_bytes(b"not a run")
+    refused("run.nc cannot be read as a run")
+    whole[["kinetic"]].to_netcdf(file)
+    refused("is not a run of flexclear")
+    for name, value in (("velocity", np.nan), ("quaternion", 3.0)):
+        broken = whole.copy(deep=True)
+        broken[name][-1] = value
+        broken.to_netcdf(file)
+        refused("run.nc is damaged")
+    whole.isel(time=slice(0, 0)).to_netcdf(file)
+    refused("has no rows")
+    file.unlink()
+    refused("there is no file")
+    file.mkdir()
+    refused("is not an ordinary file")
+    with pytest.raises(fc.InputError, match="time is that of a run"):
+        fc.edited(scene, {"start": {"time": 0.1}})

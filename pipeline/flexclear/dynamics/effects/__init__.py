@@ -167,8 +167,8 @@ def named(scene: Scene) -> set[str]:
     for effect in EFFECTS:
         parts += [(f"flexclear.dynamics.{family}", name, at) for family, name, at in effect.named(scene)]
     parts += [(LOADS, load.type, f"[load.{name}]") for name, load in scene.load.items()]
-    if scene.start is not None and scene.start.at is not None:
-        parts.append((STARTS, scene.start.at, "[start.at]"))
+    if scene.start is not None and scene.start.begins is not None:
+        parts.append((STARTS, scene.start.begins, "[start.at]"))
         laws += ["constant", "polynomial"] if scene.start.joint else []  # which hold given positions
         parts += [(JOINTS, str(one.ideal), f"[joint.{name}]") for name, one in loose(scene).items()]
     parts += [(RECORDS, name, "[output]") for name in scene.output.requests()]

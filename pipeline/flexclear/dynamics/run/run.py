@@ -81,9 +81,9 @@ def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
 def placed(scene: Scene) -> Scene:
     """Return the scene with bodies positioned by joints and drives at the begin of the run, if it begins elsewhere."""
-    if scene.start is None or scene.start.at is None:
+    if scene.start is None or scene.start.begins is None:
         return scene
-    scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
+    scene_placed: Scene = import_module(module_of(STARTS, scene.start.begins, where="[start.at]")).placed(scene)
     return scene_placed
 
 
@@ -98,9 +98,9 @@ def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
     Return also which of several assemblies was chosen, in words; empty when there is one, or the scene chooses.
     """
-    if scene.start is None or scene.start.at is None:
+    if scene.start is None or scene.start.begins is None:
         return scene, ""
-    begin = lookup(STARTS, scene.start.at, where="[start.at]")
+    begin = lookup(STARTS, scene.start.begins, where="[start.at]")
     started: tuple[Scene, str] = begin(scene, bundles, progress)
     return started
 

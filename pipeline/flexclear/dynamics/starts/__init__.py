@@ -4,7 +4,7 @@ scene/start.
 Each module has a function ``begin(scene, bundles, progress) -> (Scene, str)``: the scene with the poses, velocities and
 modal coordinates of that start in place of its own, and `Mechanism.choice` of the mechanism that gave them;
 and ``placed(scene) -> Scene``: the scene whose joints and drives position the bodies there, which `flexclear check`
-builds.
+builds.  `recorded` is that of ``[start] from``.
 """
 
 from typing import get_args
@@ -12,4 +12,4 @@ from typing import get_args
 from flexclear.scene.start import At
 
 KIND = "start"
-NAMES = {name: f"{name}:begin" for name in get_args(At)}
+NAMES = {name: f"{name}:begin" for name in (*get_args(At), "recorded")}
