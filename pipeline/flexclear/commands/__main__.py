@@ -34,6 +34,7 @@ COMMANDS = {
     "sections": "classify a repeated motion as periodic, quasi-periodic or chaotic",
     "frequencies": "compute an equilibrium and its natural frequencies",
     "report": "write the page of scenes: answers, film, figures, assumptions, cost",
+    "export": "write a scene for another program, as an FMU for co-simulation",
     "schema": "print a JSON schema of scenes, recipes or sweeps",
     "cite": "list the sources of the methods and data that a scene uses",
     "completion": "print the completion script for bash or zsh",
